@@ -23,7 +23,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     text = _text(collection_path)
     if collection_path.name.startswith('test_'):
         return True if any(marker not in text for marker in asked_for(config.getoption('markexpr'))) else None
-    needs_ros = bool({'nodes', 'ros'} & set(collection_path.parts))
+    needs_ros = bool({'nodes', 'ros', 'ros.py', 'ros_testing.py', 'operator.py'} & set(collection_path.parts))
     return True if config.getoption('doctestmodules') and (needs_ros or '>>> ' not in text) else None
 
 

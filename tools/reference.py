@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 
 import yaml
 
-from texture_core.parameters import markdown_table
+from texture_core.config import markdown_table
 from texture_papers.protocol import digest_of
 
 ROOT = Path(__file__).parents[1]

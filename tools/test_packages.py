@@ -84,11 +84,10 @@ SCIPY = frozenset({'scipy'})
 LAYERS: Mapping[str, Layer] = {
     'texture_msgs': Layer(of()),
     'texture_core': Layer(of('msgs'), never=LEARNING | DRAWING | SCIPY),
-    'texture_launch': Layer(of('core'), never=LEARNING | DRAWING | SCIPY | {'numpy', 'rclpy'}),
     'texture_drivers': Layer(
         of('msgs', 'core'),
         never=LEARNING | DRAWING | SCIPY,
-        late={'texture_drivers.file.recording': SCIPY, 'texture_drivers.pvdf.charge_leak': SCIPY},
+        late={'texture_drivers.file': SCIPY, 'texture_drivers.pvdf': SCIPY},
     ),
     'texture_features': Layer(of('msgs', 'core'), never=LEARNING | DRAWING),
     'texture_estimation': Layer(of('msgs', 'core', 'features'), never=DRAWING | {'rosbags'}),
@@ -96,21 +95,21 @@ LAYERS: Mapping[str, Layer] = {
         of('msgs', 'core', 'features'),
         tests=of('drivers'),
         never=LEARNING | DRAWING | SCIPY,
-        late={'texture_recordings.importers.ntp21': SCIPY, 'texture_recordings.tables.tables': SCIPY},
+        late={'texture_recordings.public_sets': SCIPY, 'texture_recordings.tables': SCIPY},
     ),
     'texture_simulation': Layer(of('msgs', 'core', 'drivers', 'recordings'), never=LEARNING | DRAWING),
     'texture_exploration': Layer(of('msgs', 'core'), tests=of('features', 'simulation'), never=LEARNING | DRAWING),
     'texture_evaluation': Layer(of('msgs', 'core', 'features', 'estimation', 'recordings'), tests=of('simulation')),
     'texture_bringup': Layer(
         of(
-            'msgs', 'core', 'launch', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
+            'msgs', 'core', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
             'evaluation',
         )
     ),
     'texture_papers': Layer(of('msgs', 'core', 'features', 'estimation', 'recordings', 'simulation', 'evaluation')),
     'texture_benchmarks': Layer(
         of(
-            'msgs', 'core', 'launch', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
+            'msgs', 'core', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
             'evaluation', 'bringup', 'papers',
         )
     ),

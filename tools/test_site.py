@@ -20,19 +20,19 @@ import pytest
 import reference
 
 from texture_bringup.command import installed
-from texture_core.exploration import ExplorationRequest
-from texture_core.parameters import parameters_of
+from texture_core.config import parameters_of
+from texture_core.types import ExplorationRequest
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.params import SensorParams
+from texture_drivers.sensor import SensorParams
 from texture_estimation.model import load_model
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.explorer import Exploration
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 from texture_features.feature import WindowBatch
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_simulation.offline import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / 'docs'

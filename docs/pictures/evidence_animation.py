@@ -14,14 +14,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 
-from texture_core.arrays import Array
-from texture_core.estimates import TextureEstimate
+from texture_core.types import Array
+from texture_core.types import TextureEstimate
 from texture_estimation.model import load_model
 from texture_evaluation.charts import COLOURS
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_recordings.slide_dataset import SlideDataset
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_recordings.dataset import SlideDataset
+from texture_simulation.offline import SlidePlan, write_simulated
 
 SCENE, SURFACE, TRAINING, TESTED = 'ets_linear', 'grid_1', '1-20', '25'
 PLAN = SlidePlan(slides=28, slide_s=2.0, speed_m_s=0.05, force_n=1.0)

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_simulation.offline import SlidePlan, write_simulated
 
 sys.path.append(str(Path(__file__).parent))  # where tests of sensors find their rig
 SURFACES = ('glass', 'leather', 'ridge_2mm_deep')

@@ -12,14 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.arrays import AnyArray
 from texture_core.errors import DeviceError
-from texture_core.protocols import Sensor
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.types import NANOSECONDS, AnyArray, Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.params import SensorParams
-from texture_simulation.devices.catalogue import DEVICES
-from texture_simulation.devices.device import EmulatedDevice
+from texture_drivers.sensor import SensorParams
+from texture_simulation.devices.fingers import DEVICES, EmulatedDevice
 
 DAQ = '{channels: [' + ', '.join(f'{{name: c{i}, unit: count}}' for i in range(8)) + ']}'
 Feed = Callable[[Any, int, int], None]

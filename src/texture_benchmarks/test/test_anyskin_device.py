@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from sensor_rig import CASES, Rig
 
-from texture_core.signal import lost_samples
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
+from texture_core.types import lost_samples
+from texture_simulation.devices.fingers import ByteFaults, FrameFaults
 
 pytestmark = pytest.mark.realtime
 OPENINGS = 3  # beside other tests the emulated board may get no processor time for a second

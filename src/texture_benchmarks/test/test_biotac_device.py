@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 from sensor_rig import Rig, biotac
 
-from texture_core.signal import lost_samples
-from texture_drivers.biotac.sensor import BioTac
-from texture_drivers.biotac.tables import LAYOUTS
-from texture_drivers.params import SensorParams
-from texture_simulation.devices.biotac import BoardFaults, EmulatedBioTac
-from texture_simulation.devices.faults import FrameFaults
+from texture_core.types import lost_samples
+from texture_drivers.biotac import LAYOUTS, BioTac
+from texture_drivers.sensor import SensorParams
+from texture_simulation.devices.fingers import BoardFaults, EmulatedBioTac, FrameFaults
 
 pytestmark = pytest.mark.realtime
 

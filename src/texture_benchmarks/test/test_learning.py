@@ -9,7 +9,7 @@ from texture_benchmarks.learning import run_incremental
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
-from texture_features.labelled_features import LabelledFeatures
+from texture_features.examples import LabelledFeatures
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 

@@ -11,16 +11,14 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.ros.graph import Graph
-from texture_core.estimates import TextureEstimate
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.node_process import NodeProcess
-from texture_core.ros.conversions import to_msg
+from texture_core.ros import to_msg
+from texture_core.ros_testing import NodeProcess
+from texture_core.types import ExplorationState, Phase, TextureEstimate
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_recordings.importers.biotac20 import import_biotac20
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import find_slides
+from texture_recordings.dataset import SlideDataset, find_slides
+from texture_recordings.public_sets import import_biotac20
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

@@ -15,9 +15,9 @@ from texture_benchmarks.motion import (
     simulate_force_controlled_slide,
 )
 from texture_benchmarks.study import BenchmarkOptions
-from texture_exploration.arms.simulated_surface import SimulatedSurface
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.stiffness import StiffnessEstimate
+from texture_exploration.arms.simulated import SimulatedSurface
+from texture_exploration.force_control import StiffnessEstimate
+from texture_exploration.stages import TouchParams
 
 pytestmark = pytest.mark.realtime
 

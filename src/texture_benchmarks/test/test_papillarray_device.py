@@ -14,10 +14,10 @@ import pytest
 from sensor_rig import CASES, Rig, feed_papillarray
 
 from texture_core.errors import InvalidParameter
-from texture_core.signal import lost_samples
-from texture_drivers.papillarray.sensor import PapillArray
-from texture_drivers.params import SensorParams
-from texture_simulation.devices.papillarray import EmulatedPapillArray
+from texture_core.types import lost_samples
+from texture_drivers.papillarray import PapillArray
+from texture_drivers.sensor import SensorParams
+from texture_simulation.devices.fingers import EmulatedPapillArray
 
 pytestmark = pytest.mark.realtime
 

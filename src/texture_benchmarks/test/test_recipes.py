@@ -22,16 +22,11 @@ from texture_benchmarks.recipes import (
 )
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData, ModelMismatch
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import cross_validate
-from texture_recordings.labelled_slide import LabelledSlide
-from texture_recordings.slide_dataset import SlideDataset, cut_slide
-from texture_recordings.slides import find_slides
-from texture_recordings.tables.import_tables import import_tables
-from texture_recordings.tables.mapping import mapping_from
+from texture_evaluation.cross_validation import ChronologicalSplit, cross_validate
+from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide, find_slides
+from texture_recordings.tables import import_tables, mapping_from
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 SLIDES = [LabelledSlide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork', 'felt') for k in range(1, 11)]

@@ -11,15 +11,17 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_benchmarks.ros.graph import Graph  # noqa: E402
-from texture_benchmarks.soak import Processes  # noqa: E402
-from texture_core.features import FeatureVector  # noqa: E402
-from texture_core.ros.conversions import to_msg  # noqa: E402
-from texture_estimation.model import load_model  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_launch.files import find_launch_file  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_benchmarks.ros.graph import Graph
+from texture_benchmarks.soak import Processes
+from texture_bringup.launcher import (
+    ChildLauncher,
+    find_launch_file,
+)
+from texture_core.ros import to_msg
+from texture_core.types import FeatureVector
+from texture_estimation.model import load_model
+from texture_evaluation.train import train_from_bags
+from texture_simulation.offline import SlidePlan, write_simulated
 
 DOMAIN = 81
 DEADLINE_S = 60.0

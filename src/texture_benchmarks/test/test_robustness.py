@@ -26,12 +26,9 @@ from texture_benchmarks.robustness import (
     simulate_slide_signals,
 )
 from texture_benchmarks.study import BenchmarkOptions
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import TactileSignal
-from texture_estimation.channels import with_channels
-from texture_estimation.recipe import load_recipe
-from texture_recordings.labelled_slide import LabelledSlide
-from texture_recordings.slide_dataset import SlideDataset
+from texture_core.types import ExplorationState, Phase, TactileSignal
+from texture_estimation.recipe import load_recipe, with_channels
+from texture_recordings.dataset import LabelledSlide, SlideDataset
 from texture_simulation.scene import load_scene
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')

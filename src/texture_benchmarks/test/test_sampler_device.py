@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 from sensor_rig import CASES, Feed, Rig
 
-from texture_core.signal import lost_samples
-from texture_simulation.devices.daq import EmulatedDaq
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
+from texture_core.types import lost_samples
+from texture_simulation.devices.fingers import ByteFaults, EmulatedDaq, FrameFaults
 
 pytestmark = pytest.mark.realtime
 

@@ -7,7 +7,7 @@ import pytest
 from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.scale import DrawnSize, FeatureSpread
 from texture_benchmarks.study import BenchmarkOptions
-from texture_features.labelled_features import LabelledFeatures
+from texture_features.examples import LabelledFeatures
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 recorded = pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')

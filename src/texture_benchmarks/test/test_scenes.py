@@ -23,8 +23,7 @@ from texture_benchmarks.scenes import (
     with_one_more,
 )
 from texture_benchmarks.study import BenchmarkOptions
-from texture_simulation.effects.catalogue import EFFECTS
-from texture_simulation.effects.noise import Noise
+from texture_simulation.effects import EFFECTS, Noise
 from texture_simulation.scene import Scene, load_scene, scene_from
 
 TOUCHING = TouchProtocol((0.1,), (1.0, 8.0), duration_s=0.2)

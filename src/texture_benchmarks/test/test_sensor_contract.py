@@ -13,10 +13,9 @@ import pytest
 from sensor_rig import CASES, Rig
 
 from texture_core.errors import DeviceError
-from texture_core.signal import lost_samples
+from texture_core.types import lost_samples
 from texture_drivers.catalogue import SENSORS
-from texture_simulation.devices.catalogue import DEVICES
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
+from texture_simulation.devices.fingers import DEVICES, ByteFaults, FrameFaults
 
 pytestmark = pytest.mark.realtime
 

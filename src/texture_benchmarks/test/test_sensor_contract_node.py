@@ -14,10 +14,10 @@ from sensor_rig import CASES, Rig
 from texture_msgs import msg
 
 from texture_core.errors import InvalidParameter
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros import SENSOR_QOS
+from texture_core.ros_testing import LocalGraph
 from texture_drivers.nodes.sensor import SensorNode
-from texture_simulation.devices.faults import FrameFaults
+from texture_simulation.devices.fingers import FrameFaults
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'

@@ -14,13 +14,12 @@ from sensor_rig import CASES, Rig, biotac
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.ros.conversions import to_msg
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
-from texture_drivers import stream_watch
+from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import ExplorationState, Phase
+from texture_drivers import health as stream_watch
 from texture_drivers.nodes.sensor import SensorNode
-from texture_simulation.devices.biotac import EmulatedBioTac
+from texture_simulation.devices.fingers import EmulatedBioTac
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

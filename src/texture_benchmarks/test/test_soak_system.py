@@ -8,11 +8,11 @@ import pytest
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_benchmarks.ros import soak  # noqa: E402
-from texture_benchmarks.soak import LOST, PlannedFault  # noqa: E402
-from texture_bringup.ros import operator as operators  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_benchmarks.ros import soak
+from texture_benchmarks.soak import LOST, PlannedFault
+from texture_bringup import operator as operators
+from texture_evaluation.train import train_from_bags
+from texture_simulation.offline import SlidePlan, write_simulated
 
 FAULTS = ('explorer killed',)
 DEADLINE_S = 60.0

@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError, InvalidParameter
-from texture_core.signal import TactileSignal, lost_samples
-from texture_drivers.params import SensorParams
-from texture_drivers.sound_card.capture import AudioBlock
-from texture_drivers.sound_card.sensor import SoundCard
-from texture_simulation.devices.sound_card import FRAMES_AT_ONCE, SYSTEM_CONFIG, EmulatedSoundCard
+from texture_core.types import TactileSignal, lost_samples
+from texture_drivers.sensor import SensorParams
+from texture_drivers.sound_card import AudioBlock, SoundCard
+from texture_simulation.devices.fingers import FRAMES_AT_ONCE, SYSTEM_CONFIG, EmulatedSoundCard
 
 pytestmark = pytest.mark.realtime
 

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_info
 from texture_benchmarks import study
 from texture_benchmarks.study import BenchmarkOptions, decided_at, imported, importing_once, map_forked
 from texture_core.errors import InvalidData
-from texture_core.estimates import TextureEstimate
+from texture_core.types import TextureEstimate
 from texture_evaluation.metrics import SlideResult
 
 

@@ -21,13 +21,13 @@ from texture_benchmarks.trust import (
     run,
 )
 from texture_benchmarks.trust import simulate as simulate_row
-from texture_core.estimates import TextureEstimate
-from texture_estimation.open_set.error_bound import ErrorBound
+from texture_core.types import TextureEstimate
+from texture_estimation.decisions import ErrorBound
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
-from texture_recordings.labelled_slide import LabelledSlide
+from texture_recordings.dataset import LabelledSlide
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
-from texture_simulation.simulated_slide import SimulatedSlide
 
 EVERY_ROW = [row.name(strength) for row in ROWS.values() for strength in row.strengths]
 

@@ -26,8 +26,8 @@ from texture_benchmarks import (
 )
 from texture_benchmarks.roughness import run as roughness
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
-from texture_core.catalogue import find
-from texture_estimation.search.parallel import single_blas_thread
+from texture_core.config import find
+from texture_estimation.search import single_blas_thread
 
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time

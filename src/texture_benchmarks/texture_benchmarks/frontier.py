@@ -38,20 +38,17 @@ from texture_benchmarks.study import (
     line_chart,
     map_forked,
 )
-from texture_core.arrays import Array
-from texture_core.catalogue import find
-from texture_estimation.channels import with_channels
+from texture_core.config import find
+from texture_core.types import Array
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.search.parallel import single_blas_thread
+from texture_estimation.recipe import Recipe, load_recipe, with_channels
+from texture_estimation.search import single_blas_thread
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import cross_validate
-from texture_evaluation.cross_validation.splits import Split
-from texture_recordings.slide_dataset import SlideDataset
+from texture_evaluation.cross_validation import ChronologicalSplit, Split, cross_validate
+from texture_recordings.dataset import SlideDataset
 
 N_FEATURES = 68  # those of the default recipe
 WINDOWS_PER_SLIDE = 5

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, histogram_chart
-from texture_core.arrays import Array
+from texture_core.types import Array
 from texture_estimation.model import TextureModel
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_features.windowing.windows import WindowEvent
-from texture_recordings.slide_dataset import SlideDataset
+from texture_features.windows import WindowEvent
+from texture_recordings.dataset import SlideDataset
+from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 if TYPE_CHECKING:
     from texture_benchmarks.ros.graph import LiveLatency

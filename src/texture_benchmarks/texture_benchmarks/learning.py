@@ -12,17 +12,16 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, line_chart
-from texture_core.arrays import Array
-from texture_core.estimates import TextureEstimate
-from texture_estimation.classification.training import train
+from texture_core.types import Array, TextureEstimate
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
+from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.training import train
 from texture_evaluation.train import training_examples
-from texture_features.labelled_features import LabelledFeatures
-from texture_recordings.slide_dataset import SlideDataset
+from texture_features.examples import LabelledFeatures
+from texture_recordings.dataset import SlideDataset
 
 
 @dataclass(frozen=True)

@@ -21,32 +21,23 @@ from unittest import mock
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
-from texture_core.arrays import Array
-from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
-from texture_core.finger_state import FingerState
-from texture_core.node_process import NodeProcess
+from texture_core.ros_testing import NodeProcess
+from texture_core.types import Array, ExplorationRequest, ExplorationState, FingerState, Phase
 from texture_evaluation.charts import COLOURS, chart
+from texture_exploration.arms.arm import Arm, ArmState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
-from texture_exploration.arms.protocol import Arm, ArmState
 from texture_exploration.arms.rails import RailsArm, RailsParams
-from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
-from texture_exploration.arms.ur import UrArm
-from texture_exploration.arms.ur_params import UrArmParams
-from texture_exploration.exploration import Exploration, ExplorationOutcome
-from texture_exploration.explorer import PERIOD_S, Explorer
-from texture_exploration.force_control import ForceController, ForceLoopParams
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.arms.ur import UrArm, UrArmParams
+from texture_exploration.explorer import PERIOD_S, Exploration, ExplorationOutcome, Explorer
+from texture_exploration.force_control import ForceController, ForceLoopParams, stability_chart, stability_limit_gain
+from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stability import stability_chart, stability_limit_gain
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, leap_hand
-from texture_simulation.devices.rails import EmulatedRails
-from texture_simulation.devices.rails_firmware import RailsMachine
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_exploration.stages import TouchParams
+from texture_simulation.devices.dynamixel import LEAP_FINGERS, EmulatedDynamixelBus, leap_hand
+from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 ARM_PERIOD_NS = round(1e9 / RATE_HZ)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)

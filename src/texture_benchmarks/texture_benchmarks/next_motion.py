@@ -13,23 +13,20 @@ import numpy as np
 
 from texture_benchmarks.recipes import DATA
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
-from texture_core.arrays import AnyArray, Array
-from texture_core.catalogue import find
-from texture_core.slide_motion import SlideMotion
-from texture_core.window import Window
-from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.next_motion.next_touch_model import NextTouchModel
+from texture_core.config import find
+from texture_core.types import AnyArray, Array, SlideMotion, Window
+from texture_estimation.next_motion import NextTouchModel
+from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import CutWindow
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slide_samples import SlideSamples
+from texture_features.windows import CutWindow
+from texture_recordings.dataset import SlideDataset, SlideSamples
+from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.slide_batches import simulate_slides
+from texture_simulation.sensor_models import SENSORS
 
 # Chooses a motion, by the log-posterior and the number of the slide.
 ChooseMotion = Callable[[Array, int], SlideMotion]

@@ -15,9 +15,9 @@ import numpy as np
 
 from texture_benchmarks.recipes import DATA, LATER, SPLITS, VIBRATION, biotac20_settings, try_estimator
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
-from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
-from texture_estimation.search.parallel import single_blas_thread
+from texture_core.types import AnyArray, Array
+from texture_estimation.search import single_blas_thread
 
 CHANNELS, KERNELS, STRIDE = (32, 64, 64), (9, 5, 3), 2
 EPOCHS, BATCH, RATE = 60, 64, 3e-3

@@ -28,33 +28,29 @@ from texture_benchmarks.study import (
     map_forked,
     markdown_table,
 )
-from texture_core.arrays import AnyArray, Array
-from texture_core.catalogue import find
+from texture_core.config import find, shipped
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.resources import shipped
-from texture_core.signal import TactileSignal
-from texture_estimation.channels import with_channels
+from texture_core.types import AnyArray, Array, TactileSignal
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import AUGMENTATION, Recipe, load_recipe
+from texture_estimation.recipe import AUGMENTATION, Recipe, load_recipe, with_channels
 from texture_evaluation import metrics
-from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate
-from texture_evaluation.cross_validation.cross_validation import CrossValidation
-from texture_evaluation.cross_validation.slide_splits import split_slides
-from texture_evaluation.cross_validation.splits import Split
+from texture_evaluation.cross_validation import (
+    ChronologicalSplit,
+    CrossValidation,
+    FoldFeatures,
+    Split,
+    cross_validate,
+    split_slides,
+)
 from texture_evaluation.evaluate import run_model
-from texture_features.augmentation.augmentation import Augmentation
+from texture_features.augmentation import Augmentation
 from texture_features.feature import Feature
-from texture_features.feature_set import InputFeatures
-from texture_features.features.force import Force
-from texture_features.features.speed import Speed
-from texture_features.recipe_file import read_recipe
-from texture_features.windowing.time_stretch import Stretched
-from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
+from texture_features.feature_set import InputFeatures, read_recipe
+from texture_features.features.temporal import Force, Speed
+from texture_features.windows import CutWindow, Stretched, WindowParams, cut_recording
 from texture_papers.hu import Spectrum
 from texture_papers.protocol import digest_of
-from texture_recordings.labelled_slide import LabelledSlide
-from texture_recordings.slide_dataset import SlideDataset, cut_slide
+from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide
 
 # Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and is trained on
 # windows this far apart.

@@ -28,26 +28,21 @@ from texture_benchmarks.recipes import (
     of_one_finger,
 )
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, markdown_table
-from texture_core.arrays import Array
-from texture_core.catalogue import find
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.resources import shipped
-from texture_core.signal import TactileSignal
-from texture_estimation.channels import FAST_TOPIC, with_channels
-from texture_estimation.classification.training import train
+from texture_core.config import find, shipped
+from texture_core.types import Array, ExplorationState, Phase, TactileSignal
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.recipe import FAST_TOPIC, Recipe, load_recipe, with_channels
+from texture_estimation.training import train
 from texture_evaluation.train import training_examples
-from texture_features.augmentation.augmentation import Augmentation
+from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
-from texture_recordings.labelled_slide import LabelledSlide
-from texture_recordings.slide_dataset import SlideDataset
-from texture_simulation.effects.finger_spread import FingerSpread
+from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_simulation.effects import FingerSpread
+from texture_simulation.friction import StickSlip
+from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.slide_batches import simulate_slides
-from texture_simulation.stick_slip.friction import StickSlip
+from texture_simulation.sensor_models import SENSORS
 
 KEPT = 0.9  # of the accuracy without degradation: below it, a recipe has broken down
 

@@ -15,19 +15,17 @@ from scipy.linalg import eigh
 
 from texture_benchmarks.recipes import DATA, QUICK_MATERIALS, QUICK_SLIDES
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, in_own_process
-from texture_core.arrays import AnyArray, Array
-from texture_estimation.classification.training import train
+from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.group_means import group_means
 from texture_estimation.model import TextureModel
+from texture_estimation.numerics import group_means
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.search.parallel import single_blas_thread
+from texture_estimation.search import single_blas_thread
+from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
-from texture_features.augmentation.augmented_features import NOISE
-from texture_features.augmentation.disturbances import KINDS
-from texture_features.augmentation.feature_copies import AugmentedFeatures, FeatureCopies
-from texture_features.labelled_features import LabelledFeatures
-from texture_recordings.slide_dataset import SlideDataset
+from texture_features.augmentation import KINDS, NOISE, AugmentedFeatures, FeatureCopies
+from texture_features.examples import LabelledFeatures
+from texture_recordings.dataset import SlideDataset
 
 GAIN_RESPONSES = {'log_bands': 2.0, 'log_power': 2.0, 'log_amplitude': 1.0}  # per natural logarithm of the gain
 

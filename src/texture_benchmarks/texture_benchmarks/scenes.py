@@ -18,22 +18,24 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
-from texture_core.arrays import Array, Samples
+from texture_core.types import Array, Samples
 from texture_evaluation.charts import COLOURS, chart
 from texture_papers import jamali_experiment, roberge_experiment
 from texture_papers.protocol import PaperProtocol, folds, halves, of_task
-from texture_simulation.contact import Contact
-from texture_simulation.effects.catalogue import EFFECTS
-from texture_simulation.effects.contact_growth import ForceGain, PatchGrowth
-from texture_simulation.effects.finger_spread import FingerSpread
-from texture_simulation.effects.protocols import GrowthEffect
-from texture_simulation.effects.slide_error import SlideError
-from texture_simulation.effects.unevenness import Unevenness
-from texture_simulation.scene import Scene, load_scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.slide_batches import simulate_slide_streams
-from texture_simulation.surfaces.surface import MIN_BLUR_M
+from texture_simulation.effects import (
+    EFFECTS,
+    FingerSpread,
+    ForceGain,
+    GrowthEffect,
+    PatchGrowth,
+    SlideError,
+    Unevenness,
+)
+from texture_simulation.offline import simulate_slide_streams
+from texture_simulation.path import SimulatedSlide
+from texture_simulation.scene import Contact, Scene, load_scene
+from texture_simulation.sensor_models import SENSORS
+from texture_simulation.surfaces import MIN_BLUR_M
 
 PATCH = 'patch filter'
 FRICTION = 'friction'

@@ -18,9 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkResult
-from texture_core.arrays import Array
-from texture_core.exploration import ExplorationRequest
-from texture_core.signal import NANOSECONDS
+from texture_core.types import NANOSECONDS, Array, ExplorationRequest
 from texture_evaluation.charts import COLOURS, chart
 
 SUCCESS, ABORTED, REFUSED, LOST = 'success', 'aborted', 'refused', 'lost'

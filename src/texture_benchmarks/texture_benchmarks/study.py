@@ -16,12 +16,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from texture_core.arrays import Array
 from texture_core.errors import DeviceError, InvalidData
-from texture_estimation.search.parallel import single_blas_thread
+from texture_core.types import Array
+from texture_estimation.search import single_blas_thread
 from texture_evaluation.charts import COLOURS, chart, line_styles, pareto_front
 from texture_evaluation.metrics import SlideResult
-from texture_recordings.importers.catalogue import IMPORTS
+from texture_recordings.public_sets import IMPORTS
 
 CPU_INFO = Path('/proc/cpuinfo')
 

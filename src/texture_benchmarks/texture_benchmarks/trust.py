@@ -14,24 +14,22 @@ import numpy as np
 from texture_benchmarks.recipes import DATA, at_rate
 from texture_benchmarks.robustness import DEGRADATIONS, FORCE_N, SCENE, SPEED_M_S
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
-from texture_core.arrays import Array
-from texture_core.features import FeatureVector
-from texture_estimation.classification.training import train
+from texture_core.types import Array, FeatureVector
+from texture_estimation.decisions import OUTSIDE
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel
-from texture_estimation.open_set.domain import OUTSIDE
 from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import training_examples
-from texture_features.augmentation.disturbances import smooth_response
-from texture_recordings.labelled_slide import LabelledSlide
-from texture_recordings.slide_dataset import SlideDataset
+from texture_features.augmentation import smooth_response
+from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_simulation.offline import simulate_slide_streams
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.slide_batches import simulate_slide_streams
+from texture_simulation.sensor_models import SENSORS
 
 SLIDE_S = 3.0
 TRAINED_SLIDES, TESTED_SLIDES = 25, 5  # of each of the 12 surfaces; 300 in all show an error rate of 1 %

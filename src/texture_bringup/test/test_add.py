@@ -8,13 +8,12 @@ from rclpy.executors import SingleThreadedExecutor
 from texture_msgs import msg
 
 from texture_bringup.command import main
-from texture_core.features import FeatureVector
-from texture_core.ros.conversions import to_msg
-from texture_core.ros.qos import FEATURE_QOS
-from texture_estimation.classification.training import train
+from texture_core.ros import FEATURE_QOS, to_msg
+from texture_core.types import FeatureVector
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 DEADLINE_S = 60.0

@@ -7,10 +7,10 @@ from texture_msgs import msg, srv
 
 from texture_bringup.nodes.bring_up import BringUp
 from texture_core.errors import DeviceError
-from texture_core.exploration import ExplorationRequest
-from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import ExplorationRequest
 from texture_drivers.nodes.sensor import SensorNode
-from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.nodes.explorer import ExplorerNode
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from texture_bringup.command import main
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_simulation.offline import SlidePlan, write_simulated
 
 SURFACES = ('glass', 'leather')
 

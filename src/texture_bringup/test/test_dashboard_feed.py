@@ -3,19 +3,35 @@ import json
 import numpy as np
 import pytest
 
-from texture_bringup.dashboard.feed import BINS, POINTS, Feed
-from texture_bringup.dashboard.history import MAX_EXPLORATIONS, MAX_FRAMES, History
-from texture_bringup.dashboard.motions import DEFAULTS, offered
-from texture_bringup.dashboard.node_status import MAX_LIGHTS, SILENT_S, NodeStatuses
-from texture_bringup.dashboard.ring import Ring, envelope, spectrum_db
-from texture_bringup.dashboard.taxels import places_of
+from texture_bringup.dashboard import (
+    BINS,
+    DEFAULTS,
+    MAX_EXPLORATIONS,
+    MAX_FRAMES,
+    MAX_LIGHTS,
+    POINTS,
+    SILENT_S,
+    Feed,
+    History,
+    NodeStatuses,
+    Ring,
+    envelope,
+    offered,
+    places_of,
+    spectrum_db,
+)
 from texture_core.errors import MotionRefused
-from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
-from texture_core.signal import TactileSignal
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.touch import TouchParams
+from texture_core.types import (
+    ExplorationRequest,
+    ExplorationState,
+    Phase,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
+from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import RANGES, SafetyLimits
+from texture_exploration.stages import TouchParams
 
 
 def batch(first, samples, rate_hz=1000.0, channels=('dynamic',)):

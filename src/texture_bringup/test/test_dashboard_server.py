@@ -7,9 +7,7 @@ import pytest
 from aiohttp import ClientSession, WSMsgType, web
 from aiohttp.test_utils import TestClient, TestServer
 
-from texture_bringup.dashboard.access import Access
-from texture_bringup.dashboard.server import MAX_BODY_BYTES, MAX_MESSAGE_BYTES, MAX_VIEWERS, VIEWERS, make_app
-from texture_bringup.dashboard.serving import Serving
+from texture_bringup.dashboard import MAX_BODY_BYTES, MAX_MESSAGE_BYTES, MAX_VIEWERS, VIEWERS, Access, Serving, make_app
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
 
 PAGE = Path(__file__).parents[1] / 'config' / 'dashboard'

@@ -22,10 +22,10 @@ from playwright.sync_api import expect, sync_playwright
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_evaluation.train import train_from_bags
+from texture_simulation.offline import SlidePlan, write_simulated
 
 DOMAIN = 90
 DEADLINE_S = 90.0

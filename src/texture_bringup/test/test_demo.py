@@ -14,12 +14,9 @@ import pytest
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo.plan import DemoPlan
-from texture_bringup.demo.progress_log import ProgressLog
-from texture_bringup.demo.results import RecognisedSlide, is_refused, table
-from texture_bringup.demo.run import demonstrate
-from texture_core.estimates import TextureEstimate
-from texture_core.node_process import killed_on_error
+from texture_bringup.demo import DemoPlan, ProgressLog, RecognisedSlide, demonstrate, is_refused, table
+from texture_core.ros_testing import killed_on_error
+from texture_core.types import TextureEstimate
 
 pytestmark = pytest.mark.realtime
 

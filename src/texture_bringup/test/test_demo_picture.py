@@ -2,12 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from texture_bringup.demo.picture import _growing, _Recorded
-from texture_core.estimates import TextureEstimate
-from texture_core.features import FeatureVector
-from texture_estimation.classification.training import train
+from texture_bringup.demo import _growing, _Recorded
+from texture_core.types import FeatureVector, TextureEstimate
 from texture_estimation.recipe import Recipe
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 RECIPE = {
     'inputs': {'signal': {'features': ['mean']}},

@@ -14,14 +14,14 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_core import resources  # noqa: E402
-from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
-from texture_core.exploration import ExplorationRequest  # noqa: E402
-from texture_evaluation.train import train_from_bags, train_grades_from_bags  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import Operator
+from texture_core import config as resources
+from texture_core.errors import InvalidParameter, LaunchFailed
+from texture_core.types import ExplorationRequest
+from texture_evaluation.train import train_from_bags, train_grades_from_bags
+from texture_simulation.offline import SlidePlan, write_simulated
 
 DOMAIN = 61
 PATIENT = '/**: {ros__parameters: {estimate_timeout_s: 10.0, signal_timeout_s: 3.0}}'  # this machine may be busy

@@ -4,10 +4,9 @@ import pytest
 
 from texture_bringup.command import main
 from texture_bringup.commands.explore import explored, texture_text
+from texture_core.cli import run_program
 from texture_core.errors import MotionAborted
-from texture_core.estimates import TextureEstimate
-from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
-from texture_core.program import run_program
+from texture_core.types import ExplorationRequest, ExplorationState, Phase, TextureEstimate
 
 OUTSIDE = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
 ENDED = 'the exploration has ended: cancelled by the client'

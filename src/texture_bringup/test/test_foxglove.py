@@ -9,7 +9,7 @@ import pytest
 from std_srvs.srv import Trigger
 from texture_msgs import srv
 
-from texture_recordings.ros.topics import TOPICS
+from texture_recordings.ros import TOPICS
 
 pytestmark = pytest.mark.ros  # needs the built messages
 

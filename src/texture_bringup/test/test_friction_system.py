@@ -12,18 +12,20 @@ import yaml
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_core.resources import find_file  # noqa: E402
-from texture_estimation.classification.training import train  # noqa: E402
-from texture_estimation.recipe import load_recipe  # noqa: E402
-from texture_exploration.presets import load_preset  # noqa: E402
-from texture_features.labelled_features import LabelledFeatures  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_simulation.devices.ur.params import UrControllerParams  # noqa: E402
-from texture_simulation.devices.ur.process import ControllerProcess  # noqa: E402
-from texture_simulation.frictions import sliding_coefficient  # noqa: E402
-from texture_simulation.scene import load_scene  # noqa: E402
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import Operator
+from texture_core.config import find_file
+from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
+from texture_exploration.presets import load_preset
+from texture_features.examples import LabelledFeatures
+from texture_simulation.devices.ur import (
+    ControllerProcess,
+    UrControllerParams,
+)
+from texture_simulation.friction import sliding_coefficient
+from texture_simulation.scene import load_scene
 
 DOMAIN = 89
 ADDRESS = '127.0.0.112'

@@ -10,12 +10,12 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.command import main  # noqa: E402
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_bringup.command import main
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import Operator
+from texture_evaluation.train import train_from_bags
+from texture_simulation.offline import SlidePlan, write_simulated
 
 DOMAIN = 79
 PATIENT = '/**: {ros__parameters: {estimate_timeout_s: 10.0, signal_timeout_s: 3.0}}'  # this machine may be busy

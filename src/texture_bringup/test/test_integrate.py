@@ -10,10 +10,10 @@ import pytest
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup import command  # noqa: E402
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_bringup import command
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import Operator
 
 DOMAIN = 98
 DEADLINE_S = 90.0

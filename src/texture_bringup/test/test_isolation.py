@@ -1,6 +1,6 @@
 import socket
 
-from texture_bringup.demo.isolation import FIRST_PORT, FIRST_UNICAST, PORTS_PER_DOMAIN, free_port, isolate
+from texture_bringup.demo import FIRST_PORT, FIRST_UNICAST, PORTS_PER_DOMAIN, free_port, isolate
 
 
 def test_a_domain_in_use_is_left_alone(tmp_path) -> None:

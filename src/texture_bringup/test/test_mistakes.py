@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from texture_bringup.command import main
-from texture_core.exploration import ExplorationState
-from texture_core.signal import TactileSignal
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import read_bag
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_core.types import ExplorationState, TactileSignal
+from texture_recordings.bags import BagWriter, read_bag
+from texture_simulation.offline import SlidePlan, write_simulated
 
 PLAN = SlidePlan(slides=3, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
 

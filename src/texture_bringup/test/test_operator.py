@@ -9,9 +9,9 @@ from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from texture_msgs import action
 
-from texture_bringup.ros import operator as operators
+from texture_bringup import operator as operators
 from texture_core.errors import MotionAborted
-from texture_core.exploration import ExplorationRequest
+from texture_core.types import ExplorationRequest
 
 # An explorer that answers at the end finds nobody there any more.
 pytestmark = [pytest.mark.realtime, pytest.mark.ros, pytest.mark.filterwarnings('ignore:failed to send response')]

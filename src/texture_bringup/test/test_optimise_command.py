@@ -5,9 +5,9 @@ import pytest
 
 from texture_bringup.command import main
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search.generation import Generation, ScoredIndividual
+from texture_estimation.search import Generation, ScoredIndividual
 from texture_evaluation.commands.optimise import bar
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_simulation.offline import SlidePlan, write_simulated
 
 
 def test_the_bar_says_how_far_how_good_and_how_long() -> None:

@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.resources import shipped as shipped_by_all
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.config import shipped as shipped_by_all
+from texture_core.types import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
+from texture_estimation.roughness import load_roughness_recipe
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration, no_signal_watch
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.explorer import Exploration, no_signal_watch
+from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_exploration.safety import SafetyLimits
-from texture_features.windowing.windows import CutWindow, cut_recording
+from texture_exploration.stages import TouchParams
+from texture_features.windows import CutWindow, cut_recording
 
 START_NS = NANOSECONDS
 STEP_NS = 10_000_000  # of an exploration

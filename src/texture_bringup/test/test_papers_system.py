@@ -16,29 +16,34 @@ import yaml
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from rclpy.parameter import Parameter  # noqa: E402
-from texture_msgs import msg  # noqa: E402
+from rclpy.parameter import Parameter
+from texture_msgs import msg
 
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_core import resources  # noqa: E402
-from texture_core.exploration import ExplorationRequest  # noqa: E402
-from texture_core.resources import find_file  # noqa: E402
-from texture_core.ros.conversions import from_msg  # noqa: E402
-from texture_core.ros.local_graph import LocalGraph  # noqa: E402
-from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS  # noqa: E402
-from texture_estimation.classification.training import train  # noqa: E402
-from texture_estimation.nodes.classifier import Classifier  # noqa: E402
-from texture_estimation.nodes.roughness_estimator import RoughnessEstimator  # noqa: E402
-from texture_estimation.recipe import load_recipe  # noqa: E402
-from texture_estimation.roughness.grades import read_grades  # noqa: E402
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe  # noqa: E402
-from texture_estimation.roughness.training import train_grades  # noqa: E402
-from texture_exploration.presets import load_preset  # noqa: E402
-from texture_features.feature_set import FeatureSet  # noqa: E402
-from texture_features.labelled_features import LabelledFeatures  # noqa: E402
-from texture_features.nodes.feature_extractor import FeatureExtractor  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import Operator
+from texture_core import config as resources
+from texture_core.config import find_file
+from texture_core.ros import (
+    ESTIMATE_QOS,
+    FEATURE_QOS,
+    from_msg,
+)
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import ExplorationRequest
+from texture_estimation.nodes.classifier import Classifier
+from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
+from texture_estimation.recipe import load_recipe
+from texture_estimation.roughness import (
+    load_roughness_recipe,
+    read_grades,
+    train_grades,
+)
+from texture_estimation.training import train
+from texture_exploration.presets import load_preset
+from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import FeatureSet
+from texture_features.nodes.feature_extractor import FeatureExtractor
 
 DOMAIN = 87
 DEADLINE_S = 60.0

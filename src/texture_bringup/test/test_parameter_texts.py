@@ -1,7 +1,7 @@
 import pytest
 from rcl_interfaces.msg import ParameterType
 
-from texture_bringup.ros.parameter_texts import parameter_from_text
+from texture_bringup.operator import parameter_from_text
 from texture_core.errors import InvalidParameter
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from texture_bringup.dashboard.recorder import Recorder
+from texture_bringup.dashboard import Recorder
 from texture_core.errors import InvalidParameter
 
 

@@ -6,13 +6,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from texture_core import resources
-from texture_core.parameters import parameters_of
-from texture_exploration.arms.ros_controllers_params import RosControllersParams
-from texture_exploration.arms.ur_params import UrArmParams
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.safety import SafetyLimits
-from texture_exploration.signal_watch import SignalWatchParams
+from texture_core import config as resources
+from texture_core.config import parameters_of
+from texture_exploration.arms.ros_controllers import RosControllersParams
+from texture_exploration.arms.ur import UrArmParams
+from texture_exploration.safety import SafetyLimits, SignalWatchParams
+from texture_exploration.stages import TouchParams
 
 PRESETS = sorted((resources.folder('texture_bringup', 'config') / 'robots').glob('*.yaml'))
 ROOT = Path(__file__).parents[3]

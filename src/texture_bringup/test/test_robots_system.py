@@ -10,19 +10,23 @@ import yaml
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup import command  # noqa: E402
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_core import resources  # noqa: E402
-from texture_core.parameters import parameters_of  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_exploration.arms.ur_params import UrArmParams  # noqa: E402
-from texture_exploration.safety import SafetyLimits  # noqa: E402
-from texture_exploration.signal_watch import SignalWatchParams  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_launch.files import find_launch_file  # noqa: E402
-from texture_launch.reader import read  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_bringup import command
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import (
+    ChildLauncher,
+    find_launch_file,
+    read,
+)
+from texture_bringup.operator import Operator
+from texture_core import config as resources
+from texture_core.config import parameters_of
+from texture_evaluation.train import train_from_bags
+from texture_exploration.arms.ur import UrArmParams
+from texture_exploration.safety import (
+    SafetyLimits,
+    SignalWatchParams,
+)
+from texture_simulation.offline import SlidePlan, write_simulated
 
 DEADLINE_S = 60.0
 SURFACE = 'ridge_2mm_deep'

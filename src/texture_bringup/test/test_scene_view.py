@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_bringup.scene_charts import caption, slide_picture, table_picture
+from texture_bringup.commands.scene import caption, slide_picture, table_picture
 from texture_core.errors import UnknownName
 from texture_simulation.scene import load_scene
 from texture_simulation.scene_view import SceneView, ViewPlan, lines_hz, view

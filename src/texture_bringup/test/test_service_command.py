@@ -3,10 +3,10 @@ import threading
 import pytest
 from std_srvs.srv import Trigger
 
+from texture_bringup import operator as operators
 from texture_bringup.command import installed, main
-from texture_bringup.ros import operator as operators
 from texture_bringup.service_command import SERVICE_COMMANDS
-from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros_testing import LocalGraph
 
 pytestmark = pytest.mark.ros
 

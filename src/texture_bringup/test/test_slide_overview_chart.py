@@ -3,7 +3,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 
-from texture_bringup.demo.slide_overview_chart import GrowingEvidence, SlideOverview, picture
+from texture_bringup.demo import GrowingEvidence, SlideOverview, picture
 
 LABELS = ('cork', 'felt', 'linen')
 TABLE = np.array([[9, 1, 0], [2, 8, 0], [0, 0, 0]])

@@ -37,39 +37,34 @@ import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 from scipy.io import savemat, wavfile
 
-from texture_core import resources
+from texture_bringup.launcher import all_arguments
+from texture_core import config as resources
 from texture_core.errors import TextureError
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import TactileSignal
-from texture_drivers.daq.sensor import load_daq
-from texture_drivers.file.recording import load_recording
-from texture_drivers.tsf85.recording import COLUMNS, FIRST_COLUMN, load_vendor_csv
-from texture_estimation.classification.training import train
-from texture_estimation.incremental.added_slides import AddedSlide, write_added_slide
+from texture_core.types import ExplorationState, Phase, TactileSignal
+from texture_drivers.daq import load_daq
+from texture_drivers.file import load_recording
+from texture_drivers.tsf85 import COLUMNS, FIRST_COLUMN, load_vendor_csv
 from texture_estimation.model import load_model
+from texture_estimation.model_files import AddedSlide, write_added_slide
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.grades import Grades, read_grades
-from texture_estimation.roughness.model import load_roughness_model
-from texture_estimation.roughness.ratings import read_ratings
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_estimation.roughness.training import train_grades
-from texture_estimation.search.racing import HalfScores
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.score_cache import ScoreCache
-from texture_exploration.hands.profile import load_profile
+from texture_estimation.roughness import (
+    Grades,
+    load_roughness_model,
+    load_roughness_recipe,
+    read_grades,
+    read_ratings,
+    train_grades,
+)
+from texture_estimation.search import HalfScores, RecipeSpace, ScoreCache
+from texture_estimation.training import train
+from texture_exploration.arms.hand import load_profile
 from texture_exploration.presets import load_preset
+from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
-from texture_features.labelled_features import LabelledFeatures
-from texture_launch.reader import all_arguments
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import RawMessage
-from texture_recordings.cdr import TYPES, decode, encode, typestore
-from texture_recordings.importers.biotac20 import import_biotac20
-from texture_recordings.importers.ntp21 import import_ntp21
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.tables.import_tables import import_tables
-from texture_recordings.tables.mapping import load_mapping, mapping_from
-from texture_recordings.tables.tables import MAPPED
+from texture_recordings.bags import TYPES, BagWriter, RawMessage, decode, encode, typestore
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.public_sets import import_biotac20, import_ntp21
+from texture_recordings.tables import MAPPED, import_tables, load_mapping, mapping_from
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))

@@ -13,18 +13,18 @@ import yaml
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
-from texture_msgs.msg import TactileSignal  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from texture_msgs.msg import TactileSignal
 
-from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.ros.operator import ExplorationResult, Operator  # noqa: E402
-from texture_core.exploration import ExplorationRequest  # noqa: E402
-from texture_core.ros.local_graph import LocalGraph  # noqa: E402
-from texture_core.ros.qos import SENSOR_QOS  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_launch.child import ChildLauncher  # noqa: E402
-from texture_recordings.bags import topics_in  # noqa: E402
-from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import ExplorationResult, Operator
+from texture_core.ros import SENSOR_QOS
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import ExplorationRequest
+from texture_evaluation.train import train_from_bags
+from texture_recordings.bags import topics_in
+from texture_simulation.offline import SlidePlan, write_simulated
 
 DOMAIN = 84
 DEADLINE_S = 90.0

@@ -18,8 +18,8 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
 from typing import Protocol, cast
 
-from texture_core.catalogue import find
-from texture_core.program import run_program
+from texture_core.cli import run_program
+from texture_core.config import find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from texture_bringup.ros.operator import Operator
+from texture_bringup.operator import Operator
 
 EXPLORER_MISSING = 'start an explorer, such as the emulator with `texture launch emulator`, or give its --namespace'
 TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start one of them, or give its --namespace"

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from texture_core.catalogue import find
+from texture_core.config import find
 from texture_core.errors import UnknownName
 
 

@@ -12,11 +12,16 @@ from texture_msgs import msg
 from texture_msgs.srv import Explore
 
 from texture_core.errors import InvalidData
-from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
-from texture_core.features import FeatureVector
-from texture_core.ros.conversions import from_msg, request_from_msg, request_to_msg, to_msg
-from texture_core.signal import TactileSignal
+from texture_core.ros import from_msg, request_from_msg, request_to_msg, to_msg
+from texture_core.types import (
+    ExplorationRequest,
+    ExplorationState,
+    FeatureVector,
+    Phase,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
 
 pytestmark = pytest.mark.ros
 STAMP = 1_700_000_000_123_456_789

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.files import (
+from texture_core.config import (
     Archive,
     Arrays,
     Budget,

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from texture_core.finger_state import LOOPBACK, FingerSender, FingerState
+from texture_core.types import LOOPBACK, FingerSender, FingerState
 
 
 def test_a_state_survives_the_wire() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from texture_core.ros.frames import frame_name
+from texture_core.ros import frame_name
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.labels import MAX_CHARACTERS, checked_label
+from texture_core.types import MAX_CHARACTERS, checked_label
 
 
 @pytest.mark.parametrize('label', ['', 'cork', 'woven cloth', 'Kork Nr. 3 (fein)', 'höckrig', 'x' * MAX_CHARACTERS])

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from texture_core.config import from_mapping, markdown_table, param
 from texture_core.errors import InvalidParameter
-from texture_core.parameters import from_mapping, markdown_table, param
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from texture_core.config import MAX_CHARACTERS, load_card, load_yaml, parse_json, parse_yaml, safe_repr
 from texture_core.errors import InvalidParameter
-from texture_core.plain_data import MAX_CHARACTERS, load_card, load_yaml, parse_json, parse_yaml, safe_repr
 
 LAUGHS = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
     f'{b}: &{b} [{", ".join([f"*{a}"] * 9)}]\n' for a, b in zip('abcdefghi', 'bcdefghij', strict=True)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from texture_core.config import find_file, folder
 from texture_core.errors import UnknownName
-from texture_core.resources import find_file, folder
 
 
 def test_a_path_of_the_user_wins(tmp_path: Path) -> None:

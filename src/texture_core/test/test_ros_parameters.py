@@ -9,10 +9,10 @@ import pytest
 import rclpy
 from rclpy.parameter import Parameter
 
+from texture_core.config import param
 from texture_core.errors import InvalidParameter
-from texture_core.parameters import param
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.parameters import declare, on_change, read, warn_of_unknown
+from texture_core.ros import declare, on_change, read, warn_of_unknown
+from texture_core.ros_testing import LocalGraph
 
 pytestmark = pytest.mark.ros
 

@@ -15,7 +15,7 @@ from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
 from texture_msgs.action import Explore
 
-from texture_core.ros.waiting_executor import WaitingExecutor
+from texture_core.ros import WaitingExecutor
 
 pytestmark = pytest.mark.ros
 DEADLINE_S = 20.0

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_core.rotation import quaternion, quaternion_matrix, rotation_matrix, rotation_vector
+from texture_core.types import quaternion, quaternion_matrix, rotation_matrix, rotation_vector
 
 
 def test_a_quarter_turn_about_z_brings_x_to_y() -> None:

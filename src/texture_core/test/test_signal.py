@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.signal import TactileSignal, lost_samples
+from texture_core.types import TactileSignal, lost_samples
 
 
 def batch(first: int, count: int, **changes: object) -> TactileSignal:

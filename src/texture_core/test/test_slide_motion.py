@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from texture_core.slide_motion import SlideMotion, group_similar
+from texture_core.types import SlideMotion, group_similar
 
 ASKED = SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_drivers.anyskin.protocol import FrameParser
+from texture_drivers.anyskin import FrameParser
 
 SIZE = 82
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_drivers.arrival_numbering import ArrivalNumbering
-from texture_drivers.rate_meter import RateMeter
+from texture_drivers.timing import ArrivalNumbering, RateMeter
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.signal import TactileSignal
-from texture_drivers.baseline import Baseline, Tare, saturated
-from texture_drivers.channel_watch import ChannelWatch
-from texture_drivers.stream_watch import TareParams
+from texture_core.types import TactileSignal
+from texture_drivers.health import Baseline, ChannelWatch, Tare, TareParams, saturated
 
 RATE_HZ, CHANNELS = 100.0, ('a', 'b', 'c', 'd')
 NOISE = np.array([1.0, 2.0, 1.0, 4.0])

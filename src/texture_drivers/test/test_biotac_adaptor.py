@@ -12,8 +12,8 @@ from std_msgs.msg import String
 from texture_msgs import msg
 
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros import SENSOR_QOS
+from texture_core.ros_testing import LocalGraph
 from texture_drivers.nodes.biotac_adaptor import BiotacAdaptor
 
 pytestmark = pytest.mark.ros

@@ -8,9 +8,7 @@ from typing import Any
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_drivers.biotac.cheetah import QUEUED_FRAMES, Cheetah
-from texture_drivers.biotac.protocol import decode
-from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.biotac import LAYOUTS, QUEUED_FRAMES, Cheetah, decode
 
 BIOTAC = LAYOUTS['biotac']
 SERIAL = b'BT2P0220B11E0004'

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.signal import NANOSECONDS, TactileSignal, lost_samples
-from texture_drivers.biotac.messages import MESSAGES, BioTacMessageConverter
+from texture_core.types import NANOSECONDS, TactileSignal, lost_samples
+from texture_drivers.biotac import MESSAGES, BioTacMessageConverter
 
 START_NS = 1_700_000_000_000_000_000
 HAND, ALL = MESSAGES['BioTacHand'], MESSAGES['BiotacAll']

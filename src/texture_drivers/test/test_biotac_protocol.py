@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from texture_core.errors import InvalidData
-from texture_drivers.biotac.protocol import decode
-from texture_drivers.biotac.tables import ERROR_WORDS, LAYOUTS, sampling_command
+from texture_drivers.biotac import ERROR_WORDS, LAYOUTS, decode, sampling_command
 
 BIOTAC, BIOTAC_SP = LAYOUTS['biotac'], LAYOUTS['biotac_sp']
 # Words worked out by hand: seven bits and odd parity, five bits, 00 and odd parity.

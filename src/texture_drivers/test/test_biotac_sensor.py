@@ -7,12 +7,9 @@ import pytest
 
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame
-from texture_core.signal import TactileSignal, lost_samples
-from texture_drivers.biotac.bridge import REPLY, FrameTracker
-from texture_drivers.biotac.link import SpiFrame
-from texture_drivers.biotac.sensor import BioTac
-from texture_drivers.biotac.tables import LAYOUTS, BioTacLayout
-from texture_drivers.params import SensorParams
+from texture_core.types import TactileSignal, lost_samples
+from texture_drivers.biotac import LAYOUTS, REPLY, BioTac, BioTacLayout, FrameTracker, SpiFrame
+from texture_drivers.sensor import SensorParams
 
 BIOTAC = LAYOUTS['biotac']
 FRAME_NS = 10_000_000

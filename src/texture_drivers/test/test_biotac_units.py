@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_drivers.biotac.units import BioTacScales, to_physical
+from texture_drivers.biotac import BioTacScales, to_physical
 
 
 def test_pressures_and_voltages_come_from_counts_by_the_nominal_scales() -> None:

@@ -1,7 +1,7 @@
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_drivers.block_counter import BlockCounter
+from texture_drivers.timing import BlockCounter
 
 RATE_HZ = 2500.0  # 10 samples take 4000 µs
 

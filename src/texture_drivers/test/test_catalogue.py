@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from texture_core.catalogue import find
+from texture_core.config import find
 from texture_core.errors import DeviceError, UnknownName
-from texture_core.protocols import Sensor
+from texture_core.types import Sensor
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.params import SensorParams
+from texture_drivers.sensor import SensorParams
 
 
 @pytest.fixture(params=SENSORS)

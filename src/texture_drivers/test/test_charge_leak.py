@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_drivers.pvdf.charge_leak import ChargeLeak, ForceReconstructor, LeakingFilm
+from texture_drivers.pvdf import ChargeLeak, ForceReconstructor, LeakingFilm
 
 RATE_HZ = 4096.0
 LEAK = ChargeLeak(resistance_ohm=1e8, capacitance_f=1.06e-9)  # T = 0.106 s, corner 1.5 Hz

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_drivers.clock import Arrival, StreamClock, supporting_slope
+from texture_drivers.timing import Arrival, StreamClock, supporting_slope
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND

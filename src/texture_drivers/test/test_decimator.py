@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from texture_drivers.decimator import HALF_WIDTH, Decimator
+from texture_drivers.timing import HALF_WIDTH, Decimator
 
 RATE_HZ, FACTOR = 48_000.0, 12  # to 4000 Hz
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError, InvalidParameter, UnknownName
-from texture_core.signal import lost_samples
-from texture_drivers.file.player import FilePlayer
-from texture_drivers.params import SensorParams
+from texture_core.types import lost_samples
+from texture_drivers.file import FilePlayer
+from texture_drivers.sensor import SensorParams
 
 SECOND = 1_000_000_000
 SAMPLES = np.arange(250.0).reshape(125, 2)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_drivers.papillarray.protocol import Measurements, PapillArrayParser, layout_of
+from texture_drivers.papillarray import Measurements, PapillArrayParser, layout_of
 
 START, END = bytes.fromhex('55667788'), bytes.fromhex('AABBCCDD')
 

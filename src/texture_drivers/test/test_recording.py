@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData
-from texture_drivers.file.recording import LOADERS, load_recording
+from texture_drivers.file import LOADERS, load_recording
 
 SAMPLES = np.array([[0.0, 1.0], [2.5, -3.0], [4.0, 5.0]])
 BEGINNINGS = [b'', b'RIFF\x24\x00\x00\x00WAVEfmt ', b'\x93NUMPY\x01\x00v\x00', b'PK\x03\x04', b'a,b\n1,2\n']

@@ -1,4 +1,4 @@
-from texture_drivers.sample_counter import SampleCounter
+from texture_drivers.timing import SampleCounter
 
 
 def test_consecutive_stamps_give_consecutive_indices() -> None:

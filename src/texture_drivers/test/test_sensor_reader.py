@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from texture_core.errors import DeviceError
-from texture_core.signal import TactileSignal
-from texture_drivers import sensor_reader
-from texture_drivers.sensor_health import SensorHealth
-from texture_drivers.sensor_reader import SensorReader
+from texture_core.types import TactileSignal
+from texture_drivers import sensor as sensor_reader
+from texture_drivers.health import SensorHealth
+from texture_drivers.sensor import SensorReader
 
 DEADLINE_S = 10.0
 

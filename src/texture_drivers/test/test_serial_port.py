@@ -5,7 +5,7 @@ import pytest
 import serial
 
 from texture_core.errors import DeviceError
-from texture_drivers.serial_port import SerialPort, reason_of
+from texture_drivers.serial_line import SerialPort, reason_of
 
 
 def test_a_missing_device_is_named_once_with_the_reason_of_the_operating_system(tmp_path):

@@ -3,9 +3,8 @@ import pytest
 
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.framing import Frame, pack
-from texture_core.signal import lost_samples
-from texture_drivers.framed_stream import FramedStream
-from texture_drivers.stream_decoder import StreamDecoder
+from texture_core.types import lost_samples
+from texture_drivers.serial_line import FramedStream, StreamDecoder
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND

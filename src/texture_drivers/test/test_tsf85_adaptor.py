@@ -14,10 +14,10 @@ from std_msgs.msg import Header, Int16MultiArray, String
 from texture_msgs import msg
 
 from texture_core.errors import InvalidParameter
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros import SENSOR_QOS
+from texture_core.ros_testing import LocalGraph
 from texture_drivers.nodes.tsf85_adaptor import Tsf85Adaptor
-from texture_drivers.tsf85.messages import Tsf85MessageConverter
+from texture_drivers.tsf85 import Tsf85MessageConverter
 
 pytestmark = pytest.mark.ros
 

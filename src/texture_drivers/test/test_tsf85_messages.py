@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_drivers.tsf85.messages import Tsf85MessageConverter
+from texture_drivers.tsf85 import Tsf85MessageConverter
 
 MS = 1_000_000
 START_NS = 1_700_000_000_000_000_000

@@ -2,14 +2,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from texture_drivers.tsf85.protocol import Item, Packet, Tsf85Parser, start_command, stop_command
-from texture_drivers.tsf85.tables import (
+from texture_drivers.tsf85 import (
     ACCELEROMETER,
     AUTOSEND,
     DYNAMIC,
     MAX_PACKET_BYTES,
     STATIC,
     TIMESTAMP,
+    Item,
+    Packet,
+    Tsf85Parser,
+    start_command,
+    stop_command,
 )
 
 # Written by hand from the protocol: autosend, 8 bytes of payload: stamp 0x6C1E ms, finger 0: 258, ...

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_drivers.tsf85.recording import load_vendor_csv
+from texture_drivers.tsf85 import load_vendor_csv
 
 HEADER = (
     ['Time(ms)', 'D0_0', 'D0_1']

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError, InvalidParameter
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_drivers.params import SensorParams
-from texture_drivers.tsf85.sensor import Tsf85
-from texture_drivers.tsf85.tables import LAYOUTS
+from texture_core.types import NANOSECONDS, TactileSignal
+from texture_drivers.sensor import SensorParams
+from texture_drivers.tsf85 import LAYOUTS, Tsf85
 
 DEADLINE_S = 10.0
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from texture_drivers.tsf85.batch_cutter import SIGNAL
-from texture_drivers.tsf85.finger_stream import FingerStream
-from texture_drivers.tsf85.sample_frames import SampleFrame
-from texture_drivers.unseen_loss import UnseenLoss
+from texture_drivers.timing import UnseenLoss
+from texture_drivers.tsf85 import SIGNAL, FingerStream, SampleFrame
 
 MS = 1_000_000
 START = 1_700_000_000_000_000_000

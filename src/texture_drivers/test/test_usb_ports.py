@@ -3,8 +3,8 @@ from types import SimpleNamespace
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_drivers.tsf85.tables import USB_IDS
-from texture_drivers.usb_ports import resolve, serial_number
+from texture_drivers.serial_line import resolve, serial_number
+from texture_drivers.tsf85 import USB_IDS
 
 NEW = SimpleNamespace(device='/dev/ttyACM0', vid=0x16D0, pid=0x14CC, serial_number='A7')
 OLD = SimpleNamespace(device='/dev/ttyACM3', vid=0x04B4, pid=0xF232, serial_number=None)

@@ -6,18 +6,18 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Protocol
 
-from texture_core.protocols import Sensor
-from texture_drivers.anyskin.sensor import anyskin
-from texture_drivers.biotac.sensor import BioTac
-from texture_drivers.biotac.tables import LAYOUTS as BIOTACS
-from texture_drivers.daq.sensor import daq
-from texture_drivers.file.player import FilePlayer
-from texture_drivers.papillarray.sensor import PapillArray
-from texture_drivers.params import SensorParams
-from texture_drivers.pvdf.sensor import Pvdf
-from texture_drivers.sound_card.sensor import SoundCard
-from texture_drivers.tsf85.sensor import Tsf85
-from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
+from texture_core.types import Sensor
+from texture_drivers.anyskin import anyskin
+from texture_drivers.biotac import LAYOUTS as BIOTACS
+from texture_drivers.biotac import BioTac
+from texture_drivers.daq import daq
+from texture_drivers.file import FilePlayer
+from texture_drivers.papillarray import PapillArray
+from texture_drivers.pvdf import Pvdf
+from texture_drivers.sensor import SensorParams
+from texture_drivers.sound_card import SoundCard
+from texture_drivers.tsf85 import LAYOUTS as TSF85S
+from texture_drivers.tsf85 import Tsf85
 
 
 class MakeSensor(Protocol):

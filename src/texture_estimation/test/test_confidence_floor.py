@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch
-from texture_core.features import FeatureVector
-from texture_estimation.classification.training import train
+from texture_core.types import FeatureVector
+from texture_estimation.decisions import FLOOR_WINDOWS as EFFECTIVE_WINDOWS
+from texture_estimation.decisions import ConfidenceFloor, fit_confidence_floor
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.incremental.added_slides import AddedSlide
 from texture_estimation.model import load_model
-from texture_estimation.open_set.confidence_floor import EFFECTIVE_WINDOWS, ConfidenceFloor, fit_confidence_floor
+from texture_estimation.model_files import AddedSlide
 from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
 
 LENGTHS = np.arange(1.0, 12.0)
 STRICT = ConfidenceFloor((1.0,), (36.0,))  # no single window of the fixtures is so certain

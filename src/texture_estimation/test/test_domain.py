@@ -4,10 +4,8 @@ import math
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_estimation.open_set.domain import Domain
-from texture_estimation.open_set.domain_margins import DomainMargins
-from texture_estimation.open_set.intervals import FULL_CIRCLE, covered_arcs
-from texture_features.slide_conditions import SignalLevel, SlideConditions
+from texture_estimation.decisions import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
+from texture_features.examples import SignalLevel, SlideConditions
 
 
 def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85', directions_rad=(0.0,)):

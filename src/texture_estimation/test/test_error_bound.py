@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from texture_core.features import FeatureVector
-from texture_estimation.classification.training import train
+from texture_core.types import FeatureVector
+from texture_estimation.decisions import ErrorBound
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
 
 RECIPE = load_recipe('default')
 WORD = 'too few slides for early stopping'

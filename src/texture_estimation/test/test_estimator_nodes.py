@@ -9,21 +9,17 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
 from texture_core.errors import ModelMismatch
-from texture_core.features import FeatureVector
-from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
-from texture_estimation.classification.training import train
+from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, from_msg, to_msg
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
 from texture_estimation.recipe import Recipe
-from texture_estimation.roughness.evidence import RoughnessAccumulator
-from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
-from texture_estimation.roughness.training import train_grades
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.roughness import Grades, RoughnessAccumulator, RoughnessRecipe, train_grades
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 pytestmark = pytest.mark.ros
 GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')

@@ -3,15 +3,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from texture_core.features import FeatureVector
-from texture_estimation.classification.evidence_rules import GroupedEvidence, MajorityVote, SoftVote
-from texture_estimation.classification.training import train
+from texture_core.types import FeatureVector
+from texture_estimation.decisions import Domain, ErrorBound
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
-from texture_estimation.fingerprint import fingerprint_difference
-from texture_estimation.open_set.domain import Domain
-from texture_estimation.open_set.error_bound import ErrorBound
-from texture_estimation.recipe import load_recipe
-from texture_estimation.search.fitness import decided_by_slide
+from texture_estimation.evidence_rules import GroupedEvidence, MajorityVote, SoftVote
+from texture_estimation.recipe import fingerprint_difference, load_recipe
+from texture_estimation.search import decided_by_slide
+from texture_estimation.training import train
 
 
 def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):

@@ -1,14 +1,8 @@
 import numpy as np
 import pytest
 
-from texture_estimation.classification.evidence_rules import (
-    EVIDENCE_RULES,
-    GroupedEvidence,
-    MajorityVote,
-    SoftVote,
-    running_means,
-)
-from texture_estimation.log_probabilities import is_tied, log_softmax
+from texture_estimation.evidence_rules import EVIDENCE_RULES, GroupedEvidence, MajorityVote, SoftVote, running_means
+from texture_estimation.numerics import is_tied, log_softmax
 
 
 def joined(rule, votes, n_labels=4):

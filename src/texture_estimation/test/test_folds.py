@@ -1,6 +1,6 @@
 import numpy as np
 
-from texture_estimation.learners.folds import assign_folds
+from texture_estimation.learners.learner import assign_folds
 
 
 def test_no_slide_is_on_both_sides_and_parts_are_stretches_of_time():

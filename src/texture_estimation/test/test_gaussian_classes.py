@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from texture_estimation.incremental.gaussian_classes import GaussianClasses
+from texture_estimation.gaussians import GaussianClasses
 
 
 def normal(centre, count, seed):
@@ -55,7 +55,7 @@ def test_of_uncorrelated_features_a_diagonal_covariance_says_the_same(monkeypatc
     samples = np.concatenate([around, around + np.array([9.0, 5.0])])
     given = samples, np.repeat([0, 1], 4), np.array([4, 4])
     full = GaussianClasses.fit(*given)
-    monkeypatch.setattr('texture_estimation.incremental.gaussian_classes.MAX_CORRELATED', 1)
+    monkeypatch.setattr('texture_estimation.gaussians.MAX_CORRELATED', 1)
     diagonal = GaussianClasses.fit(*given)
     assert diagonal.projection.shape == (2,)
     np.testing.assert_allclose(diagonal.log_probabilities(samples), full.log_probabilities(samples))

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
-from texture_core.features import FeatureVector
+from texture_core.types import FeatureVector
+from texture_estimation.decisions import Domain
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.incremental.incremental_classifier import EXPLORATIONS, IncrementalClassifier
+from texture_estimation.incremental import EXPLORATIONS, IncrementalClassifier
 from texture_estimation.model import load_model
-from texture_estimation.open_set.domain import Domain
-from texture_features.slide_conditions import SlideConditions
+from texture_features.examples import SlideConditions
 
 
 def measured(incremental_classifier, values, exploration_id='e1', feature_set=None, last=True):

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from sklearn.neural_network import MLPClassifier
 
-from texture_estimation import log_probabilities
+from texture_estimation import numerics as log_probabilities
 from texture_estimation.learners import mlp
-from texture_estimation.learners.augmented_examples import AugmentedExamples
-from texture_estimation.learners.mlp import Mlp, _first_weights, _slopes
-from texture_estimation.log_probabilities import log_loss, log_softmax
-from texture_features.augmentation.augmentation import Augmentation
+from texture_estimation.learners.mlp import AugmentedExamples, Mlp, _first_weights, _slopes
+from texture_estimation.numerics import log_loss, log_softmax
+from texture_features.augmentation import Augmentation
 
 
 def test_slopes_are_the_derivatives_of_the_cross_entropy():

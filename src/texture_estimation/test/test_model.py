@@ -7,12 +7,12 @@ import pytest
 import skops.io
 
 from texture_core.errors import ModelMismatch
-from texture_core.slide_motion import SlideMotion
-from texture_estimation.classification.training import train
+from texture_core.types import SlideMotion
+from texture_estimation.decisions import ErrorBound
 from texture_estimation.model import load_model
-from texture_estimation.next_motion.next_touch_model import NextTouchModel
-from texture_estimation.open_set.error_bound import ErrorBound
+from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
 
 
 @pytest.fixture

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
-from texture_core.features import FeatureVector
-from texture_core.slide_motion import SlideMotion
-from texture_estimation.next_motion.next_touch_model import ClassConditionalGaussian, NextTouchModel, slide_values
+from texture_core.types import FeatureVector, SlideMotion
+from texture_estimation.next_motion import ClassConditionalGaussian, NextTouchModel, slide_values
 
 ACROSS = SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0)
 ALONG = replace(ACROSS, direction_rad=np.pi / 2)

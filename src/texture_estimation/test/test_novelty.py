@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from texture_estimation.open_set.class_distance import ClassDistance
-from texture_estimation.open_set.novelty import (
-    EFFECTIVE_WINDOWS,
+from texture_estimation.decisions import (
     FEATURES,
     HIDDEN,
     LOG_ODDS,
     ONSET,
     SCORES,
+    ClassDistance,
     NoveltyDetector,
     SlideNovelty,
     space_means,
     window_count,
 )
+from texture_estimation.decisions import NOVELTY_WINDOWS as EFFECTIVE_WINDOWS
 
 CLASSES, SLIDES, FEATURE_COUNT = 8, 12, 5
 

@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from texture_core.resources import folder
-from texture_core.window import Window
-from texture_estimation.classification.training import train
-from texture_estimation.incremental.slide_gaussians import LENGTHS, SlideGaussians
+from texture_core.config import folder
+from texture_core.types import Window
+from texture_estimation.decisions import FEATURES, ClassDistance, NoveltyDetector
+from texture_estimation.decisions import NOVELTY_WINDOWS as EFFECTIVE_WINDOWS
+from texture_estimation.gaussians import LENGTHS, SlideGaussians
 from texture_estimation.learners.catalogue import LEARNERS
-from texture_estimation.open_set.class_distance import ClassDistance
-from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, FEATURES, NoveltyDetector
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness.catalogue import REGRESSORS
-from texture_estimation.roughness.regressor import ROUGH, SMOOTH
-from texture_features.labelled_features import LabelledFeatures
-from texture_features.windowing.windows import CutWindow
+from texture_estimation.roughness import REGRESSORS, ROUGH, SMOOTH
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
+from texture_features.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 # Linear machines take their time; their features are those of the others, their learner is tried above.

@@ -5,12 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from texture_estimation.classification.training import train
-from texture_estimation.learners.linear_discriminant import linear_discriminant
-from texture_estimation.learners.mlp import Mlp
-from texture_estimation.learners.onset_mlp import OnsetMlp
+from texture_estimation.learners.mlp import Mlp, OnsetMlp, linear_discriminant
 from texture_estimation.recipe import Recipe
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 NAMES = ('signal/a', 'signal/b', 'signal/slide_onset')
 SLIDES, WINDOWS = 20, 6

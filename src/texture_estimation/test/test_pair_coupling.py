@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 
-from texture_estimation.learners.pair_coupling import PairCoupling, fit_coupling, uncalibrated
+from texture_estimation.learners.svm import PairCoupling, fit_coupling, uncalibrated
 
 
 def test_consistent_pairs_give_back_the_probabilities_they_came_from():

@@ -8,8 +8,8 @@ import pytest
 from sklearn.preprocessing import StandardScaler
 from skops.io import dumps, loads
 
-from texture_core.files import Archive
-from texture_estimation.plain_skops import read_plain_skops
+from texture_core.config import Archive
+from texture_estimation.model_files import read_plain_skops
 
 PLAIN = {
     'weights': np.arange(6.0).reshape(2, 3),

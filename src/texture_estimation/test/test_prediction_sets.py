@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.open_set.prediction_sets import PredictionSets, fit_prediction_sets
+from texture_estimation.decisions import PredictionSets, fit_prediction_sets
+from texture_estimation.numerics import log_softmax
 
 EFFECTIVE_WINDOWS = np.array([1.0, 2.0, 4.0])
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from texture_core.config import folder
 from texture_core.errors import InvalidParameter, TextureError
-from texture_core.resources import folder
 from texture_estimation.recipe import DecisionParams, Recipe, load_recipe
-from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
+from texture_estimation.roughness import RoughnessRecipe
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.arrays import Array
-from texture_core.resources import folder
+from texture_core.config import folder
+from texture_core.types import Array
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
+from texture_estimation.roughness import load_roughness_recipe
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import InputFeatures
 

@@ -5,16 +5,22 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch, UnknownName
-from texture_core.features import FeatureVector
-from texture_estimation.classification.training import train
+from texture_core.types import FeatureVector
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.evidence import NO_MODEL, SILENT, RoughnessAccumulator
-from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.model import NORMAL_90, load_roughness_model
-from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
-from texture_estimation.roughness.training import hold_out, train_grades
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.roughness import (
+    NO_MODEL,
+    NORMAL_90,
+    SILENT,
+    Grades,
+    RoughnessAccumulator,
+    RoughnessRecipe,
+    hold_out,
+    load_roughness_model,
+    train_grades,
+)
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 FINGERPRINT = 'abcd1234 signal=1000Hz*1'
 NAMES = ('signal/signal_energy/f', 'signal/arc_length/f', 'signal/peak_to_median_power/f', 'signal/log_variance/f')

@@ -11,13 +11,12 @@ from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
 from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
 from texture_estimation import model_files
-from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.learners.sklearn_learner import SklearnLearner
-from texture_estimation.learners.sklearn_predictor import SklearnPredictor
-from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.learners.learner import standardisation
+from texture_estimation.learners.sklearn_learner import SklearnLearner, SklearnPredictor
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
 
 INPUTS = {'signal': {'features': ['hjorth']}}
 TREES = {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'n_estimators': 20}

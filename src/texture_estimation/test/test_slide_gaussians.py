@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.incremental.slide_gaussians import LENGTHS, SlideGaussians
-from texture_estimation.incremental.slide_moments import SlideMoments
+from texture_estimation.gaussians import LENGTHS, SlideGaussians, SlideMoments
 
 WINDOWS, SLIDES = 12, 8
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from texture_estimation.incremental.slide_moments import SlideMoments
+from texture_estimation.gaussians import SlideMoments
 
 
 def test_running_moments_equal_those_of_all_windows_also_far_from_zero():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.open_set.stopping_rule import SlideCourse, StoppingRule, fit_open_set_rule, fit_stopping_rule
+from texture_estimation.decisions import SlideCourse, StoppingRule, fit_open_set_rule, fit_stopping_rule
 
 EFFECTIVE_WINDOWS = 1.0 + 0.5 * np.arange(9)
 

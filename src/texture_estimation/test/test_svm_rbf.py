@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.learners.pair_coupling import uncalibrated
-from texture_estimation.learners.svm_predictor import export
-from texture_estimation.learners.svm_rbf import SvmRbf
+from texture_estimation.learners.svm import SvmRbf, export, uncalibrated
 
 
 def max_wins(decisions, n_labels):

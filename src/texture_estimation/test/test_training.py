@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.features import FeatureVector
-from texture_estimation.classification.training import train
+from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.recipe import load_recipe
-from texture_features.augmentation.augmentation import Augmentation
-from texture_features.augmentation.feature_copies import AugmentedFeatures, FeatureCopies
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.training import train
+from texture_features.augmentation import Augmentation, AugmentedFeatures, FeatureCopies
+from texture_features.examples import LabelledFeatures
 
 RECIPE = load_recipe('default')
 RECIPE_OF_PAIRS = load_recipe('any-speed')

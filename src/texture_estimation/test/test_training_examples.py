@@ -1,4 +1,4 @@
-from texture_estimation.incremental.training_examples import MAX_EXAMPLES, spread
+from texture_estimation.gaussians import MAX_EXAMPLES, spread
 
 
 def test_examples_are_thinned_evenly():

@@ -6,19 +6,46 @@ import math
 
 import numpy as np
 
-from texture_core.arrays import Array
-from texture_core.estimates import TextureEstimate
-from texture_core.features import FeatureVector
-from texture_core.signal import NANOSECONDS
-from texture_estimation.classification.evidence_rules import GroupedEvidence
-from texture_estimation.fingerprint import fingerprint_difference
-from texture_estimation.incremental.slide_moments import SlideMoments
-from texture_estimation.log_probabilities import is_tied
+from texture_core.types import NANOSECONDS, Array, FeatureVector, TextureEstimate
+from texture_estimation.decisions import ErrorBound, SlideNovelty
+from texture_estimation.evidence_rules import GroupedEvidence
+from texture_estimation.gaussians import SlideMoments
 from texture_estimation.model import TextureModel
-from texture_estimation.no_window import no_window
-from texture_estimation.open_set.error_bound import ErrorBound
-from texture_estimation.open_set.novelty import SlideNovelty
-from texture_features.slide_conditions import RunningConditions
+from texture_estimation.numerics import is_tied
+from texture_estimation.recipe import fingerprint_difference
+from texture_features.examples import RunningConditions
+from texture_features.windows import WindowParams
+
+# --------------------
+# The sentence of a final estimate that no window of the slide could be used for.
+
+
+def no_window(windows: WindowParams) -> str:
+    """Return why a slide ended without a window, how long it must be, and what to do.
+
+    Parameters
+    ----------
+    windows
+        How the recipe of the model cuts windows.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> no_window(WindowParams(length_s=0.5)).partition('; ')[0]
+    'no window could be used: the slide was shorter than the 0.5 s of a window, or its samples were lost'
+    """
+    skip_s, length_s = windows.skip_s, windows.length_s
+    needed = (
+        f'{skip_s + length_s:g} s, the first {skip_s:g} s and a window' if skip_s else f'the {length_s:g} s of a window'
+    )
+    return (
+        f'no window could be used: the slide was shorter than {needed}, or its samples were lost; '
+        'slide longer or more slowly'
+    )
+
 
 UNTEMPERED = 1.0
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
@@ -61,9 +88,9 @@ class EvidenceAccumulator:
 
     Examples
     --------
-    >>> from texture_estimation.classification.training import train
+    >>> from texture_estimation.training import train
     >>> from texture_estimation.recipe import Recipe
-    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> from texture_features.examples import LabelledFeatures
     >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
     >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
     >>> labels = np.repeat(['cork', 'felt'], 20)

@@ -13,24 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
+from texture_core.types import Array
 from texture_estimation import model_files
-from texture_estimation.incremental.added_slides import AddedSlide, read_added_slides
-from texture_estimation.incremental.slide_gaussians import SlideGaussians
-from texture_estimation.incremental.training_examples import TrainingExamples
+from texture_estimation.decisions import (
+    ConfidenceFloor,
+    Domain,
+    ErrorBound,
+    NoveltyDetector,
+    PredictionSets,
+    SlideNovelty,
+    StoppingRule,
+    space_means,
+)
+from texture_estimation.gaussians import SlideGaussians, TrainingExamples
 from texture_estimation.learners.learner import Predictor, hidden_layer
-from texture_estimation.learners.mlp_predictor import MlpPredictor
-from texture_estimation.log_probabilities import is_tied, log_softmax
-from texture_estimation.next_motion.next_touch_model import NextTouchModel
-from texture_estimation.open_set.confidence_floor import ConfidenceFloor
-from texture_estimation.open_set.domain import Domain
-from texture_estimation.open_set.error_bound import ErrorBound
-from texture_estimation.open_set.novelty import NoveltyDetector, SlideNovelty, space_means
-from texture_estimation.open_set.prediction_sets import PredictionSets
-from texture_estimation.open_set.stopping_rule import StoppingRule
+from texture_estimation.learners.mlp import MlpPredictor
+from texture_estimation.model_files import AddedSlide, read_added_slides
+from texture_estimation.next_motion import NextTouchModel
+from texture_estimation.numerics import is_tied, log_softmax
 from texture_estimation.recipe import Recipe
-from texture_features.features import slide_onset
+from texture_features.features import temporal as slide_onset
 
 # Names of their parts in the file.
 EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL = 'examples', 'novelty_detector', 'next_touch_model'
@@ -83,9 +86,9 @@ class TextureModel:
     Examples
     --------
     >>> import numpy as np
-    >>> from texture_estimation.classification.training import train
+    >>> from texture_estimation.training import train
     >>> from texture_estimation.recipe import Recipe
-    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> from texture_features.examples import LabelledFeatures
     >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
     >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
     >>> labels = np.repeat(['cork', 'felt'], 20)
@@ -281,7 +284,9 @@ class TextureModel:
         known, windows = self.examples, self.recipe.training_windows
         kept = len(known.codes) / max(int(self.training.get('windows', 0)), len(known.codes))
         overlap = min(windows.hop_s / windows.length_s / kept, 1.0)
-        compared = np.array([name.rsplit('/', 1)[-1] != slide_onset.NAME for name in self.names], dtype=np.float64)
+        compared = np.array(
+            [name.rsplit('/', 1)[-1] != slide_onset.SLIDE_ONSET for name in self.names], dtype=np.float64
+        )
         return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, overlap, compared)
 
     def validate(self) -> None:
@@ -360,7 +365,7 @@ def load_model(path: str | Path) -> TextureModel:
     ModelMismatch
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
-    target = model_files.stem(path)
+    target = model_files.model_stem(path)
     card, content = model_files.read(path)
     if 'regressor' in card.get('recipe', {}):
         raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")

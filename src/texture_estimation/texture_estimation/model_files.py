@@ -1,4 +1,4 @@
-"""The two files that hold a model, whatever it classifies: NAME.skops with what was trained, and the card NAME.json."""
+"""The files of a model, read without running code: NAME.skops, the card NAME.json, added slides in NAME.added."""
 
 from __future__ import annotations
 
@@ -8,17 +8,98 @@ import json
 import os
 import struct
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from texture_core.config import MAX_CARD_BYTES, MB, Archive, FileRefused, load_json, parse_json, read_bounded
 from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
-from texture_core.files import MB, Archive, FileRefused, read_bounded
-from texture_core.plain_data import MAX_CARD_BYTES, load_json, parse_json
-from texture_estimation.plain_skops import SCHEMA, read_plain_skops
+from texture_core.types import Array
+from texture_features.examples import SlideConditions
+
+# --------------------
+# Read a .skops file that holds nothing but dicts, lists, plain values and arrays, without the library that wrote it.
+#
+# That library knows every class of scikit-learn, and loads all of it first: seconds and 150 MB, of which a node that
+# classifies needs nothing. What is not as plain as said here is left to it.
+
+Node = Mapping[str, Any]
+SCHEMA = 'schema.json'
+PLAIN_SKOPS_MAX_SCHEMA_BYTES = 5_000_000
+
+
+class NotPlain(Exception):
+    """Something else than plain values and arrays.
+
+    Examples
+    --------
+    >>> try:
+    ...     raise NotPlain("it holds a function")
+    ... except NotPlain as error:
+    ...     print(error)
+    it holds a function
+    """
+
+
+def read_plain_skops(file: Archive) -> dict[str, Any] | None:
+    """Return what a file holds; None if that is not plain."""
+    try:
+        parameters = _build(parse_json(file.read(SCHEMA, PLAIN_SKOPS_MAX_SCHEMA_BYTES).decode()), file)
+    except (NotPlain, KeyError, TypeError, UnicodeDecodeError):
+        return None
+    return parameters if isinstance(parameters, dict) else None
+
+
+def _build(node: Node, file: Archive) -> Any:
+    kind = node['__loader__'], node['__module__']
+    if kind not in KINDS:
+        raise NotPlain(kind)
+    return KINDS[kind](node, file)
+
+
+def _dict(node: Node, file: Archive) -> dict[str, Any]:
+    if node['__class__'] != 'dict' or any(key['__class__'] != 'str' for key in node['key_types']['content']):
+        raise NotPlain(node['__class__'])
+    return {name: _build(value, file) for name, value in node['content'].items()}
+
+
+def _list(node: Node, file: Archive) -> list[Any]:
+    if node['__class__'] != 'list':
+        raise NotPlain(node['__class__'])
+    return [_build(value, file) for value in node['content']]
+
+
+def _value(node: Node, _file: Archive) -> Any:
+    value = parse_json(node['content'])
+    if not (value is None or isinstance(value, (bool, int, float, str))):
+        raise NotPlain(type(value))
+    return value
+
+
+def _array(node: Node, file: Archive) -> Any:
+    if node['type'] != 'numpy':
+        raise NotPlain(node['type'])
+    array = file.array(node['file'])
+    return array if node['__class__'] == 'ndarray' else array[()]
+
+
+# By loader and module, as the schema names them.
+KINDS: Mapping[tuple[str, str], Callable[[Node, Archive], Any]] = {
+    ('DictNode', 'builtins'): _dict,
+    ('ListNode', 'builtins'): _list,
+    ('JsonNode', 'builtins'): _value,
+    ('NdArrayNode', 'numpy'): _array,
+}
+
+
+# --------------------
+# The two files that hold a model, whatever it classifies: NAME.skops with what was trained, and the card NAME.json.
 
 FORMAT = 1
 ENDINGS = ('.skops', '.json')
@@ -57,7 +138,7 @@ def usable(target: Path) -> Iterator[None]:
         ) from error
 
 
-def stem(path: str | Path) -> Path:
+def model_stem(path: str | Path) -> Path:
     """Return the path without the ending of either file."""
     path = Path(path).expanduser()
     return path.with_suffix('') if path.suffix in ENDINGS else path
@@ -65,7 +146,7 @@ def stem(path: str | Path) -> Path:
 
 def both_files(path: str | Path) -> tuple[Path, Path]:
     """Return NAME.skops and NAME.json of a model that is named by either, or by both without the ending."""
-    target = stem(path)
+    target = model_stem(path)
     parameters, card = (target.with_name(target.name + ending) for ending in ENDINGS)
     return parameters, card
 
@@ -95,8 +176,8 @@ def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, An
     card_path.parent.mkdir(parents=True, exist_ok=True)
     content = dumps(dict(parameters), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
     card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
-    replace(parameters_path, content)
-    replace(card_path, (json.dumps(card, indent=1) + '\n').encode())
+    replace_file(parameters_path, content)
+    replace_file(card_path, (json.dumps(card, indent=1) + '\n').encode())
     return parameters_path
 
 
@@ -217,7 +298,7 @@ def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:
         yield from _nodes(part)
 
 
-def replace(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes) -> None:
     """Write a file whole or not at all."""
     beside = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
@@ -247,3 +328,136 @@ def _read_parameters(path: Path, digest: str) -> bytes:
     if hashlib.sha256(content).hexdigest() != digest:
         raise ModelMismatch(f"model file '{path}' is damaged or of another card; copy both files again or train again")
     return content
+
+
+# --------------------
+# Slides added to a model after its training, stored in the folder NAME.added beside it.
+
+ADDED_SLIDES_MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
+
+
+@dataclass(frozen=True, eq=False)
+class AddedSlide:
+    """One slide over a known surface.
+
+    Parameters
+    ----------
+    label
+        Of the surface.
+    exploration_id
+        Of the slide.
+    values : (n, n_features)
+        Features of its windows.
+    conditions
+        How it was made, as far as it is known.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = write_added_slide(f'{folder}/model', 1, AddedSlide('oak', 'slide', np.ones((3, 1))), 'a1')
+    ...     [slide] = read_added_slides(f'{folder}/model', 'a1', ('mean',))
+    >>> slide.label, slide.values.shape
+    ('oak', (3, 1))
+    """
+
+    label: str
+    exploration_id: str
+    values: Array
+    conditions: SlideConditions = field(default_factory=SlideConditions)
+
+
+def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
+    """Write an added slide of a model by its number, from 1, atomically.
+
+    Parameters
+    ----------
+    model
+        Path of the model.
+    number
+        Number of the slide, from 1; an existing one is replaced.
+    added_slide
+        What is written.
+    feature_set
+        Fingerprint of the features.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    content = {
+        'format': FORMAT,
+        'feature_set': feature_set,
+        'label': added_slide.label,
+        'exploration_id': added_slide.exploration_id,
+        'values': added_slide.values.tolist(),
+        'conditions': asdict(added_slide.conditions),
+    }
+    path = _folder(model) / f'{number:05d}.json'
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(path, (json.dumps(content) + '\n').encode())
+    return path
+
+
+def stored_numbers(model: str | Path) -> list[int]:
+    """Return the numbers of the stored slides of a model, rising; those of removed slides are missing."""
+    return sorted(int(path.stem) for path in _folder(model).glob('*.json') if path.stem.isdecimal())
+
+
+def remove_added_slide(model: str | Path, number: int) -> None:
+    """Remove an added slide if it exists."""
+    (_folder(model) / f'{number:05d}.json').unlink(missing_ok=True)
+
+
+def read_added_slides(model: str | Path, feature_set: str, names: Sequence[str]) -> tuple[AddedSlide, ...]:
+    """Return the added slides of a model in their order; none if there is no folder.
+
+    They hold features, so they stay valid when the model is trained again with the same features.
+
+    Parameters
+    ----------
+    model
+        Path of the model.
+    feature_set
+        Fingerprint of the features of the model.
+    names
+        Name of each feature.
+
+    Returns
+    -------
+    tuple of AddedSlide
+        In the order in which they were added.
+
+    Raises
+    ------
+    ModelMismatch
+        If one is damaged, or holds features of another kind.
+    """
+    return tuple(_read(path, feature_set, len(names)) for path in sorted(_folder(model).glob('*.json')))
+
+
+def _read(path: Path, feature_set: str, n_features: int) -> AddedSlide:
+    try:
+        content = load_json(path, ADDED_SLIDES_MAX_BYTES)
+        values = np.array(content['values'], dtype=np.float64)
+        conditions = SlideConditions.from_mapping(content.get('conditions', {}))
+        added_slide = AddedSlide(str(content['label']), str(content['exploration_id']), values, conditions)
+        of = str(content['feature_set'])
+        if not np.isfinite(values).all():
+            raise ValueError('it holds values that are not finite')
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+        raise ModelMismatch(
+            f"added slide '{path}' cannot be read: {type(error).__name__}: {error}; remove it and add it again"
+        ) from error
+    if of != feature_set or values.ndim != 2 or values.shape[1] != n_features or not added_slide.label:
+        raise ModelMismatch(
+            f"added slide '{path}' is of the features '{of}', the model has '{feature_set}'; "
+            f"move the folder '{path.parent.name}' away, or use the model to which it was added"
+        )
+    return added_slide
+
+
+def _folder(model: str | Path) -> Path:
+    stem = model_stem(model)
+    return stem.with_name(f'{stem.name}.added')

@@ -3,24 +3,56 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from texture_core.catalogue import unknown_name
+from texture_core.config import from_mapping, param, unknown_name
 from texture_core.errors import InvalidParameter
-from texture_core.parameters import from_mapping, param
-from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
+from texture_estimation.decisions import FEATURES, NEVER, SCORES, DomainMargins
+from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner, extras_of
-from texture_estimation.open_set.domain_margins import DomainMargins
-from texture_estimation.open_set.novelty import FEATURES, SCORES
-from texture_estimation.open_set.stopping_rule import NEVER
-from texture_features.augmentation.augmentation import Augmentation
-from texture_features.feature_set import FeatureSet
-from texture_features.recipe_entry import choose, entry_of
-from texture_features.recipe_file import read_recipe
-from texture_features.windowing.windows import WindowParams
+from texture_features.augmentation import Augmentation
+from texture_features.feature_set import FeatureSet, choose, entry_of, read_recipe
+from texture_features.windows import WindowParams
+
+# --------------------
+# Say in which part two fingerprints of feature sets differ.
+
+PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
+
+
+def fingerprint_difference(came: str, trained: str) -> str:
+    """Return what differs, in words; '' if nothing does.
+
+    Parameters
+    ----------
+    came, trained
+        Such as '3f9c12ab signal=2200Hz*1': of the feature vectors, and of the model.
+    """
+    if came == trained:
+        return ''
+    found, wanted = _inputs(came), _inputs(trained)
+    if found.keys() != wanted.keys():
+        return f'the inputs are {_listed(found)}, the model was trained on {_listed(wanted)}'
+    for topic, (rate, channels) in found.items():
+        trained_rate, trained_channels = wanted[topic]
+        if rate != trained_rate:
+            return f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz"
+        if channels != trained_channels:
+            return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
+    return "features or window length are others; start the feature_extractor with the model's card as its recipe"
+
+
+def _inputs(fingerprint: str) -> dict[str, tuple[str, str]]:
+    return {match['topic']: (match['rate'], match['channels']) for match in PART.finditer(fingerprint)}
+
+
+def _listed(inputs: dict[str, tuple[str, str]]) -> str:
+    return ', '.join(inputs) or 'none'
+
 
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 AUGMENTATION = 'augmentation'  # section within `training`
@@ -283,3 +315,29 @@ def load_recipe(name_or_path: str) -> Recipe:
     """
     name, content = read_recipe(name_or_path)
     return Recipe.from_mapping(content, name)
+
+
+# --------------------
+# A recipe for the vibration alone, or for all channels of a sensor.
+
+FAST_TOPIC = 'signal'
+CHANNELS = ('fast', 'all')
+
+
+def with_channels(recipe: Recipe, channels: str) -> Recipe:
+    """Return the recipe as it is for 'all' channels, with the input `signal` alone for 'fast'.
+
+    Raises
+    ------
+    InvalidParameter
+        If `channels` is neither, or the recipe has no vibration.
+    """
+    if channels not in CHANNELS:
+        raise InvalidParameter(f"channels are '{channels}'; 'fast' or 'all' is needed")
+    if channels == 'all':
+        return recipe
+    inputs = tuple(item for item in recipe.feature_set.inputs if item.topics == (FAST_TOPIC,))
+    if not inputs:
+        raise InvalidParameter(f"recipe '{recipe.name}' has no input '{FAST_TOPIC}'; use it with all channels")
+    feature_set = replace(recipe.feature_set, inputs=inputs, _layouts={})
+    return replace(recipe, feature_set=feature_set)

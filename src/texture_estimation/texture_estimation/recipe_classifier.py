@@ -10,8 +10,8 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_array, check_consistent_length, check_is_fitted, check_X_y
 
-from texture_core.arrays import AnyArray, Array
-from texture_estimation.log_probabilities import softmax
+from texture_core.types import AnyArray, Array
+from texture_estimation.numerics import softmax
 from texture_estimation.recipe import load_recipe
 
 

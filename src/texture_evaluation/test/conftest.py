@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_simulation.offline import SlidePlan, write_simulated
 
 SURFACES = ('glass', 'leather', 'ridge_2mm_deep')
 

@@ -7,13 +7,11 @@ import pytest
 from foreign_tables import MAPPING, recordings, write_csv
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.estimates import TextureEstimate
+from texture_core.types import TextureEstimate
 from texture_evaluation.commands import evaluate
-from texture_evaluation.cross_validation.comparison import compare, compare_all, mcnemar
-from texture_evaluation.cross_validation.cross_validation import CrossValidation, FoldResult
+from texture_evaluation.cross_validation import CrossValidation, FoldResult, compare, compare_all, mcnemar
 from texture_evaluation.metrics import SlideResult
-from texture_recordings.tables.import_tables import import_tables
-from texture_recordings.tables.mapping import load_mapping
+from texture_recordings.tables import import_tables, load_mapping
 
 SMALL = """
 windows: {length_s: 0.5, hop_s: 0.25}

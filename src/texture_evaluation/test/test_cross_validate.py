@@ -7,18 +7,14 @@ import pytest
 from scipy.stats import beta
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
 
+from texture_core.config import write_json
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.plain_data import write_json
 from texture_estimation.recipe import Recipe
-from texture_evaluation.cross_validation.accuracy_figures import interval, slide_counts
-from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import cross_validate
-from texture_evaluation.cross_validation.splits import parse_split
-from texture_evaluation.evaluate import evaluate_dataset
-from texture_evaluation.evaluation_text import table
+from texture_evaluation.cross_validation import ChronologicalSplit, cross_validate, interval, parse_split, slide_counts
+from texture_evaluation.evaluate import evaluate_dataset, table
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
-from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.dataset import SlideDataset
 
 RECIPE = Recipe.from_mapping(
     {

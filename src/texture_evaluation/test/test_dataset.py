@@ -7,11 +7,10 @@ from texture_core.errors import InvalidData, ModelMismatch
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import cut_recording
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import read_bag
-from texture_recordings.slide_dataset import SlideDataset
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_features.windows import cut_recording
+from texture_recordings.bags import BagWriter, read_bag
+from texture_recordings.dataset import SlideDataset
+from texture_simulation.offline import SlidePlan, write_simulated
 
 FEATURES = FeatureSet.load('vibration-and-taxels')
 

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_core.config import write_json
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
-from texture_core.plain_data import write_json
-from texture_core.signal import TactileSignal
+from texture_core.types import TactileSignal
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import read_bag
+from texture_recordings.bags import BagWriter, read_bag
 
 
 @pytest.fixture(scope='module')

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from texture_core.estimates import TextureEstimate
+from texture_core.types import TextureEstimate
 from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
 

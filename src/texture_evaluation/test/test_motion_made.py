@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.slide_motion import SlideMotion
+from texture_core.types import ExplorationState, Phase, SlideMotion
 from texture_estimation.recipe import load_recipe
-from texture_recordings.motion_of_states import motion_made
-from texture_recordings.slide_dataset import SlideDataset
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_recordings.dataset import SlideDataset, motion_made
+from texture_simulation.offline import SlidePlan, write_simulated
 
 SECOND = 1_000_000_000
 TOUCH = ExplorationState(0, 'id', 'linear_slide', Phase.CONTACT)

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, TextureError
+from texture_estimation import search as recipe_files
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search import recipe_files
-from texture_estimation.search.generation import SearchParams
-from texture_estimation.search.recipe_files import checkpoint_of
+from texture_estimation.search import SearchParams, checkpoint_of
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.optimise import Wanted, optimise_from_bags
 from texture_evaluation.train import train_from_bags

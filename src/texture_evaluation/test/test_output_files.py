@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
+from texture_core.config import refuse_inputs
 from texture_core.errors import InvalidParameter
-from texture_core.output_files import refuse_inputs
 from texture_estimation.model_files import both_files
 from texture_evaluation.charts import refuse_chart_format
 

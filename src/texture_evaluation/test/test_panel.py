@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_estimation.roughness.ratings import Ratings, read_ratings
-from texture_evaluation.agreement import intraclass_correlation, krippendorff_alpha, one_against_rest
-from texture_evaluation.panel import examine, protocol_violations
-from texture_evaluation.panel_charts import deviations_chart, votes_chart
+from texture_estimation.roughness import Ratings, read_ratings
+from texture_evaluation.panel import (
+    deviations_chart,
+    examine,
+    intraclass_correlation,
+    krippendorff_alpha,
+    one_against_rest,
+    protocol_violations,
+    votes_chart,
+)
 
 DATA = (
     Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')

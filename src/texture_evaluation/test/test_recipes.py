@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.resources import shipped
-from texture_estimation.classification.training import train
+from texture_core.config import shipped
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.cross_validation.cross_validate import predict_slides
+from texture_estimation.training import train
+from texture_evaluation.cross_validation import predict_slides
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.metrics import window_accuracy
 from texture_evaluation.train import train_from_bags, training_examples
-from texture_recordings.slide_dataset import SlideDataset
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_recordings.dataset import SlideDataset
+from texture_simulation.offline import SlidePlan, write_simulated
 
 SHIPPED = sorted(shipped('texture_estimation', 'config/recipes'))
 # How the load lies on the taxels: the simulated finger has it alike over all surfaces.

@@ -2,13 +2,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.exploration import Phase
-from texture_features.segmentation.segments import SegmentationParams
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import read_bag
+from texture_core.types import Phase
+from texture_features.segmentation import SegmentationParams
+from texture_recordings.bags import BagWriter, read_bag
+from texture_recordings.dataset import find_slides
 from texture_recordings.segment import segment_bags
-from texture_recordings.slides import find_slides
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_simulation.offline import SlidePlan, write_simulated
 
 SURFACE = 'ridge_2mm_deep'
 

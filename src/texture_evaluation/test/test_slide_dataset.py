@@ -5,17 +5,15 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import load_recipe
-from texture_features.augmentation.augmentation import Augmentation
+from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import CutWindow, WindowParams
-from texture_recordings import slides as slides_module
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.tables.import_tables import import_tables
-from texture_recordings.tables.mapping import mapping_from
+from texture_features.windows import CutWindow, WindowParams
+from texture_recordings import dataset as slides_module
+from texture_recordings.bags import BagWriter
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.tables import import_tables, mapping_from
 
 RATE_HZ = 1000.0
 FEATURES = FeatureSet.from_mapping(

@@ -5,19 +5,14 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, UnknownName
-from texture_core.exploration import Phase
-from texture_core.signal import NANOSECONDS, lost_samples
+from texture_core.types import NANOSECONDS, Phase, lost_samples
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.train import training_examples
 from texture_features.feature import WindowBatch
-from texture_features.features.log_shares import LogShares
-from texture_features.features.spatial_bands import SpatialBands
+from texture_features.features.taxels import LogShares, SpatialBands
 from texture_recordings.bags import read_bag
-from texture_recordings.importers.catalogue import IMPORTS
-from texture_recordings.importers.fabricslide import import_fabricslide
-from texture_recordings.importers.ntp21 import evenly, import_ntp21
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import find_slides
+from texture_recordings.dataset import SlideDataset, find_slides
+from texture_recordings.public_sets import IMPORTS, evenly, import_fabricslide, import_ntp21
 
 PITCH_M = 10e-3
 

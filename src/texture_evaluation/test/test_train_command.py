@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_estimation.classification.training import train
+from texture_estimation.decisions import ErrorBound
 from texture_estimation.model import TextureModel
-from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
 from texture_evaluation.commands.train import summary
-from texture_features.labelled_features import LabelledFeatures
+from texture_features.examples import LabelledFeatures
 
 
 @pytest.fixture(scope='module')

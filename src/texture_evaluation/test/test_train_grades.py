@@ -3,9 +3,9 @@ import json
 import pytest
 
 from texture_core.errors import UnknownName
-from texture_estimation.roughness.model import load_roughness_model
+from texture_estimation.roughness import load_roughness_model
 from texture_evaluation.train import train_grades_from_bags
-from texture_features.recipe_file import read_recipe
+from texture_features.feature_set import read_recipe
 
 GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')
 

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidParameter
+from texture_core.types import AnyArray
 
 # Okabe & Ito 2008: distinguished by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')

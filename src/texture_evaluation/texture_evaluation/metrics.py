@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texture_core.arrays import AnyArray, Array
-from texture_core.estimates import TextureEstimate
+from texture_core.types import AnyArray, Array, TextureEstimate
 
 TIMES_S = (0.5, 1.0, 2.5, 5.0)
 CALIBRATION_BINS = 15

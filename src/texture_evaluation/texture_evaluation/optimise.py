@@ -2,33 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_estimation.channels import with_channels
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.roughness_recipe import RoughnessRecipe, load_roughness_recipe
-from texture_estimation.search.classification_task import ClassificationTask
-from texture_estimation.search.generation import Generation, SearchParams
-from texture_estimation.search.labelled_windows import Cut, LabelledWindows
-from texture_estimation.search.optimise import SearchResult, optimise
-from texture_estimation.search.pairs import PairSearchResult, optimise_pairs
-from texture_estimation.search.parallel import ParallelMap, threaded_map
-from texture_estimation.search.recipe_files import Written, checkpoint_of, write_recipes, written_checkpoints
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.roughness_task import RoughnessTask
-from texture_estimation.search.search_slides import SearchSlides
-from texture_estimation.search.shipped_spaces import shipped_space
-from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
+from texture_estimation.recipe import Recipe, load_recipe, with_channels
+from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe, read_grades
+from texture_estimation.search import (
+    ClassificationTask,
+    Cut,
+    Generation,
+    LabelledWindows,
+    PairSearchResult,
+    ParallelMap,
+    RecipeSpace,
+    RoughnessTask,
+    SearchParams,
+    SearchResult,
+    SearchSlides,
+    Written,
+    checkpoint_of,
+    optimise,
+    optimise_pairs,
+    shipped_space,
+    threaded_map,
+    write_recipes,
+    written_checkpoints,
+)
+from texture_evaluation.charts import COLOURS, chart, line_styles, pareto_front
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import CutWindow, WindowParams
-from texture_recordings.slide_dataset import SlideDataset
+from texture_features.windows import CutWindow, WindowParams
+from texture_recordings.dataset import SlideDataset
+
+# --------------------
+# Charts of genetic searches: how they converge, and the front of accuracy and computing.
+
+NAMED = 10  # lines of more searches than this are not named
+
+
+def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, path: str | Path) -> Path:
+    """Draw the fitness of the best individual over the generations, a line for each search.
+
+    Parameters
+    ----------
+    searches
+        Name of the search → its generations.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+    """
+    with chart(path, (7.5, 4.2), title) as figure:
+        axes = figure.subplots()
+        for (name, history), style in zip(searches.items(), cycle(line_styles()), strict=False):
+            best = [100 * one.best.fitness for one in history]
+            label = name if len(searches) <= NAMED else None
+            axes.step([one.number for one in history], best, where='mid', label=label, **style)
+        axes.set(xlabel='generation', ylabel='fitness of the best individual (%)')
+        if len(searches) <= NAMED:
+            axes.legend(loc='lower right')
+    return Path(path)
+
+
+def search_front_chart(fronts: Mapping[str, Sequence[tuple[float, float]]], title: str, path: str | Path) -> Path:
+    """Draw the recipes of each search by cost and fitness, and the front that none of them betters.
+
+    Parameters
+    ----------
+    fronts
+        Name of the search → (operations of a window, fitness from 0 to 1) of each recipe.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+    """
+    with chart(path, (7.5, 4.2), title) as figure:
+        axes = figure.subplots()
+        for number, (name, points) in enumerate(fronts.items()):
+            colour = COLOURS[number % len(COLOURS)]
+            best = [points[index] for index in pareto_front(points)]
+            axes.plot([cost for cost, _ in points], [100 * share for _, share in points], '.', color=colour)
+            axes.step(
+                [cost for cost, _ in best], [100 * share for _, share in best],
+                where='post', color=colour, linewidth=1, label=name,
+            )  # fmt: skip
+        axes.set(xscale='log', xlabel='operations from the samples of a window to the decision', ylabel='fitness (%)')
+        axes.legend(loc='lower right')
+    return Path(path)
+
 
 Tell = Callable[[str, Generation], None]
 

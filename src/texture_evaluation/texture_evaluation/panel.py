@@ -1,8 +1,4 @@
-"""A human panel: people who grade textures from 1 (smooth) to 5 (rough), and how far they agree.
-
-The protocol is that of Rispal, Rana & Duchaine, "Texture roughness estimation using dynamic tactile sensing", section
-III: each person gives every texture a whole grade from 1 to 5 and spreads the textures evenly, 4 to 6 a grade for 25.
-"""
+"""Human panels: agreement between people, and with a model."""
 
 from __future__ import annotations
 
@@ -16,9 +12,95 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.files import writing
-from texture_estimation.roughness.ratings import GRADES, Ratings
-from texture_evaluation.agreement import intraclass_correlation, krippendorff_alpha, one_against_rest
+from texture_core.config import writing
+from texture_core.types import AnyArray, Array
+from texture_estimation.roughness import RATINGS_GRADES, Ratings
+from texture_evaluation.charts import COLOURS, chart
+
+# --------------------
+# How far people agree who graded the same things.
+
+
+def krippendorff_alpha(grades: Array) -> float:
+    """Return Krippendorff's alpha for intervals of grades (n_raters, n_textures); NaN if all are the same.
+
+    Source: Krippendorff 1980, chapter 12; as `nltk` computes it.
+
+    Parameters
+    ----------
+    grades : (n_raters, n_textures)
+        On an interval scale; NaN where a rater gave none.
+    """
+    from nltk.metrics import interval_distance  # type: ignore[import-untyped]  # noqa: PLC0415  # slow to import
+    from nltk.metrics.agreement import AnnotationTask  # type: ignore[import-untyped]  # noqa: PLC0415
+
+    given = np.argwhere(~np.isnan(grades))
+    triples = [(int(rater), int(texture), float(grades[rater, texture])) for rater, texture in given]
+    if len({grade for _, _, grade in triples}) < 2:
+        return math.nan
+    return float(AnnotationTask(triples, distance=interval_distance).alpha())
+
+
+def intraclass_correlation(table: Array) -> tuple[float, float]:
+    """Return ICC(2,1) and ICC(2,k): how far one rater, and the mean of k, agrees with others of their kind.
+
+    Parameters
+    ----------
+    table : (n_targets, n_raters)
+        Targets with a NaN are left out; both are NaN if fewer than two are left, or for a single rater.
+
+    Source: Shrout & Fleiss 1979, two-way random effects.
+    """
+    table = table[~np.isnan(table).any(axis=1)]
+    targets, raters = table.shape
+    if min(targets, raters) < 2:
+        return math.nan, math.nan
+    mean = table.mean()
+    between_targets = raters * ((table.mean(axis=1) - mean) ** 2).sum() / (targets - 1)
+    between_raters = targets * ((table.mean(axis=0) - mean) ** 2).sum() / (raters - 1)
+    total = ((table - mean) ** 2).sum()
+    degrees = (targets - 1) * (raters - 1)
+    rest = (total - between_targets * (targets - 1) - between_raters * (raters - 1)) / degrees
+    signal, bias = between_targets - rest, (between_raters - rest) / targets
+    single = between_targets + (raters - 1) * rest + raters * bias
+    joint = between_targets + bias
+    if not single > 0 or not joint > 0:
+        return math.nan, math.nan
+    return float(signal / single), float(signal / joint)
+
+
+def one_against_rest(grades: Array) -> tuple[float, float]:
+    """Return mean absolute difference and mean correlation of each person with the mean of the others.
+
+    Parameters
+    ----------
+    grades : (n_raters, n_textures)
+        NaN where missing. Both are NaN for a single rater.
+    """
+    errors, correlations = [], []
+    for index, own in enumerate(grades):
+        others = np.delete(grades, index, axis=0)
+        shared = ~np.isnan(own) & ~np.isnan(others).all(axis=0)
+        if not shared.any():
+            continue
+        rest = np.nanmean(others[:, shared], axis=0)
+        errors.append(float(np.abs(own[shared] - rest).mean()))
+        if own[shared].std() > 0 and rest.std() > 0:
+            correlations.append(float(np.corrcoef(own[shared], rest)[0, 1]))
+    return _mean(errors), _mean(correlations)
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else math.nan
+
+
+# --------------------
+# A human panel: people who grade textures from 1 (smooth) to 5 (rough), and how far they agree.
+#
+# The protocol is that of Rispal, Rana & Duchaine, "Texture roughness estimation using dynamic tactile sensing",
+# section
+# III: each person gives every texture a whole grade from 1 to 5 and spreads the textures evenly, 4 to 6 a grade for
+# 25.
 
 TEXTURES_PER_GRADE = (4, 6)  # of the paper's 25; other numbers of textures in proportion
 PAPERS_TEXTURES = 25
@@ -112,9 +194,9 @@ def protocol_violations(ratings: Ratings) -> list[str]:
 def _uneven_raters(ratings: Ratings) -> Iterator[str]:
     low, high = _allowed_a_grade(len(ratings.textures))
     for name, row in zip(ratings.raters, ratings.grades, strict=True):
-        used = (np.rint(row)[:, None] == GRADES).sum(axis=0)
+        used = (np.rint(row)[:, None] == RATINGS_GRADES).sum(axis=0)
         if used.min() < low or used.max() > high:
-            shown = ', '.join(f'{count} × {grade}' for grade, count in zip(GRADES, used, strict=True))
+            shown = ', '.join(f'{count} × {grade}' for grade, count in zip(RATINGS_GRADES, used, strict=True))
             yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are asked'
 
 
@@ -125,3 +207,67 @@ def _allowed_a_grade(n_textures: int) -> tuple[int, int]:
 
 def _or_none(value: float) -> float | None:
     return None if math.isnan(value) else value
+
+
+# --------------------
+# The two pictures of a human panel: votes per grade, and mean with standard deviation.
+
+MIN_SHARE = 4 / 30  # the paper leaves out grades that got fewer than 4 of 30 votes
+MANY = 40  # more textures than this: small names
+LARGEST_DOT = 220.0
+
+
+def votes_chart(ratings: Ratings, path: str | Path) -> Path:
+    """Draw how many people gave each texture each grade, textures from smooth to rough (the paper's Fig. 3)."""
+    order = np.argsort(ratings.means, kind='stable')
+    votes = ratings.votes[order]
+    least = max(1, round(MIN_SHARE * len(ratings.raters)))
+    with chart(path, _size(ratings)) as figure:
+        axes = figure.subplots()
+        texture, grade = np.nonzero(votes >= least)
+        numbers = votes[texture, grade]
+        axes.scatter(
+            texture,
+            RATINGS_GRADES[grade],
+            s=LARGEST_DOT * numbers / len(ratings.raters),
+            color=COLOURS[0],
+            alpha=0.8,
+            zorder=3,
+        )
+        axes.scatter(np.arange(len(order)), ratings.means[order], marker='_', color=COLOURS[5], s=80, zorder=4)
+        _axes(axes, ratings, order)
+        hidden = f', fewer than {least} are not shown' if least > 1 else ''
+        axes.set_title(f'Votes per grade of {len(ratings.raters)} people: larger dots have more{hidden}; lines: means')
+    return Path(path)
+
+
+def deviations_chart(ratings: Ratings, path: str | Path) -> Path:
+    """Draw mean grade plus and minus one standard deviation over the people (the paper's Fig. 4)."""
+    order = np.argsort(ratings.means, kind='stable')
+    means, deviations = ratings.means[order], np.nan_to_num(ratings.deviations[order])
+    with chart(path, _size(ratings)) as figure:
+        axes = figure.subplots()
+        places = np.arange(len(order))
+        axes.bar(places, 2 * deviations, bottom=means - deviations, width=0.6, color=COLOURS[4], zorder=2)
+        axes.scatter(places, means, marker='_', color=COLOURS[0], s=80, zorder=3)
+        _axes(axes, ratings, order)
+        axes.set_title(f'Grade of {len(ratings.raters)} people: mean ± standard deviation')
+    return Path(path)
+
+
+def _axes(axes: Any, ratings: Ratings, order: AnyArray) -> None:
+    names = [ratings.textures[index] for index in order]
+    small = len(names) > MANY
+    axes.set_xticks(range(len(names)), names, rotation=90, fontsize=5 if small else 8)
+    axes.set(
+        xlabel='texture, from smooth to rough',
+        ylabel='roughness grade (1 to 5)',
+        ylim=(0.5, 5.5),
+        yticks=RATINGS_GRADES,
+    )
+    axes.set_xlim(-0.8, len(names) - 0.2)
+    axes.grid(visible=False, axis='x')
+
+
+def _size(ratings: Ratings) -> tuple[float, float]:
+    return max(7.0, 0.13 * len(ratings.textures)), 4.2

@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from texture_core.files import writing
-from texture_estimation.channels import with_channels
-from texture_estimation.classification.training import train
+from texture_core.config import writing
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.model import RoughnessModel
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_estimation.roughness.training import train_grades
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.recipe import Recipe, load_recipe, with_channels
+from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, read_grades, train_grades
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 from texture_recordings.bags import find_bags
-from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.dataset import SlideDataset
 
 HOPS = 4  # windows of the least distance overlap so often
 

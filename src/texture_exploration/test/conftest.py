@@ -4,12 +4,12 @@ import importlib.util
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest
+from texture_core.types import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration, no_signal_watch
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.explorer import Exploration, no_signal_watch
+from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 # The pure tests run where there is no ROS.
 ROS_TESTS = [

@@ -13,11 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.ros_controllers_params import RosControllersParams
-from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
-from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
-from texture_simulation.devices.twist_controller_params import TwistControllerParams
+from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersArm, RosControllersParams
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 
 class ManagedTopics:

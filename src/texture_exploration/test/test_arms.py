@@ -11,12 +11,11 @@ from unittest import mock
 import pytest
 
 from texture_core.errors import CommandRefused
-from texture_core.node_process import NodeProcess
+from texture_core.ros_testing import NodeProcess
+from texture_exploration.arms.arm import ArmCommand, SurfaceBound
 from texture_exploration.arms.catalogue import ARMS
-from texture_exploration.arms.protocol import ArmCommand, SurfaceBound
 from texture_simulation.devices.rails import EmulatedRails
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = pytest.mark.realtime
 

@@ -3,11 +3,11 @@ import math
 import pytest
 
 from texture_core.errors import MotionRefused
-from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.motions.circular import CircularPath, circular
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.motions import CircularPath, circular
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 LIMITS = SafetyLimits()
 

@@ -5,8 +5,7 @@ import math
 import pytest
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.command_limits import CommandLimits
-from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.arm import ArmCommand, CommandLimits
 
 LIMITS = CommandLimits()
 REFUSED = {

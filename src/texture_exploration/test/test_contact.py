@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.types import NANOSECONDS, ExplorationRequest, Phase, TactileSignal
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.motions.touch import TouchParams
-from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
+from texture_exploration.stages import TouchParams
+from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)
 DROP = SimulatedArmParams(step_m=-0.012, step_from_m=0.06)

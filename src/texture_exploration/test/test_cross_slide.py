@@ -4,10 +4,11 @@ import math
 import pytest
 
 from texture_core.errors import MotionRefused
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_exploration.motions.cross_slide import DEFAULTS, cross_slide
-from texture_exploration.motions.touch import TouchParams
+from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.motions import CROSS_SLIDE_DEFAULTS as DEFAULTS
+from texture_exploration.motions import cross_slide
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 CROSS = ExplorationRequest('cross_slide')
 LEG_S = DEFAULTS['distance_m'] / DEFAULTS['speed_m_s']

@@ -1,7 +1,7 @@
 import threading
 
-from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_exploration.estimates import EarlyStoppingParams, ExplorationEstimates
+from texture_core.types import RoughnessEstimate, TextureEstimate
+from texture_exploration.explorer import EarlyStoppingParams, ExplorationEstimates
 
 
 def texture(**values):

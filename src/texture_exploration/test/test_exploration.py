@@ -3,11 +3,10 @@ import re
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.safety import SafetyLimits
-from texture_exploration.signal_watch import SignalWatch
+from texture_exploration.safety import SafetyLimits, SignalWatch
+from texture_exploration.stages import TouchParams
 
 MOVING = (Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT)
 

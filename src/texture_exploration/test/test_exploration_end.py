@@ -1,7 +1,6 @@
 import pytest
 
-from texture_exploration.exploration import ExplorationOutcome
-from texture_exploration.exploration_end import STILL_MOVING, ExplorationEnd
+from texture_exploration.explorer import STILL_MOVING, ExplorationEnd, ExplorationOutcome
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ import re
 
 import numpy as np
 
-from texture_exploration.exploration_ids import ExplorationIds
+from texture_exploration.explorer import ExplorationIds
 
 
 def test_a_name_reports_the_time_and_the_number():

@@ -7,8 +7,8 @@ import pytest
 from rclpy.parameter import Parameter
 
 from texture_core.errors import UnknownName
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.waiting_executor import WaitingExecutor
+from texture_core.ros import WaitingExecutor
+from texture_core.ros_testing import LocalGraph
 from texture_exploration.nodes.explore_preset import ExplorePreset
 from texture_exploration.nodes.explorer import ExplorerNode
 

@@ -1,12 +1,12 @@
 import pytest
 
 from texture_core.errors import DeviceError, MotionRefused, UnknownName
-from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 pytestmark = pytest.mark.realtime
 

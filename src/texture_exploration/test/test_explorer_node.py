@@ -18,17 +18,11 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
-from texture_core.estimates import TextureEstimate
-from texture_core.finger_state import FingerState
-from texture_core.node_process import killed_on_error
-from texture_core.ros.conversions import to_msg
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
-from texture_core.ros.time import to_ns
-from texture_core.ros.waiting_executor import WaitingExecutor
+from texture_core.ros import ESTIMATE_QOS, STATE_QOS, WaitingExecutor, to_msg, to_ns
+from texture_core.ros_testing import LocalGraph, killed_on_error
+from texture_core.types import FingerState, TextureEstimate
 from texture_exploration.nodes.explorer import ExplorerNode
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import ERROR, OVERLOAD, leap_hand
+from texture_simulation.devices.dynamixel import ERROR, OVERLOAD, EmulatedDynamixelBus, leap_hand
 
 QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
 SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}

@@ -10,22 +10,19 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.node_process import killed_on_error
+from texture_core.ros_testing import killed_on_error
+from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import leap_hand
-from texture_simulation.devices.rails import EmulatedRails
-from texture_simulation.devices.rails_firmware import RailsMachine
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_exploration.stages import TouchParams
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, leap_hand
+from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = pytest.mark.realtime
 

@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_core.exploration import ExplorationRequest
+from texture_core.types import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.force_control import ContactState, ForceController, ForceLoop, ForceLoopParams
-from texture_exploration.lag import LagEstimate
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.slope_observer import SlopeObserver
-from texture_exploration.stability import spectral_radius
-from texture_exploration.stiffness import StiffnessEstimate
+from texture_exploration.force_control import (
+    ContactState,
+    ForceController,
+    ForceLoop,
+    ForceLoopParams,
+    LagEstimate,
+    SlopeObserver,
+    StiffnessEstimate,
+    spectral_radius,
+)
+from texture_exploration.stages import TouchParams
 
 PERIOD_S = 0.004
 

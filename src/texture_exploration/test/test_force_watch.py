@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
+from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.force_watch import ForceWatch
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.safety import SafetyLimits
+from texture_exploration.safety import ForceWatch, SafetyLimits
+from texture_exploration.stages import TouchParams
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
 ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n_m=20000.0)

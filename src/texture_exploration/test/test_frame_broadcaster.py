@@ -6,11 +6,10 @@ import pytest
 from rclpy.clock import Clock
 
 from texture_core.errors import InvalidParameter
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.rotation import quaternion_matrix, rotation_matrix
-from texture_exploration.arms.surface_frame import SurfaceFrame
-from texture_exploration.ros import frame_broadcaster
-from texture_exploration.ros.frame_broadcaster import FrameBroadcaster, FrameParams
+from texture_core.types import ExplorationState, Phase, quaternion_matrix, rotation_matrix
+from texture_exploration.arms.arm import SurfaceFrame
+from texture_exploration.nodes import explorer as frame_broadcaster
+from texture_exploration.nodes.explorer import FrameBroadcaster, FrameParams
 
 pytestmark = pytest.mark.ros
 

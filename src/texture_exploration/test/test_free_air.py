@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from texture_exploration.free_air import FreeAir
+from texture_exploration.arms.arm import FreeAir
 
 STEP_NS = 4_000_000
 RISE_M, STEADY_N = 0.003, 0.5

@@ -12,26 +12,30 @@ import pytest
 import serial
 import yaml
 
+from texture_core.config import find_file, load_yaml
 from texture_core.errors import CommandRefused, DeviceError, InvalidParameter
-from texture_core.plain_data import load_yaml
-from texture_core.resources import find_file
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.dynamixel import (
+    DynamixelBus,
+    DynamixelFinger,
+    DynamixelHand,
+    MotorState,
+    torque_off_packet,
+)
+from texture_exploration.arms.hand import SimulatedHand, load_profile, read_profile
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
-from texture_exploration.arms.protocol import ArmCommand
-from texture_exploration.hands.dynamixel import DynamixelFinger, DynamixelHand
-from texture_exploration.hands.dynamixel_bus import DynamixelBus, MotorState
-from texture_exploration.hands.profile import load_profile, read_profile
-from texture_exploration.hands.simulated import SimulatedHand
-from texture_exploration.hands.torque_guard import torque_off_packet
-from texture_simulation.devices.dynamixel import PING, READ, EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import (
+from texture_simulation.devices.dynamixel import (
     GOAL_CURRENT,
     GOAL_POSITION,
     MODE,
     OVERLOAD,
+    PING,
+    READ,
     TORQUE,
     TRIPPED,
     WATCHDOG,
     DynamixelMotors,
+    EmulatedDynamixelBus,
     leap_hand,
 )
 
@@ -78,7 +82,7 @@ def register(bus, motor, address):
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """On a busy machine the emulated motors may be late more often than real ones are."""
-    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.TRIES', 12)
+    monkeypatch.setattr('texture_exploration.arms.dynamixel.TRIES', 12)
 
 
 @pytest.fixture
@@ -268,7 +272,7 @@ def test_a_motor_that_falls_silent_while_it_is_taken_in_does_not_end_the_others(
     bus.motors.absent = {5}
     until(lambda: 'motor 5' in fault_of(hand))
     monkeypatch.setattr(bus.motors, 'write', falls_silent)
-    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.TRIES', 2)
+    monkeypatch.setattr('texture_exploration.arms.dynamixel.TRIES', 2)
     bus.motors.absent = set()
     until(lambda: refused)
     told_ns = time.monotonic_ns()
@@ -276,7 +280,7 @@ def test_a_motor_that_falls_silent_while_it_is_taken_in_does_not_end_the_others(
     assert "motor 5 ('press' of middle) does not answer" in fault_of(hand)
     assert bus.motors.tables[1][TORQUE]
     bus.motors.absent = set()
-    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.TRIES', 12)
+    monkeypatch.setattr('texture_exploration.arms.dynamixel.TRIES', 12)
     until(lambda: fault_of(hand) == '')
 
 
@@ -362,7 +366,7 @@ def test_a_motor_with_a_latched_error_can_be_rebooted(bus, hand):
 
 
 def test_an_error_that_a_reboot_does_not_clear_is_reported(bus, hand, monkeypatch):
-    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.RESTART_S', 0.2)
+    monkeypatch.setattr('texture_exploration.arms.dynamixel.RESTART_S', 0.2)
     monkeypatch.setattr(bus.motors, 'reboot', lambda _motor: None)
     bus.motors.fail(1, OVERLOAD)
     with pytest.raises(DeviceError, match=r'motor 1 .* still reports overload after a reboot; .*switch its power off'):

@@ -7,20 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_core.config import markdown_table
 from texture_core.errors import DeviceError, InvalidParameter, UnknownName
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.parameters import markdown_table
+from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.dynamixel import DynamixelBus, DynamixelHand, signed
+from texture_exploration.arms.hand import SimulatedHand, load_profile
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
-from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.explorer import Explorer
-from texture_exploration.hands.dynamixel import DynamixelHand
-from texture_exploration.hands.dynamixel_bus import DynamixelBus, signed
-from texture_exploration.hands.profile import load_profile
-from texture_exploration.hands.simulated import SimulatedHand
-from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import DynamixelMotors, PressingMotor
+from texture_exploration.stages import TouchParams
+from texture_simulation.devices.dynamixel import DynamixelMotors, EmulatedDynamixelBus, PressingMotor
 
 pytestmark = pytest.mark.realtime
 

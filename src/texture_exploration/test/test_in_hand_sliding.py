@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import MotionRefused
-from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.motions.in_hand_sliding import in_hand_random, in_hand_sliding, random_strokes
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.motions import in_hand_random, in_hand_sliding, random_strokes
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 RUB = ExplorationRequest('in_hand_sliding')
 

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.lift_first import LiftFirst
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import LiftFirst, TouchParams
 
 pytestmark = pytest.mark.realtime
 

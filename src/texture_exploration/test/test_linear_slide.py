@@ -4,10 +4,10 @@ from itertools import pairwise
 import pytest
 
 from texture_core.errors import MotionRefused
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_exploration.motions.linear_slide import linear_slide
-from texture_exploration.motions.touch import TouchParams
+from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.motions import linear_slide
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 
 def slide_of(table):

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_exploration.motions.catalogue import MOTIONS
+from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.motions import MOTIONS
 
 ORDER = [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.DONE]
 

@@ -3,10 +3,9 @@ from itertools import pairwise
 
 import pytest
 
-from texture_exploration.arms.protocol import ArmState
-from texture_exploration.motions.circular import CircularPath
-from texture_exploration.motions.linear_slide import StraightPath
-from texture_exploration.motions.path import PathFollower, ramp_s, ramps_m, smooth
+from texture_exploration.arms.arm import ArmState
+from texture_exploration.motions import CircularPath, StraightPath
+from texture_exploration.stages import PathFollower, ramp_s, ramps_m, smooth
 
 
 def follow(path, places):

@@ -4,10 +4,10 @@ from pathlib import Path
 import pytest
 
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset, read_preset
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 # A slide is longer than the recording of its paper by so much: an arm that answers late still covers all of that.
 LATE_S = 0.05

@@ -8,20 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_core.config import markdown_table
 from texture_core.errors import DeviceError
-from texture_core.exploration import ExplorationRequest
-from texture_core.finger_state import FingerState
 from texture_core.framing import Frame, pack, unpack
-from texture_core.parameters import markdown_table
-from texture_exploration.arms import rails_tables as tables
-from texture_exploration.arms.protocol import ArmCommand
+from texture_core.types import ExplorationRequest, FingerState
+from texture_exploration.arms import rails as tables
+from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.devices.rails import EmulatedRails
-from texture_simulation.devices.rails_firmware import RailsMachine
+from texture_exploration.stages import TouchParams
+from texture_simulation.devices.fingers import ByteFaults
+from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 
 pytestmark = pytest.mark.realtime
 

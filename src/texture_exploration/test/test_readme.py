@@ -2,13 +2,12 @@ from pathlib import Path
 
 import pytest
 
-from texture_core.parameters import markdown_table
+from texture_core.config import markdown_table
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.estimates import EarlyStoppingParams
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.safety import SafetyLimits
-from texture_exploration.signal_watch import SignalWatchParams
+from texture_exploration.explorer import EarlyStoppingParams
+from texture_exploration.motions import MOTIONS
+from texture_exploration.safety import SafetyLimits, SignalWatchParams
+from texture_exploration.stages import TouchParams
 
 README = (Path(__file__).parent.parent / 'README.md').read_text()
 

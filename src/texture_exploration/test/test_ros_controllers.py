@@ -8,21 +8,15 @@ import numpy as np
 import pytest
 
 from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, MotionRefused
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.rotation import quaternion_matrix, rotation_matrix
-from texture_exploration.arms.protocol import ArmCommand
-from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.ros_controllers_params import RosControllersParams as Params
-from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
-from texture_exploration.arms.tool_state import GRAVITY_M_S2, ToolState
-from texture_exploration.exploration import Exploration
-from texture_exploration.explorer import Explorer
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.lift_first import LiftFirst
-from texture_exploration.motions.touch import TouchParams
+from texture_core.types import ExplorationRequest, Phase, quaternion_matrix, rotation_matrix
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.ros_controllers import GRAVITY_M_S2, ForceSample, PoseSample, RosControllersArm, ToolState
+from texture_exploration.arms.ros_controllers import RosControllersParams as Params
+from texture_exploration.explorer import Exploration, Explorer
+from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
-from texture_simulation.devices.twist_controller_params import TwistControllerParams
+from texture_exploration.stages import LiftFirst, TouchParams
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 PERIOD_NS = 4_000_000
 EXPLORER_PERIODS = 2  # of the arm, in one of the explorer

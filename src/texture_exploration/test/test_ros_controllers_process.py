@@ -21,16 +21,14 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
 from texture_core.errors import DeviceError, MotionRefused
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.node_process import NodeProcess, killed_on_error
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import STATE_QOS
-from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_core.ros import STATE_QOS
+from texture_core.ros_testing import LocalGraph, NodeProcess, killed_on_error
+from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.ros import controller_topics
+from texture_exploration.ros import controllers as controller_topics
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

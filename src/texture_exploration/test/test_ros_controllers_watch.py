@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from texture_exploration.arms.ros_controllers_watch import FollowWatch
+from texture_exploration.arms.ros_controllers import FollowWatch
 
 PERIOD_S = 0.004
 FOLLOW_M = 0.002

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_exploration.arms.protocol import ArmState
+from texture_exploration.arms.arm import ArmState
 from texture_exploration.safety import SafetyLimits
 
 REST = (0.0, 0.0, 0.0)

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from rclpy.action import ActionClient
 
-from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros_testing import LocalGraph
 from texture_exploration.nodes import explorer
 from texture_exploration.nodes.explorer import ExplorerNode
 

@@ -7,8 +7,8 @@ import time
 import pytest
 from texture_msgs import msg, srv
 
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
+from texture_core.ros import SENSOR_QOS, STATE_QOS
+from texture_core.ros_testing import LocalGraph
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

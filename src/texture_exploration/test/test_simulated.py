@@ -4,10 +4,9 @@ import socket
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.finger_state import FingerState
-from texture_exploration.arms.protocol import ArmCommand
+from texture_core.types import FingerState
+from texture_exploration.arms.arm import HOLDS_S, ArmCommand, DelayedVelocity
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.arms.velocity_only import HOLDS_S, DelayedVelocity
 
 
 class Clock:

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from texture_exploration.force_control import ForceController
-from texture_exploration.stability import (
+from texture_exploration.force_control import (
+    ForceController,
     LoopModel,
     loop_matrix,
     simulated_stability_limit_gain,

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import MotionAborted
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.signal import TactileSignal
-from texture_exploration.arms.protocol import ArmState
+from texture_core.types import ExplorationRequest, Phase, TactileSignal
+from texture_exploration.arms.arm import ArmState
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.motions.stall import SlideWatch, StallWatch
-from texture_exploration.motions.touch import TouchParams
-from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
+from texture_exploration.stages import SlideWatch, StallWatch, TouchParams
+from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 SPEED_M_S = 0.02
 STEP_S = 0.01

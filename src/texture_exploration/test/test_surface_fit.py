@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.rotation import rotation_matrix
-from texture_exploration.arms.surface_frame import SurfaceFrame
-from texture_exploration.surface_fit import SurfaceTouches, fit_surface
+from texture_core.types import rotation_matrix
+from texture_exploration.arms.arm import SurfaceFrame
+from texture_exploration.explorer import SurfaceTouches, fit_surface
 
 UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 CORNERS = [(0.3, 0.0, 0.1), (0.4, 0.0, 0.1), (0.35, 0.08, 0.1)]

@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.rotation import rotation_matrix
-from texture_exploration.arms.tangential_force import SLIDING_M_S, tangential_force_n
-from texture_exploration.arms.ur import UrArm, UrArmParams
-from texture_exploration.arms.ur_messages import Counts, UrReport
+from texture_core.types import rotation_matrix
+from texture_exploration.arms.arm import SLIDING_M_S, tangential_force_n
+from texture_exploration.arms.ur import Counts, UrArm, UrArmParams, UrReport
 
 
 @pytest.mark.parametrize('turned_rad', [0.0, 0.7, 2.0, math.pi, -1.3])

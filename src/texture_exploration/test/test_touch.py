@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from texture_core.exploration import ExplorationRequest
-from texture_exploration.motions.touch import REACTION_S, TouchParams
+from texture_core.types import ExplorationRequest
+from texture_exploration.stages import REACTION_S, TouchParams
 
 TOUCH = TouchParams(approach_speed_m_s=0.1, approach_stiffness_n_m=2000.0)
 

@@ -18,21 +18,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_core.config import markdown_table
 from texture_core.errors import DeviceError
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.finger_state import FingerState
-from texture_core.parameters import markdown_table
-from texture_exploration.arms.protocol import ArmCommand
-from texture_exploration.arms.tcp_connection import TcpConnection
-from texture_exploration.arms.ur import UrArm, UrArmParams
-from texture_exploration.arms.ur_params import UrArmParams as Params
-from texture_exploration.arms.ur_probe import _ask
-from texture_exploration.arms.ur_tables import PROTOCOL_VERSION, REQUEST_VERSION, RTDE_PORT, SETUP_INPUTS
+from texture_core.types import ExplorationRequest, FingerState, Phase
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.ur import (
+    PROTOCOL_VERSION,
+    REQUEST_VERSION,
+    RTDE_PORT,
+    SETUP_INPUTS,
+    TcpConnection,
+    UrArm,
+    UrArmParams,
+    _ask,
+)
+from texture_exploration.arms.ur import UrArmParams as Params
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_exploration.stages import TouchParams
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = pytest.mark.realtime
 

@@ -2,10 +2,8 @@
 
 import pytest
 
-from texture_exploration.arms.ur_command_stream import UrCommandStream
-from texture_exploration.arms.ur_messages import UrCommand
-from texture_exploration.arms.ur_params import UrArmParams
-from texture_exploration.arms.ur_watchdog import Watchdog
+from texture_exploration.arms.ur import UrArmParams, UrCommand
+from texture_exploration.arms.ur_worker import UrCommandStream, Watchdog
 
 PARAMS = UrArmParams(surface_x_m=0.0, surface_z_m=0.0)
 CYCLE_NS = 4_000_000

@@ -15,19 +15,15 @@ from collections import deque
 import pytest
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.finger_state import FingerState
-from texture_exploration.arms import ur_probe
-from texture_exploration.arms.protocol import ArmCommand
+from texture_core.types import ExplorationRequest, FingerState, Phase
+from texture_exploration.arms import ur as ur_probe
+from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
-from texture_exploration.exploration import Exploration
-from texture_exploration.explorer import Explorer, Pacer
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.lift_first import LiftFirst
-from texture_exploration.motions.touch import REACTION_S, TouchParams
+from texture_exploration.explorer import Exploration, Explorer, Pacer
+from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_exploration.stages import REACTION_S, LiftFirst, TouchParams
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = [
     pytest.mark.realtime,

@@ -2,10 +2,8 @@
 
 import pytest
 
-from texture_exploration.arms.ur_command_stream import UrCommandStream
-from texture_exploration.arms.ur_messages import UrCommand
-from texture_exploration.arms.ur_params import UrArmParams
-from texture_exploration.arms.ur_watchdog import Watchdog
+from texture_exploration.arms.ur import UrArmParams, UrCommand
+from texture_exploration.arms.ur_worker import UrCommandStream, Watchdog
 
 PARAMS = UrArmParams(watchdog_hz=10.0, acknowledge_s=1.0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
-from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
 
 arm = UrArm(UrArmParams(ip=sys.argv[1]))

@@ -7,30 +7,580 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from typing import Literal
 
-from texture_core.catalogue import find
+import numpy as np
+
+from texture_core.config import find, param
 from texture_core.errors import DeviceError, InvalidData, MotionAborted, MotionRefused, TextureError
-from texture_core.exploration import ExplorationRequest, ExplorationState
-from texture_exploration.arms.protocol import (
+from texture_core.types import (
+    ENDED,
+    Array,
+    ExplorationRequest,
+    ExplorationState,
+    Phase,
+    RoughnessEstimate,
+    TextureEstimate,
+    rotation_vector,
+)
+from texture_exploration.arms.arm import (
     Arm,
+    ArmCommand,
+    ArmState,
     Checkable,
     Counting,
+    Doubting,
+    ForceReading,
     Rebootable,
     Recoverable,
     SurfaceBound,
+    SurfaceFrame,
     Vector,
     Warns,
     Zeroing,
 )
-from texture_exploration.arms.surface_frame import SurfaceFrame
-from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
-from texture_exploration.listening import Listening
-from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.lift_first import LiftFirst, Rise
-from texture_exploration.motions.touch import TouchParams
-from texture_exploration.safety import SafetyLimits
-from texture_exploration.surface_fit import TOUCHES, SurfaceTouches
+from texture_exploration.motions import MOTIONS
+from texture_exploration.safety import WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, SafetyLimits
+from texture_exploration.stages import LiftFirst, Motion, MotionStep, Rise, TouchParams
+
+# --------------------
+# Collect the estimates of one exploration.
+
+
+@dataclass(frozen=True)
+class EarlyStoppingParams:
+    """When a slide may end early, and how long to wait for the final estimates."""
+
+    min_confidence: float = param(
+        0.0,
+        'Sets the lowest confidence that ends a slide early, besides the stopping rule of the model; a '
+        'higher value slides longer.',
+        low=0.0,
+        high=1.0,
+    )
+    estimate_timeout_s: float = param(
+        1.0, 'Sets how long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
+    )
+
+    def may_stop(self, estimate: TextureEstimate) -> bool:
+        """Return whether the texture estimate may end the slide."""
+        return estimate.known and estimate.decided and estimate.confidence >= self.min_confidence
+
+
+class ExplorationEstimates:
+    """The newest texture and roughness estimate of one exploration; safe for threads."""
+
+    def __init__(self, exploration_id: str) -> None:
+        self.texture = TextureEstimate(0, exploration_id)
+        self.roughness = RoughnessEstimate(0, exploration_id)
+        self._changed = threading.Condition()
+        self._cancelled = False
+
+    def update(self, estimate: TextureEstimate | RoughnessEstimate) -> None:
+        """Take over a newer estimate."""
+        with self._changed:
+            if isinstance(estimate, TextureEstimate):
+                self.texture = estimate
+            else:
+                self.roughness = estimate
+            self._changed.notify_all()
+
+    def wait_until_final(self, kinds: Collection[str], timeout_s: float) -> bool:
+        """Wait until the estimates of these kinds ('texture', 'roughness') are final; return whether they are."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._cancelled or self._final(kinds), timeout_s)
+            return self._final(kinds)
+
+    def cancel(self) -> None:
+        """End the waiting: no further estimate will arrive."""
+        with self._changed:
+            self._cancelled = True
+            self._changed.notify_all()
+
+    def _final(self, kinds: Collection[str]) -> bool:
+        return all(getattr(self, kind).final for kind in kinds)
+
+
+# --------------------
+# One exploration: the loop that ties a motion to an arm and watches over both.
+
+STATE_PERIOD_NS = 20_000_000
+# After a longer gap between two steps it was we who slept: the age of the arm's state says nothing about the arm.
+GAP_NS = 50_000_000
+# A tick that comes a little early must not wait for the next one.
+STATE_SLACK_NS = 5_000_000
+NO_SLIDE_OBSERVED = (
+    'the slide was shorter than the delay of the arm or than a pause of this machine, so no sample could be taken;  '
+    'slide longer or more slowly'
+)
+
+
+@dataclass(frozen=True)
+class ExplorationOutcome:
+    """How an exploration ended.
+
+    Attributes
+    ----------
+    success
+        Whether it was done as requested.
+    message
+        What happened, in a sentence.
+    slid
+        Whether the finger slid, so that there are samples.
+    lifted
+        Whether the finger was lifted at the end, and the measured force says so; an arm with a fault can only be
+        stopped.
+    """
+
+    success: bool
+    message: str
+    slid: bool
+    lifted: bool = True
+
+
+def no_signal_watch(_listening: Listening) -> str:
+    """Return '': the sensor is not watched."""
+    return ''
+
+
+class Exploration:
+    """Step a motion until it ends, whatever happens to the arm.
+
+    Parameters
+    ----------
+    exploration_id, request
+        What is explored; repeated in each state.
+    arm, motion, limits
+        Who moves, how, and what ends it at once.
+    clock
+        CLOCK_MONOTONIC in ns.
+    signal_fault
+        Returns in a sentence why the sensor delivers no samples, '' if it does; it is told since when the loop listens.
+    on_state
+        Called in the thread of `run` with each new phase and 50 times a second; stamps are of `clock`.
+
+    Attributes
+    ----------
+    ended : threading.Event
+        Set by whoever calls `run` when all is over, for those who wait.
+    outcome, state
+        How it ended, and the newest state.
+    gaps
+        How often a step came far too late, because the machine was busy.
+    """
+
+    def __init__(
+        self,
+        exploration_id: str,
+        request: ExplorationRequest,
+        *,
+        arm: Arm,
+        motion: Motion,
+        limits: SafetyLimits,
+        clock: Callable[[], int],
+        on_state: Callable[[ExplorationState], None],
+        signal_fault: Callable[[Listening], str] = no_signal_watch,
+    ) -> None:
+        self.exploration_id = exploration_id
+        self.request = request
+        self.outcome = ExplorationOutcome(False, 'it broke off through an internal error; see the log', False, False)
+        self.ended = threading.Event()
+        self.gaps = 0
+        self.state = ExplorationState(clock(), exploration_id, request.motion, Phase.IDLE)
+        self._arm = arm
+        self._motion = motion
+        self._limits = limits
+        self._clock = clock
+        self._on_state = on_state
+        self._signal_fault = signal_fault
+        reading = getattr(arm, 'force_reading', ForceReading.CONTROLLED)
+        self._force_watch = ForceWatch(limits, reading, motion.force_n)
+        self._guard = ForceGuard(limits)
+        self._commanded = ArmCommand()
+        self._stop_reason = ''
+        self._finish_reason = ''
+        self._abort_reason = ''
+        self._signal_seen = False
+        self._slid = False
+        self._entered = False  # the workspace
+        self._next_state_ns = 0
+        self._begin_ns = self._last_ns = clock()
+        self._listening = Listening(self._begin_ns)
+
+    def run(self, pace: Callable[[], None]) -> ExplorationOutcome:
+        """Go through the whole motion; `pace` returns when the next step is due."""
+        try:
+            while not self._tick():
+                pace()
+        except DeviceError as error:
+            self._give_up(f'{error}; the finger was not lifted')
+        finally:
+            # Also when a bug ends the loop: no arm is left moving.
+            with contextlib.suppress(DeviceError):
+                self._arm.stop()
+        return self.outcome
+
+    def stop(self, reason: str) -> None:
+        """Lift the finger and abort, from any phase; from any thread."""
+        self._stop_reason = self._stop_reason or reason
+
+    def finish(self, reason: str) -> None:
+        """End the slide early with success; from any thread."""
+        self._finish_reason = self._finish_reason or reason
+
+    def _tick(self) -> bool:
+        """Do one step; return whether the exploration has ended."""
+        arm, now_ns = self._arm.state(), self._clock()
+        self._detect_gap(now_ns)
+        fault = arm_fault(arm, now_ns, self._limits, self._listening)
+        if fault:
+            self._give_up(f'{fault}; the finger was not lifted')
+            return True
+        relative = self._guard.relative(arm, self._zeroed, self._commanded)
+        doubt = self._arm.doubt() if isinstance(self._arm, Doubting) else ''
+        reason = (
+            self._stop_reason
+            or self._violation(arm, relative)
+            or doubt
+            or self._signal_fault(self._listening)
+            or self._overdue(now_ns)
+        )
+        if reason:
+            self._abort_reason = self._abort_reason or reason
+            self._motion.abort(reason)
+        if self._awaits_samples():
+            self._arm.command(ArmCommand())
+            return False
+        if self._finish_reason:
+            self._motion.finish(self._finish_reason)
+        step = self._motion.step(now_ns, arm)
+        command = self._guard.yielding(relative, step.command, step.phase in (Phase.LIFT, Phase.ABORTED))
+        if self._guard.blocked:
+            self._abort_reason = self._motion.message
+            self._give_up(f'{self._guard.blocked}; the finger was not lifted')
+            return True
+        if command is not step.command:
+            step = replace(step, command=command, phase=Phase.LIFT)
+        self._arm.command(step.command)
+        self._commanded = step.command
+        self._force_watch.note(step.phase, arm, step.command)
+        self._publish_state(now_ns, step, arm)
+        return step.phase in ENDED
+
+    def _awaits_samples(self) -> bool:
+        """Return whether the finger rests until the sensor delivers; silence from before the request counts."""
+        self._signal_seen = self._signal_seen or bool(self._abort_reason) or not self._signal_fault(WITHOUT_GAPS)
+        return not self._signal_seen
+
+    @property
+    def _zeroed(self) -> bool:
+        return self._arm.zeroed if isinstance(self._arm, Zeroing) else True
+
+    def _violation(self, arm: ArmState, relative: ArmState) -> str:
+        """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
+        workspace_violation = self._limits.workspace_violation(arm)
+        self._entered |= not workspace_violation
+        frozen = self._force_watch.frozen(arm, self._commanded)
+        return (
+            arm.unsafe
+            or self._guard.violation(relative, self.state.phase)
+            or frozen
+            or (workspace_violation if self._entered else '')
+        )
+
+    def _overdue(self, now_ns: int) -> str:
+        """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
+        timeout_s = self.request.timeout_s
+        late = timeout_s > 0.0 and (now_ns - self._begin_ns) * 1e-9 > timeout_s
+        return f'the exploration took longer than its timeout of {timeout_s:g} s' if late else ''
+
+    def _detect_gap(self, now_ns: int) -> None:
+        if now_ns - self._last_ns > GAP_NS:
+            self._listening = Listening(self._begin_ns, self._last_ns, now_ns)
+            self.gaps += 1
+        self._last_ns = now_ns
+
+    def _publish_state(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
+        """Report the state if its phase is new or the time has come."""
+        self._slid |= step.phase is Phase.SLIDE
+        flaw = self._flaw() if step.phase is Phase.DONE else ''
+        if flaw:
+            lifted = self._motion.lifted
+            self.outcome, step = ExplorationOutcome(False, flaw, self._slid, lifted), replace(step, phase=Phase.ABORTED)
+        elif step.phase in ENDED:
+            success = step.phase is Phase.DONE
+            self.outcome = ExplorationOutcome(success, self._motion.message, self._slid, self._motion.lifted)
+        # A promise that is withdrawn is told at once: until then windows may be cut on it.
+        as_before = step.phase is self.state.phase and (step.steady_s > 0) is (self.state.steady_s > 0)
+        if as_before and now_ns < self._next_state_ns:
+            return
+        self._next_state_ns = now_ns + STATE_PERIOD_NS - STATE_SLACK_NS
+        vx, vy, _ = arm.velocity
+        x, y, z = arm.position
+        self._report(
+            ExplorationState(
+                stamp_ns=now_ns,
+                exploration_id=self.exploration_id,
+                motion=self.request.motion,
+                phase=step.phase,
+                steady_s=step.steady_s,
+                speed_m_s=(vx * vx + vy * vy) ** 0.5,
+                force_n=arm.force_n,
+                tangential_force_n=arm.tangential_force_n,
+                direction_rad=step.direction_rad,
+                progress=step.progress,
+                surface=self.request.surface,
+                x_m=x,
+                y_m=y,
+                z_m=z,
+            )
+        )
+
+    def _flaw(self) -> str:
+        """Return why an exploration whose motion ended as planned is no success, '' if it is."""
+        return self._force_watch.drifted() if self._slid else NO_SLIDE_OBSERVED
+
+    def _give_up(self, reason: str) -> None:
+        """End at once: an arm that does not follow cannot be lifted, only stopped."""
+        message = f'{self._abort_reason}; {reason}' if self._abort_reason else reason
+        self.outcome = ExplorationOutcome(False, message, self._slid, lifted=False)
+        self._report(
+            ExplorationState(
+                stamp_ns=self._clock(),
+                exploration_id=self.exploration_id,
+                motion=self.request.motion,
+                phase=Phase.ABORTED,
+                progress=self.state.progress,
+                surface=self.request.surface,
+            )
+        )
+
+    def _report(self, state: ExplorationState) -> None:
+        self.state = state
+        self._on_state(state)
+
+
+def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Listening = WITHOUT_GAPS) -> str:
+    """Return in words why the arm would not follow a command, '' if it would.
+
+    Parameters
+    ----------
+    arm
+        Newest state of the arm.
+    now_ns
+        Time of the same clock, ns.
+    limits
+        Longest allowed silence of the arm.
+    listening
+        Since when the caller listens, and its newest gap.
+
+    Returns
+    -------
+    str
+        A sentence without a full stop, or ''.
+    """
+    age_s = listening.silence_s(arm.time_ns, now_ns)
+    if arm.fault:
+        return f'the arm reports a fault: {arm.fault}'
+    if age_s > limits.state_timeout_s:
+        return f'the arm has not answered for {age_s * 1e3:.0f} ms'
+    return ''
+
+
+# --------------------
+# How the end of an exploration is reported to the operator.
+
+STILL_MOVING = ExplorationOutcome(
+    False, 'the explorer ended before the finger was lifted; look at the robot', slid=False, lifted=False
+)
+
+
+@dataclass(frozen=True)
+class ExplorationEnd:
+    """The end of an exploration.
+
+    Attributes
+    ----------
+    exploration_id
+        Id of the exploration.
+    outcome
+        How it ended.
+    """
+
+    exploration_id: str
+    outcome: ExplorationOutcome
+
+    @property
+    def severity(self) -> Literal['info', 'warning', 'error']:
+        """Level of the log: an abort is a warning, a finger that was not lifted is an error."""
+        if self.outcome.success:
+            return 'info'
+        return 'warning' if self.outcome.lifted else 'error'
+
+    @property
+    def sentence(self) -> str:
+        """What the log says."""
+        lifted = '' if self.outcome.success or not self.outcome.lifted else '; the finger was lifted'
+        return f'{self.exploration_id}: {self.outcome.message}{lifted}'
+
+
+# --------------------
+# Ids of explorations.
+
+
+class ExplorationIds:
+    """Make readable unique ids such as '20261120T235959-001-ab12': UTC, a running number, a random end.
+
+    The random end keeps two nodes apart that begin in the same second.
+    """
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._number = 0
+
+    def next(self, time_ns: int) -> str:
+        """Return the name of an exploration that begins at `time_ns` since 1970."""
+        self._number += 1
+        begin = datetime.fromtimestamp(time_ns // 1_000_000_000, tz=timezone.utc)
+        return f'{begin:%Y%m%dT%H%M%S}-{self._number:03d}-{self._rng.integers(0x10000):04x}'
+
+
+# --------------------
+# The frame of a surface from places where the fingertip touched it.
+
+MAKE_A_PLANE = 3
+TOUCHES = 4  # three always lie in a plane: only a further one shows whether it is the surface
+NARROWEST_M = 0.01  # spread of the touches across their longest direction, and distance between any two
+LARGEST_RESIDUAL_M = 0.002  # a surface that is bent more than this is no plane
+LARGEST_TURN_RAD = math.radians(15.0)  # against the pose before: beyond, a touch is more likely wrong than the pose
+
+
+@dataclass(frozen=True)
+class SurfaceFit:
+    """A plane through touches: `pose` as `SurfaceFrame` takes it, (6,); distances of the touches from the plane in m.
+
+    `residual_m` is their root mean square and `largest_m` the largest; both are 0 for three touches, which always lie
+    in one plane and so prove nothing.
+    """
+
+    pose: tuple[float, ...]
+    residual_m: float
+    largest_m: float
+
+
+def fit_surface(
+    touches: Sequence[Sequence[float] | Array], normal: Sequence[float], along: Sequence[float]
+) -> SurfaceFit:
+    """Return the plane that fits touches best, by least squares of the distances (total least squares).
+
+    The origin is the middle of the touches, z the normal, x the direction `along` the surface as far as it lies in the
+    plane.
+
+    Parameters
+    ----------
+    touches : (n, 3)
+        Places in the base frame, m; at least three.
+    normal : (3,)
+        Normal of the surface as it was known before, in the base frame.
+    along : (3,)
+        Direction of the x axis in the base frame.
+
+    Returns
+    -------
+    SurfaceFit
+        Pose of the surface in the base frame, and the distances that are left, m.
+
+    Raises
+    ------
+    InvalidData
+        If there are fewer than three touches, if they lie nearly in a line, if they are far from a plane, or if the
+        plane is turned by more than 15 degrees against `normal`.
+    """
+    points = np.array(touches, dtype=float)
+    if len(points) < MAKE_A_PLANE:
+        raise InvalidData(f'there are {len(points)} touches; {MAKE_A_PLANE} are needed')
+    middle = points.mean(axis=0)
+    _, _sizes, directions = np.linalg.svd(points - middle, full_matrices=False)
+    spread_m = float(np.ptp((points - middle) @ directions[1]))
+    if spread_m < NARROWEST_M:
+        raise InvalidData(
+            f'the touches lie nearly in a line: across it they spread over {1e3 * spread_m:.1f} mm, and '
+            f'{1e3 * NARROWEST_M:g} mm are needed; touch at the corners of a triangle'
+        )
+    axis = np.cross(directions[0], directions[1])
+    distances = (points - middle) @ axis
+    largest_m = float(np.abs(distances).max())
+    if largest_m > LARGEST_RESIDUAL_M:
+        raise InvalidData(
+            f'the touches do not lie in a plane: one is {1e3 * largest_m:.1f} mm off, and {1e3 * LARGEST_RESIDUAL_M:g} '
+            'mm are allowed; touch one flat part of the surface'
+        )
+    before = np.array(normal, dtype=float) / np.linalg.norm(normal)
+    up = axis * (1.0 if axis @ before >= 0.0 else -1.0)
+    turn_rad = math.acos(min(1.0, float(up @ before)))
+    if turn_rad > LARGEST_TURN_RAD:
+        raise InvalidData(
+            f'the touched plane is turned by {math.degrees(turn_rad):.0f} degrees against the pose of the surface '
+            f'before, and {math.degrees(LARGEST_TURN_RAD):.0f} are allowed; see that every touch is on the surface, '
+            'or give its pose as parameters first'
+        )
+    x_axis = np.array(along, dtype=float)
+    x_axis = x_axis - (x_axis @ up) * up
+    length = float(np.linalg.norm(x_axis))
+    axes = np.column_stack([x_axis / length, np.cross(up, x_axis / length), up])
+    pose = (*middle.tolist(), *rotation_vector(axes).tolist())
+    return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m)
+
+
+class SurfaceTouches:
+    """Collects touches until they make a plane that one more confirms; further ones refine it."""
+
+    def __init__(self) -> None:
+        self._places: list[Array] = []
+        self._normal: Sequence[float] = ()  # of the pose before the first touch, so that the plane cannot creep
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def forget(self) -> int:
+        """Begin again; return how many touches there were."""
+        count, self._places = len(self._places), []
+        return count
+
+    def add(self, place: Sequence[float], normal: Sequence[float], along: Sequence[float]) -> SurfaceFit | None:
+        """Take a touch; return the plane, None if there are too few.
+
+        Parameters
+        ----------
+        place, normal, along : (3,)
+            See `fit_surface`; the normal at the first touch counts for all.
+
+        Returns
+        -------
+        SurfaceFit or None
+
+        Raises
+        ------
+        InvalidData
+            If it is next to another, or they make no plane; the newest touch is not kept.
+        """
+        newest = np.array(place, dtype=float)
+        for number, other in enumerate(self._places, start=1):
+            apart_m = float(np.linalg.norm(newest - other))
+            if apart_m < NARROWEST_M:
+                raise InvalidData(
+                    f'it is {1e3 * apart_m:.1f} mm from touch {number}, and {1e3 * NARROWEST_M:g} mm are needed; touch '
+                    'another place'
+                )
+        places = [*self._places, newest]
+        self._normal = self._normal if self._places else normal
+        fit = fit_surface(places, self._normal, along) if len(places) >= MAKE_A_PLANE else None
+        self._places = places
+        return fit if len(places) >= TOUCHES else None
+
 
 PERIOD_S = 0.01
 CLOSING_S = 10.0  # longer than any motion needs to lift

@@ -7,7 +7,7 @@ controller sets the normal velocity
 
 and it comes into effect after the loop delay. The feed-forward dh/dt is not the arm's own movement: z + F/k is h
 whatever the controller does, so its slope is a disturbance that is observed, and adds no loop as far as k is right.
-k is estimated while the finger comes into contact, and g follows from it: see `texture_exploration.stability`. The
+k is estimated while the finger comes into contact, and g follows from it: see `texture_exploration.force_control`. The
 delay is measured while it comes down; if it is longer than declared, gain and speed are reduced accordingly.
 """
 
@@ -15,14 +15,436 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Protocol
 
+import numpy as np
+
+from texture_core.config import param
 from texture_core.errors import InvalidParameter
-from texture_core.parameters import param
-from texture_exploration.lag import ForceLag, LagEstimate
-from texture_exploration.slope_observer import SlopeObserver
-from texture_exploration.stability import LoopModel, stability_limit_gain
-from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
+from texture_core.types import Array
+
+# --------------------
+# How late an arm follows a normal velocity, measured above the surface, and how late its force, at the first touch.
+
+LONGEST_S = 0.15  # a longer lag is not told apart from an arm that does not move
+SAMPLES = 10  # of which the mean counts
+CHANGED = 0.02  # share by which a velocity differs from the one before
+LAG_SLOWEST_M_S = 1e-5
+BLOCK = 5  # samples of which the mean is compared with that of the ones before
+STOPPED = 0.03  # share of the first speed below which a finger stands
+RISING = 4.0  # times its noise that a mean must rise to count
+
+
+class LagEstimate:
+    """Estimate the lag from how far the finger is behind the way that was asked for.
+
+    From rest the arm is asked for a constant velocity v. After t it has been asked for W = v·t and, following a lag d
+    late, has gone v·(t − d): so d = (W − gone) / v, whatever the shape of the start, once it has lasted longer than d.
+
+    Attributes
+    ----------
+    value_s : float
+        The lag; NaN until it is measured. It stays until the next start from rest has lasted long enough.
+    """
+
+    def __init__(self) -> None:
+        self.value_s = math.nan
+        self._asked_m_s = 0.0
+        self._rest_m = math.nan  # height at rest; NaN if the present velocity did not begin at rest
+        self._way_m = 0.0
+        self._constant_s = math.inf  # nobody has asked for anything yet
+        self._lags_s: list[float] = []
+
+    def update(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
+        """Take what was measured now, and what is asked for from now on.
+
+        Parameters
+        ----------
+        height_m
+            Of the finger, as measured.
+        asked_m_s
+            Normal velocity.
+        dt_s
+            Time since the last call, in which the velocity of that call was asked for.
+        """
+        self._way_m += self._asked_m_s * dt_s
+        self._constant_s += dt_s
+        if self._asked_m_s == 0.0:
+            self._at_rest(height_m)
+        elif self._constant_s > LONGEST_S and not math.isnan(self._rest_m):
+            self._add((self._way_m - (height_m - self._rest_m)) / self._asked_m_s)
+        if abs(asked_m_s - self._asked_m_s) > CHANGED * abs(self._asked_m_s):
+            self._change(asked_m_s)
+
+    def _at_rest(self, height_m: float) -> None:
+        # Before, it may still be moving.
+        self._rest_m = height_m if self._constant_s > LONGEST_S else math.nan
+        self._way_m = 0.0
+
+    def _add(self, lag_s: float) -> None:
+        # Later samples would add the error of the speed itself.
+        if len(self._lags_s) < SAMPLES:
+            self._lags_s.append(min(LONGEST_S, max(0.0, lag_s)))
+            if len(self._lags_s) == SAMPLES:
+                self.value_s = sum(self._lags_s) / SAMPLES
+
+    def _change(self, asked_m_s: float) -> None:
+        if self._asked_m_s != 0.0:
+            self._rest_m = math.nan
+        self._asked_m_s = asked_m_s if abs(asked_m_s) >= LAG_SLOWEST_M_S else 0.0
+        self._constant_s = 0.0
+        self._lags_s = []
+
+
+class ForceLag:
+    """Measure how late the force follows the finger: it is told to stop, and the force goes on rising for the lag.
+
+    Attributes
+    ----------
+    value_s : float
+        How long the force rose after the finger stood, s; NaN until that is known.
+    """
+
+    def __init__(self, noise_n: float) -> None:
+        self.value_s = math.nan
+        self._noise_n = noise_n
+        self._samples: deque[tuple[float, float]] = deque(maxlen=2 * BLOCK)  # height and force
+        self._first_m = math.nan  # way of a block as it began to stop
+        self._stood_s = self._rose_s = math.nan
+        self._time_s = 0.0
+
+    def update(self, height_m: float, force_n: float, dt_s: float) -> bool:
+        """Take a sample; return whether it is over: the force is constant, or it never stopped to rise.
+
+        Parameters
+        ----------
+        height_m, force_n
+            As measured, while zero velocity is asked for.
+        dt_s
+            Time since the last call.
+        """
+        self._time_s += dt_s
+        self._samples.append((height_m, force_n))
+        if self._time_s > 4 * LONGEST_S:
+            return True  # it does not stand still: nothing can be told
+        if len(self._samples) >= BLOCK and len({force_n for _, force_n in list(self._samples)[-BLOCK:]}) == 1:
+            return True  # without any noise: constant or frozen, which a movement shows
+        if len(self._samples) < 2 * BLOCK:
+            return False
+        went_m, rose_n = (
+            (sum(row[of] for row in list(self._samples)[BLOCK:]) - sum(row[of] for row in list(self._samples)[:BLOCK]))
+            / BLOCK
+            for of in (0, 1)
+        )
+        if math.isnan(self._first_m):
+            self._first_m = max(abs(went_m), LAG_SLOWEST_M_S * dt_s)
+        if rose_n > RISING * self._noise_n * math.sqrt(2.0 / BLOCK):
+            self._rose_s = self._time_s
+        if math.isnan(self._stood_s):
+            if abs(went_m) > STOPPED * self._first_m:
+                return False
+            self._stood_s = self._rose_s = self._time_s
+        lag_s = self._rose_s - self._stood_s
+        if lag_s > LONGEST_S or self._time_s - self._rose_s > 2 * BLOCK * dt_s:
+            self.value_s = lag_s
+            return True
+        return False
+
+
+# --------------------
+# How fast the surface rises under a finger that presses on it and moves along.
+
+MIN_POINTS = 3
+OBSERVED = 8  # heights that tell the slope: fewer follow a bump better, but shake with a finger that sticks and slips
+SHORTEST_M = 1e-6  # way over which a slope is told
+LIKELY_SLOPE = 0.2
+LIKELY_BEND_1_M = 0.5  # half of the second derivative; higher bends are followed the better k is known
+
+
+class SlopeObserver:
+    """How fast the surface will rise under the finger, freed from what the controller does itself.
+
+    A parabola through the last heights over the way tells the slope where the finger will be when the answer comes
+    into effect; times the speed that is commanded now, it is the rise then.
+
+    Parameters
+    ----------
+    ahead_s
+        From a height to the middle of the time in which the answer to it is in effect.
+    """
+
+    def __init__(self, ahead_s: float) -> None:
+        self._ahead_s = ahead_s
+        self._points: deque[tuple[float, float]] = deque(maxlen=OBSERVED)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has seen a height."""
+        return bool(self._points)
+
+    def restart(self) -> None:
+        """The finger left the surface."""
+        self._points.clear()
+
+    def update(
+        self, travelled_m: float, surface_m: float, speed_m_s: float, noise_m: float, doubt: float = 0.0
+    ) -> float:
+        """Return how fast the surface will rise, m/s.
+
+        Parameters
+        ----------
+        travelled_m
+            That the finger has gone along the surface.
+        surface_m
+            Height of the untouched surface, z + F/k.
+        speed_m_s
+            Along the surface, as commanded.
+        noise_m
+            Of the height.
+        doubt
+            Noise as a share of the error that may come of it until the answer is in effect: beyond, less is answered.
+
+        Returns
+        -------
+        float
+            Positive if the surface rises ahead, m/s.
+        """
+        self._points.append((travelled_m, surface_m))
+        if len(self._points) < MIN_POINTS:
+            return 0.0
+        travelled, height = np.array(self._points).T
+        unit = max(float(travelled[-1] - travelled[0]), SHORTEST_M)
+        travelled = (travelled - travelled_m) / unit
+        shapes = np.stack([travelled, travelled**2], axis=1)
+        shapes = shapes - shapes.mean(axis=0)
+        # Likely slopes and bends, as if they had been seen once beside the heights.
+        likely = np.diag([noise_m / (LIKELY_SLOPE * unit), noise_m / (LIKELY_BEND_1_M * unit**2)]) ** 2
+        slope, curvature = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
+        ahead = min(1.0, speed_m_s * self._ahead_s / unit)
+        # As it sets off, a late arm has gone much less than it goes until the answer: the noise counts so many times.
+        sure = 1.0 / (1.0 + (doubt * max(1.0, speed_m_s * self._ahead_s / unit)) ** 2)
+        return float(sure * (slope + 2 * curvature * ahead) / unit * speed_m_s)
+
+
+# --------------------
+# Stability limit of the force control: predicted from the sampled loop, and found by simulation.
+#
+# The contact integrates the velocity to a force, F' = −k·u; u is held for a period T and comes into effect after a
+# delay
+# of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on the force error e is exactly
+#
+#     e[n+1] = e[n] + k·T·((1 − γ)·u[n−m] + γ·u[n−m−1]),    s[n+1] = s[n] + T·e[n+1],    u[n] = −g·(e[n] + s[n] / Ti),
+#
+# a linear map; it is stable if all its eigenvalues lie within the unit circle. Only the products g·k·T, delay / T and
+# Ti / T matter. Without the integral part and without sampling the stability limit is g·k·delay = π/2.
+#
+# Source: Åström & Wittenmark, Computer-Controlled Systems, 1997, section 2.3 (sampling a system with delay).
+
+BISECTIONS = 40
+CYCLES = 60  # a simulated loop is judged after so many delays
+SMALL = 0.1
+FINE = 20  # simulation steps per period
+
+
+@dataclass(frozen=True)
+class LoopModel:
+    """Force control on a contact: stiffness k, gain g, delay, period T and time constant Ti of the integral part."""
+
+    stiffness_n_m: float
+    gain_m_s_n: float
+    delay_s: float
+    period_s: float
+    integral_s: float = math.inf
+
+
+class NormalVelocityController(Protocol):
+    """What is simulated; see `texture_exploration.force_control.ForceController`."""
+
+    def update(self, error_n: float, dt_s: float) -> float:
+        """Return the normal velocity, positive away from the surface."""
+
+
+def loop_matrix(loop: LoopModel) -> Array:
+    """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities.
+
+    Returns
+    -------
+    (m + 3, m + 3) or (m + 2, m + 2)
+    """
+    share, whole = math.modf(round(loop.delay_s / loop.period_s, 9))
+    waiting = int(whole) + 1
+    matrix = np.zeros((2 + waiting, 2 + waiting))
+    answer = np.zeros(2 + waiting)
+    answer[0], answer[1] = -loop.gain_m_s_n, -loop.gain_m_s_n / loop.integral_s
+    step = loop.stiffness_n_m * loop.period_s
+    error = np.zeros(2 + waiting)
+    error[0] = 1.0
+    error[1 + waiting] += step * share  # the oldest velocity
+    newer = answer if waiting == 1 else np.eye(2 + waiting)[waiting]
+    error += step * (1 - share) * newer
+    matrix[0] = error
+    matrix[1] = loop.period_s * error
+    matrix[1, 1] += 1.0
+    matrix[2] = answer
+    for place in range(3, 2 + waiting):
+        matrix[place, place - 1] = 1.0
+    return matrix if math.isfinite(loop.integral_s) else np.delete(np.delete(matrix, 1, axis=0), 1, axis=1)
+
+
+def spectral_radius(loop: LoopModel) -> float:
+    """Return by how much a disturbance grows each period, the spectral radius; below 1 it dies out."""
+    return float(np.abs(np.linalg.eigvals(loop_matrix(loop))).max())
+
+
+@lru_cache(maxsize=4096)
+def stability_limit_gain(loop: LoopModel) -> float:
+    """Return the gain from which the loop is unstable, m/s/N, by its eigenvalues; its own gain does not count."""
+    return _bisect(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
+
+
+def simulated_stability_limit_gain(
+    loop: LoopModel, controller: Callable[[LoopModel], NormalVelocityController]
+) -> float:
+    """Return the gain from which the running controller makes a disturbance grow, m/s/N."""
+    return _bisect(loop, lambda gain: disturbance_decays(replace(loop, gain_m_s_n=gain), controller), bisections=12)
+
+
+def disturbance_decays(loop: LoopModel, controller: Callable[[LoopModel], NormalVelocityController]) -> bool:
+    """Run a controller on a spring, finely integrated, after a jolt of 1 N; return whether the swinging shrinks."""
+    running = controller(loop)
+    fine_s = loop.period_s / FINE
+    late = round(loop.delay_s / fine_s)
+    periods = math.ceil(CYCLES * (loop.delay_s + loop.period_s) / loop.period_s)
+    error, peaks = 1.0, np.empty(periods)
+    velocities = np.zeros(late + FINE * periods)
+    for period in range(periods):
+        now = FINE * period
+        velocities[late + now : late + now + FINE] = running.update(error, loop.period_s)
+        error += loop.stiffness_n_m * fine_s * float(velocities[now : now + FINE].sum())
+        peaks[period] = abs(error)
+        if peaks[period] > 1e6:
+            return False
+    third = periods // 3
+    # The integral part may leave a small slow rest that still rises; a swinging that grows began with 1.
+    return bool(peaks[-third:].max() < max(SMALL, peaks[third : 2 * third].max()))
+
+
+def stability_chart(
+    stiffness_n_m: Sequence[float],
+    delay_s: Sequence[float],
+    controller: Callable[[LoopModel], NormalVelocityController],
+    period_s: float = 0.004,
+    integral_s: float = 0.5,
+) -> dict[str, Array]:
+    """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated.
+
+    Parameters
+    ----------
+    stiffness_n_m
+        Stiffnesses of the contact, N/m, s of them.
+    delay_s
+        Delays of the loop, d of them.
+    controller
+        Makes the controller of a loop.
+    period_s
+        Time between two commands.
+    integral_s
+        Integral time of the controller.
+
+    Returns
+    -------
+    dict
+        'stiffness_n_m' (s,), 'delay_s' (d,), and 'predicted' and 'simulated' (s, d) in m/s/N.
+    """
+    loops = [[LoopModel(k, 0.0, delay, period_s, integral_s) for delay in delay_s] for k in stiffness_n_m]
+    return {
+        'stiffness_n_m': np.array(stiffness_n_m, dtype=float),
+        'delay_s': np.array(delay_s, dtype=float),
+        'predicted': np.array([[stability_limit_gain(loop) for loop in row] for row in loops]),
+        'simulated': np.array([[simulated_stability_limit_gain(loop, controller) for loop in row] for row in loops]),
+    }
+
+
+def _bisect(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
+    """Return the lowest gain that is not stable, around that of the pure delay, π / 2 / (k · delay)."""
+    high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator bears 2 / (k·T)
+    # Far below, the integral part makes a slow swing, which a short run could take for an unstable one.
+    low = 0.1 / (loop.stiffness_n_m * (loop.delay_s + loop.period_s))
+    for _ in range(bisections):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+# --------------------
+# Stiffness of a contact, estimated while the force rises.
+
+SOFTEST_N_M = 50.0
+MOST_POINTS = 25  # more make a short rise no surer: what is left is no noise
+RECENT_SHARE = 0.5  # of the force, from which on points count
+MIN_RISE_N = 0.1  # of the force at the default of `TOUCHING_N`, before a stiffness can be told from noise
+TOUCHING_N = 0.03
+
+
+class StiffnessEstimate:
+    """Estimate how stiff a contact is, by the slope of force over height while the force rises: least squares.
+
+    Parameters
+    ----------
+    touching_n
+        A smaller force is none; it must exceed the noise of the force sensor.
+    """
+
+    def __init__(self, touching_n: float = TOUCHING_N) -> None:
+        self._touching_n = touching_n
+        self._min_rise_n = MIN_RISE_N * touching_n / TOUCHING_N
+        self.value_n_m = math.nan
+        self.restart()
+
+    @property
+    def empty(self) -> bool:
+        """Whether this contact has just begun."""
+        return not self._points
+
+    def restart(self) -> None:
+        """The contact ended: forget the points, not the value."""
+        self.fixed = False  # for the rest of this contact
+        self._points: list[tuple[float, float]] = []
+
+    def update(self, height_m: float, force_n: float) -> None:
+        """Take a point; those before the contact are passed over."""
+        if self.fixed or force_n < self._touching_n or not self._presses_on(height_m, force_n):
+            return
+        self._points.append((height_m, force_n))
+        # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
+        highest_n = max(force_n for _, force_n in self._points)
+        recent_n = min(RECENT_SHARE * highest_n, highest_n - 1.5 * self._min_rise_n)
+        self._points = [point for point in self._points if point[1] >= recent_n]
+        # The slope of many points is as sure over a shorter rise: its error falls with their root.
+        rise_n = (highest_n - self._points[0][1]) * math.sqrt(min(MOST_POINTS, len(self._points)) / MIN_POINTS)
+        if len(self._points) >= MIN_POINTS and rise_n > self._min_rise_n:
+            self.value_n_m = max(SOFTEST_N_M, self._slope())
+
+    def _presses_on(self, height_m: float, force_n: float) -> bool:
+        """Return whether the finger is deeper or presses harder than before; by the force alone noise would choose."""
+        if not self._points:
+            return True
+        before_m, before_n = self._points[-1]
+        # A force that stays the same to the last bit may be frozen: no contact is that soft.
+        return force_n > before_n or (height_m < before_m and force_n != before_n)
+
+    def _slope(self) -> float:
+        count = len(self._points)
+        z_mean = sum(z for z, _ in self._points) / count
+        f_mean = sum(f for _, f in self._points) / count
+        spread = sum((z - z_mean) ** 2 for z, _ in self._points)
+        shared = sum((z - z_mean) * (f - f_mean) for z, f in self._points)
+        return -shared / spread if spread > 0 else math.nan
+
 
 NOISE_SHARE = 1.0 / 6.0  # of the force that counts as touching: the least noise of the force that is supposed
 LEAST_NOISE = 0.1  # of that; a reading may also stand still

@@ -16,12 +16,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from texture_core.catalogue import find, unknown_name
+from texture_core.config import find, find_file, load_yaml, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter
-from texture_core.exploration import ExplorationRequest
-from texture_core.plain_data import load_yaml, safe_repr
-from texture_core.resources import find_file
-from texture_exploration.motions.catalogue import MOTIONS
+from texture_core.types import ExplorationRequest
+from texture_exploration.motions import MOTIONS
 
 KEYS = ('paper', 'motion', 'repeats', 'vary')
 NUMBERS = tuple(name for name, kind in typing.get_type_hints(ExplorationRequest).items() if kind is float)

@@ -6,12 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.window import Window
-from texture_features.augmentation.augmentation import Augmentation
-from texture_features.augmentation.augmented_features import NOISE, Augmenter
-from texture_features.augmentation.disturbances import (
+from texture_core.types import Window
+from texture_features.augmentation import (
     DISTURBANCES,
     KINDS,
+    NOISE,
+    Augmentation,
+    Augmenter,
     SlideWindows,
     add_drift,
     amplify,
@@ -22,7 +23,7 @@ from texture_features.augmentation.disturbances import (
     smooth_response,
 )
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import CutWindow, SlideEnd
+from texture_features.windows import CutWindow, SlideEnd
 
 RATE_HZ, TONE_HZ = 2000.0, 100.0
 FEATURES = FeatureSet.from_mapping(

@@ -4,11 +4,18 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.axes import MOST_WAITING, AxisJoiner, axis_along, split_axis
-from texture_features.windowing.windows import CutWindow, SlideEnd, WindowParams, cut_recording
+from texture_features.windows import (
+    MOST_WAITING,
+    AxisJoiner,
+    CutWindow,
+    SlideEnd,
+    WindowParams,
+    axis_along,
+    cut_recording,
+    split_axis,
+)
 
 RATE_HZ = 100.0
 PARAMS = WindowParams(length_s=1.0, hop_s=0.5)

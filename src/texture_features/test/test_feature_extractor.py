@@ -3,14 +3,12 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from texture_msgs import msg
 
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.ros import FEATURE_QOS, SENSOR_QOS, STATE_QOS, from_msg, to_msg
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_features.feature_set import FeatureSet
 from texture_features.nodes.feature_extractor import FeatureExtractor
-from texture_features.windowing.windows import cut_recording
+from texture_features.windows import cut_recording
 
 pytestmark = pytest.mark.ros
 RATE_HZ = 1000.0

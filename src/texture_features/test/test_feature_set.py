@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, TextureError, UnknownName
-from texture_core.window import Window
+from texture_core.types import Window
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import CutWindow, SlideEnd
+from texture_features.windows import CutWindow, SlideEnd
 
 RECIPE = {
     'windows': {'length_s': 0.5, 'hop_s': 0.25},

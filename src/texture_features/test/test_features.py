@@ -3,11 +3,11 @@ import pytest
 from scipy import signal as scipy_signal
 
 from texture_core.errors import InvalidData
-from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
-from texture_features.features.hjorth import hjorth
-from texture_features.features.log_bands import LogBands
-from texture_features.spectra.spectrum import hann, mean_over_segments, segment_densities
+from texture_features.feature_set import FEATURES
+from texture_features.features.spectral import LogBands
+from texture_features.features.temporal import hjorth
+from texture_features.spectra import hann, mean_over_segments, segment_densities
 
 RATE_HZ = 1000.0
 EVERY = pytest.mark.parametrize('name', FEATURES)

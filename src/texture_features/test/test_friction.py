@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import TactileSignal
+from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import WindowParams, cut_recording
+from texture_features.windows import WindowParams, cut_recording
 
 RATE_HZ, STEP_NS = 100.0, 20_000_000
 RECIPE = {'windows': {'length_s': 0.5, 'hop_s': 0.5}, 'inputs': {'signal': {'features': ['friction', 'mean']}}}

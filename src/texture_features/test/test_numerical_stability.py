@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
+from texture_features.feature_set import FEATURES
 
 RATE_HZ = 1000.0
 NOISE = np.random.default_rng(0).normal(size=(500, 2))

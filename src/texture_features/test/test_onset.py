@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from texture_features.segmentation.onset import OnsetModel
+from texture_features.segmentation import OnsetModel
 
 RATE_HZ, RAMP_S, SETS_OFF_S, LENGTH_S = 1000.0, 0.2, 0.3, 1.2
 RANGE_S = (0.1, 0.55)

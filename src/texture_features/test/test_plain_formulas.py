@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import signal as scipy_signal
 
-from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
-from texture_features.spectra.spectrum import hann
+from texture_features.feature_set import FEATURES
+from texture_features.spectra import hann
 
 RATE_HZ = 1000.0
 

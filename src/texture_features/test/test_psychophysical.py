@@ -4,12 +4,9 @@ from scipy.signal import lfilter
 
 from texture_core.errors import InvalidParameter
 from texture_features.feature import WindowBatch
-from texture_features.features.pacinian_power import PacinianPower
-from texture_features.features.peak_to_median_power import PeakToMedianPower
-from texture_features.features.spatial_band_power import SpatialBandPower
-from texture_features.features.spatial_variation import SpatialVariation
-from texture_features.features.spectral_exponent import SpectralExponent
-from texture_features.features.temporal_variation import TemporalVariation
+from texture_features.features.spectral import PacinianPower, PeakToMedianPower, SpectralExponent
+from texture_features.features.taxels import SpatialBandPower, SpatialVariation
+from texture_features.features.temporal import TemporalVariation
 
 RATE_HZ = 1000.0
 SPEEDS = (0.10, 0.15, 0.20)

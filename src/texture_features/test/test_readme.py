@@ -1,7 +1,7 @@
 import re
 from pathlib import Path
 
-from texture_features.catalogue import FEATURES
+from texture_features.feature_set import FEATURES
 
 README = (Path(__file__).parent.parent / 'README.md').read_text()
 

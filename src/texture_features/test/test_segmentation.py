@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.exploration import Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.segmentation.cell_power import cell_power
-from texture_features.segmentation.contact_intervals import find_contacts
-from texture_features.segmentation.segments import SegmentationParams, find_sliding
-from texture_features.segmentation.slide_segmenter import SlideSegmenter, segment_recording
+from texture_core.types import NANOSECONDS, Phase, TactileSignal
+from texture_features.segmentation import (
+    SegmentationParams,
+    SlideSegmenter,
+    cell_power,
+    find_contacts,
+    find_sliding,
+    segment_recording,
+)
 
 RATE_HZ, SLOW_HZ = 1000.0, 60.0
 START_NS = 10**15

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.features import FeatureVector
-from texture_features.slide_conditions import RunningConditions, SlideConditions
+from texture_core.types import FeatureVector
+from texture_features.examples import RunningConditions, SlideConditions
 
 
 def window(**known: object) -> FeatureVector:

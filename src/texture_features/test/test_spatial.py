@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_features.array_speed import ArraySpeedEstimator
-from texture_features.catalogue import FEATURES
-from texture_features.feature import WindowBatch
-from texture_features.feature_set import FeatureSet
+from texture_features.feature import ArraySpeedEstimator, WindowBatch
+from texture_features.feature_set import FEATURES, FeatureSet
 
 RATE_HZ = 400.0
 PITCH_M = 4e-3

@@ -6,11 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.windowing.sample_buffer import BufferedStream
-from texture_features.windowing.slide_coverage import SlideCoverage
-from texture_features.windowing.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
+from texture_features.windows import (
+    BufferedStream,
+    CutWindow,
+    SlideCoverage,
+    SlideEnd,
+    WindowCutter,
+    WindowParams,
+    cut_recording,
+)
 
 PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
 START_NS = 7 * NANOSECONDS

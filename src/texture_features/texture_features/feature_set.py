@@ -9,28 +9,171 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, groupby
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from texture_core.arrays import Array
-from texture_core.errors import InvalidParameter
-from texture_core.features import FeatureVector
-from texture_core.parameters import from_mapping, param
-from texture_core.plain_data import safe_repr
-from texture_core.signal import TARED
-from texture_core.window import Window
-from texture_features.catalogue import FEATURES
+from texture_core.config import find, find_file, from_mapping, load_card, load_yaml, param, safe_repr
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.types import TARED, Array, FeatureVector, Window
 from texture_features.feature import Feature, WindowBatch
-from texture_features.features.force import Force
-from texture_features.features.friction import Friction
-from texture_features.features.slide_onset import SlideOnset
-from texture_features.features.speed import Speed
-from texture_features.recipe_entry import choose
-from texture_features.recipe_file import read_recipe
-from texture_features.windowing.axes import check_axes, split_axis
-from texture_features.windowing.time_stretch import Stretched
-from texture_features.windowing.windows import CutWindow, SlideEnd, WindowEvent, WindowParams
+from texture_features.features.spectral import (
+    LogBands,
+    LowFftBins,
+    MeanLogBands,
+    PacinianPower,
+    PeakToMedianPower,
+    PowerAutocorrelation,
+    ShortTimeFourier,
+    SpectralExponent,
+)
+from texture_features.features.taxels import (
+    CentredLogRatio,
+    ChannelMeanStatistics,
+    LogShares,
+    MeanSpatialBands,
+    RelativeChanges,
+    SpatialBandPower,
+    SpatialBands,
+    SpatialVariation,
+)
+from texture_features.features.temporal import (
+    ChannelMean,
+    Force,
+    Friction,
+    Hjorth,
+    LogDifferenceVariance,
+    LogVariance,
+    Moments,
+    SlideOnset,
+    Speed,
+    TemporalVariation,
+)
+from texture_features.windows import CutWindow, SlideEnd, Stretched, WindowEvent, WindowParams, check_axes, split_axis
+
+# --------------------
+# The features that a recipe can name.
+
+FEATURES: Mapping[str, type[Feature]] = {
+    'log_bands': LogBands,  # Welch 1967
+    'mean_log_bands': MeanLogBands,
+    'low_fft_bins': LowFftBins,
+    'hjorth': Hjorth,  # Hjorth 1970; Kaboli et al. 2015
+    'short_time_fourier': ShortTimeFourier,
+    'moments': Moments,
+    'power_autocorrelation': PowerAutocorrelation,
+    'mean': ChannelMean,
+    'log_variance': LogVariance,
+    'log_difference_variance': LogDifferenceVariance,
+    'pacinian_power': PacinianPower,  # Bensmaia & Hollins 2005
+    'spectral_exponent': SpectralExponent,  # Toscani & Metzger 2022
+    'temporal_variation': TemporalVariation,  # Lieber & Bensmaia 2019
+    'spatial_variation': SpatialVariation,  # Lieber & Bensmaia 2019
+    'spatial_band_power': SpatialBandPower,
+    'peak_to_median_power': PeakToMedianPower,
+    'spatial_bands': SpatialBands,
+    'mean_spatial_bands': MeanSpatialBands,
+    'mean_statistics': ChannelMeanStatistics,
+    'centred_log_ratio': CentredLogRatio,
+    'log_shares': LogShares,  # Aitchison 1986, with signs
+    'relative_changes': RelativeChanges,
+    'speed': Speed,
+    'force': Force,
+    'friction': Friction,  # Roberge et al., future work
+    'slide_onset': SlideOnset,
+}
+
+
+# --------------------
+# Build what a recipe chooses: 'name', or {name: {parameter: value}}, from a catalogue of parameter dataclasses.
+
+T = TypeVar('T')
+
+
+def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) -> tuple[str, T]:
+    """Return name and object of one entry of a recipe; `kind` is the noun for the error sentence.
+
+    Parameters
+    ----------
+    catalogue
+        What can be chosen, by name.
+    entry
+        'name', or {name: {parameter: value}}.
+    kind
+        Noun for the sentence of an error, such as 'feature'.
+    where
+        Where the entry stands, for the same sentence.
+
+    Returns
+    -------
+    str, object
+        Name of the entry and the object that was built.
+
+    Raises
+    ------
+    InvalidParameter, UnknownName
+        If the entry is not of that form, or the name or a parameter is unknown or out of range.
+    """
+    entry = {entry: {}} if isinstance(entry, str) else entry
+    if not isinstance(entry, Mapping) or len(entry) != 1:
+        raise InvalidParameter(
+            f"{where}: came {safe_repr(entry)}; a {kind} is written 'name' or 'name: {{parameter: value}}'"
+        )
+    [(name, values)] = entry.items()
+    try:
+        cls = find(catalogue, str(name), kind)
+    except UnknownName as error:
+        raise UnknownName(f'{where}: {error}') from error
+    place = f"{where}, {kind} '{name}'"
+    build = getattr(cls, 'from_recipe', None)  # of an entry whose parameters are not known beforehand
+    return str(name), build(values or {}, place) if build else from_mapping(cls, values or {}, place)
+
+
+def entry_of(chosen: Any) -> dict[str, Any]:
+    """Return the parameters of what was chosen, as a recipe writes them."""
+    write = getattr(chosen, 'as_recipe', None)
+    entry: dict[str, Any] = write() if write else dataclasses.asdict(chosen)
+    return entry
+
+
+# --------------------
+# Read the mapping in a recipe, or in the card of a model that was trained with one.
+
+
+def read_recipe(
+    name_or_path: str, subfolder: str = 'config/recipes', kind: str = 'recipe'
+) -> tuple[str, Mapping[str, Any]]:
+    """Return name and content of a recipe (YAML) that texture_estimation ships, or of any file.
+
+    A model's card (JSON) holds its recipe under `recipe`; a model (.skops) has the card beside it.
+
+    Parameters
+    ----------
+    name_or_path
+        Name of a shipped recipe, or path of a recipe (.yaml), a card (.json) or a model (.skops).
+    subfolder
+        Where texture_estimation keeps the shipped ones.
+    kind
+        Noun for the sentence of an error.
+
+    Returns
+    -------
+    str, mapping
+        Name of the file without its ending, and its content.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        If there is no such file or it holds no recipe; `kind` is the noun for the sentence.
+    """
+    path = find_file(name_or_path, 'texture_estimation', subfolder, kind)
+    if path.suffix == '.skops':
+        path = path.with_suffix('.json')
+    content = load_card(path) if path.suffix == '.json' else load_yaml(path, kind)
+    if not isinstance(content, Mapping):
+        raise InvalidParameter(f"{kind} '{path}' holds {safe_repr(content)}; a mapping with the key 'inputs' is needed")
+    return path.stem, content
+
 
 # Windows described in one go: enough for speed, few enough for the memory cache.
 CHUNK = 64

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
-from texture_features.labelled_features import LabelledFeatures
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 FINGERPRINT = 'abcd1234 signal=1000Hz*1'
 

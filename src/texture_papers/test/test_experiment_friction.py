@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_papers.catalogue import Experiment, run_experiment
-from texture_papers.protocol import RecognitionTask, gather, reduced
+from texture_papers.catalogue import run_experiment
+from texture_papers.protocol import Experiment, RecognitionTask, gather, reduced
 from texture_papers.roberge_experiment import FRICTION_SCENE, FRICTION_TASK, FRICTION_VISITS, measured_friction
 from texture_simulation.scene import load_scene
 

@@ -8,10 +8,11 @@ import pytest
 
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search.fitness import UNDECIDED
+from texture_estimation.search import UNDECIDED
 from texture_papers import report
-from texture_papers.catalogue import EXPERIMENTS, PROTOCOLS, Experiment, run_experiment
+from texture_papers.catalogue import EXPERIMENTS, PROTOCOLS, run_experiment
 from texture_papers.protocol import (
+    Experiment,
     MethodResult,
     PaperProtocol,
     apart,

@@ -11,11 +11,11 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_estimation.classification.training import train
 from texture_estimation.learners.catalogue import LEARNERS
-from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import load_model
+from texture_estimation.numerics import is_tied
 from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
 from texture_papers.hu import SvmMaxWins, principal_components
 from texture_papers.jamali import NaiveBayes, bins_of
 from texture_papers.kaboli import (

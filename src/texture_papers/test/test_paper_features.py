@@ -7,11 +7,10 @@ from scipy import signal as scipy_signal
 from scipy import stats
 
 from texture_core.errors import InvalidData
-from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
-from texture_features.feature_set import FeatureSet
-from texture_features.features.short_time_fourier import ShortTimeFourier
-from texture_features.spectra.spectrum import hann, long_densities
+from texture_features.feature_set import FEATURES, FeatureSet
+from texture_features.features.spectral import ShortTimeFourier
+from texture_features.spectra import hann, long_densities
 from texture_papers.hu import Spectrum
 from texture_papers.jamali import (
     DB4,

@@ -4,8 +4,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_papers.catalogue import Experiment, run_experiment
+from texture_estimation.roughness import load_roughness_recipe
+from texture_papers.catalogue import run_experiment
+from texture_papers.protocol import Experiment
 from texture_papers.rispal_experiment import Answers
 
 

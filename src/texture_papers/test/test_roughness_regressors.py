@@ -2,12 +2,15 @@ import numpy as np
 import pytest
 from sklearn.svm import SVC
 
+from texture_core.config import folder
 from texture_core.errors import InvalidData, TextureError
-from texture_core.resources import folder
-from texture_estimation.roughness.catalogue import REGRESSORS
-from texture_estimation.roughness.gaussian_process import GaussianProcess
-from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.roughness_recipe import RoughnessRecipe, load_roughness_recipe
+from texture_estimation.roughness import (
+    REGRESSORS,
+    GaussianProcess,
+    RoughnessRecipe,
+    load_roughness_recipe,
+    read_grades,
+)
 from texture_papers.rispal import Svm5, mean_of_votes
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/roughness').glob('*.yaml'))

@@ -7,26 +7,38 @@ import pytest
 from sklearn.metrics.pairwise import rbf_kernel
 
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
-from texture_core.window import Window
-from texture_estimation.classification.evidence_rules import MajorityVote
+from texture_core.types import Window
+from texture_estimation.evidence_rules import MajorityVote
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search.classification_task import ClassificationTask
-from texture_estimation.search.feature_cache import FeatureCache
-from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness
-from texture_estimation.search.generation import SearchParams
-from texture_estimation.search.genetic_search import search
-from texture_estimation.search.halves import random_halves
-from texture_estimation.search.optimise import optimise
-from texture_estimation.search.pairs import optimise_pairs
-from texture_estimation.search.parallel import dask_map, serial_map, threaded_map
-from texture_estimation.search.racing import HalfScores, is_clearly_worse, raced_fitness
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.score_cache import ScoreCache
-from texture_estimation.search.search_slides import SearchSlides
-from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
-from texture_estimation.search.surrogates.exact import exact
-from texture_estimation.search.variables import Integer, LogReal, SearchSpace
-from texture_features.windowing.windows import CutWindow
+from texture_estimation.search import (
+    UNDECIDED,
+    ArrayStream,
+    ClassificationTask,
+    FeatureCache,
+    HalfScores,
+    Integer,
+    LogReal,
+    RecipeSpace,
+    ScoreCache,
+    SearchParams,
+    SearchSlides,
+    SearchSpace,
+    SlideArrays,
+    dask_map,
+    decided_by_slide,
+    decisions,
+    exact,
+    fitness,
+    is_clearly_worse,
+    optimise,
+    optimise_pairs,
+    raced_fitness,
+    random_halves,
+    search,
+    serial_map,
+    threaded_map,
+)
+from texture_features.windows import CutWindow
 from texture_papers.roberge import AnnPairs, SvmPairs, ann_pairs_surrogate, kernel_of, svm_pairs_surrogate
 
 SMALL = SearchParams(population=6, generations=3, halves=4)

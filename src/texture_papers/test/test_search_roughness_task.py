@@ -1,17 +1,19 @@
 import numpy as np
 import pytest
 
-from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_estimation.search.generation import SearchParams
-from texture_estimation.search.halves import random_halves
-from texture_estimation.search.optimise import optimise
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.roughness_fitness import nearness
-from texture_estimation.search.roughness_task import RoughnessTask
-from texture_estimation.search.search_slides import SearchSlides
-from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
-from texture_estimation.search.surrogates.exact_regressor import exact_grades
+from texture_estimation.roughness import Grades, load_roughness_recipe
+from texture_estimation.search import (
+    ArrayStream,
+    RecipeSpace,
+    RoughnessTask,
+    SearchParams,
+    SearchSlides,
+    SlideArrays,
+    exact_grades,
+    nearness,
+    optimise,
+    random_halves,
+)
 from texture_papers.rispal import Ann1, Ann5, Svm5, ann1_surrogate, ann5_surrogate, svm5_surrogate
 
 GRADES = Grades({f'surface_{number}': float(number) for number in range(1, 6)})

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_core.window import Window
-from texture_features.catalogue import FEATURES
+from texture_core.types import Window
 from texture_features.feature import WindowBatch
-from texture_features.feature_set import FeatureSet
-from texture_features.windowing.time_stretch import Stretched, resample, stretched_lengths
-from texture_features.windowing.windows import CutWindow
+from texture_features.feature_set import FEATURES, FeatureSet
+from texture_features.windows import CutWindow, Stretched, resample, stretched_lengths
 from texture_papers.roberge import SpectralPeaks
 
 RATE_HZ = 1000.0

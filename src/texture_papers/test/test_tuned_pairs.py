@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, ModelMismatch, UnknownName
-from texture_estimation.classification.training import train
 from texture_estimation.learners.learner import of_examples
-from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import load_model
+from texture_estimation.numerics import is_tied
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.search.joined_pairs import joined_recipe
+from texture_estimation.search import joined_recipe
+from texture_estimation.training import train
 from texture_papers.roberge import AnnPairs, SvmPairs, TunedPairs
 
 LABELS = ('cork', 'felt', 'slate', 'wood')

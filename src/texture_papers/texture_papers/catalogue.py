@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from texture_core.catalogue import find
+from texture_core.config import find
 from texture_papers import hu_experiment, jamali_experiment, kaboli_experiment, rispal_experiment, roberge_experiment
 from texture_papers.protocol import Experiment, ExperimentResult, Run, over_seeds
 from texture_papers.report import run

@@ -8,16 +8,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from texture_core.arrays import Array
-from texture_core.catalogue import find
+from texture_core.config import find, param
 from texture_core.errors import InvalidParameter
-from texture_core.parameters import param
+from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted
-from texture_estimation.learners.pair_coupling import uncalibrated
-from texture_estimation.learners.svm_predictor import SvmPredictor, export
-from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.learners.svm import SvmPredictor, export, uncalibrated
+from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch
-from texture_features.spectra.spectrum import long_densities
+from texture_features.spectra import long_densities
 from texture_papers.roberge import PairVotes
 
 SCALES: Mapping[str, Callable[[Array, float], Array]] = {

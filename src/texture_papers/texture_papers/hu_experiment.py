@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
+from texture_core.types import Array
 from texture_papers.hu import principal_components
 from texture_papers.protocol import (
     FEW,
@@ -33,8 +33,8 @@ from texture_papers.protocol import (
     recipe_of,
 )
 from texture_papers.report import better_on, finding_as_json, higher
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
-from texture_simulation.simulated_slide import SimulatedSlide
 
 TASK = 'five linens'
 SLIDE_S = 3.0

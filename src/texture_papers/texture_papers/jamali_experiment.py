@@ -17,7 +17,7 @@ from texture_papers.protocol import (
     folds,
 )
 from texture_papers.report import higher, more_spread, most_errors, seldom
-from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.path import SimulatedSlide
 
 TASK = 'eight surfaces'
 SLIDE_S = 2.0

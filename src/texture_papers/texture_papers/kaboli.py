@@ -10,14 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
-from texture_core.catalogue import find
-from texture_core.parameters import param
-from texture_estimation.learners.learner import Codes, Fitted
-from texture_estimation.learners.standardisation import standardisation
-from texture_estimation.log_probabilities import log_softmax
+from texture_core.config import find, param
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes, Fitted, standardisation
+from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch, centred, power
-from texture_features.features.hjorth import Hjorth
+from texture_features.features.temporal import Hjorth
 from texture_papers.roberge import PairVotes
 
 

@@ -21,7 +21,7 @@ from texture_papers.protocol import (
     training_in,
 )
 from texture_papers.report import at_least, higher, kept_in, most_errors
-from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.path import SimulatedSlide
 
 SLIDE_S = 2.0
 SLIDING = SimulatedSlide(0.05, 1.0, SLIDE_S)

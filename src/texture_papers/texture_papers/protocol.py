@@ -23,31 +23,36 @@ from numpy.typing import NDArray
 from scipy.stats import t
 from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold, ShuffleSplit, StratifiedShuffleSplit
 
-from texture_core.arrays import AnyArray, Array, Samples
-from texture_core.catalogue import find
+from texture_core.config import find
 from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.types import AnyArray, Array, Samples
 from texture_estimation.learners.learner import Codes
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_estimation.search.classification_task import ClassificationTask
-from texture_estimation.search.feature_cache import FeatureCache
-from texture_estimation.search.fitness import UNDECIDED, decided_by_slide
-from texture_estimation.search.generation import SearchParams
-from texture_estimation.search.optimise import SearchResult, optimise
-from texture_estimation.search.parallel import threaded_map
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.search_slides import SearchSlides
-from texture_estimation.search.search_task import R, SearchTask
-from texture_estimation.search.shipped_spaces import space_for
-from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+from texture_estimation.roughness import load_roughness_recipe
+from texture_estimation.search import (
+    UNDECIDED,
+    ArrayStream,
+    ClassificationTask,
+    FeatureCache,
+    R,
+    RecipeSpace,
+    SearchParams,
+    SearchResult,
+    SearchSlides,
+    SearchTask,
+    SlideArrays,
+    decided_by_slide,
+    optimise,
+    space_for,
+    threaded_map,
+)
 from texture_features.feature_set import FeatureSet, InputFeatures
-from texture_features.windowing.axes import SEPARATOR, axis_along
-from texture_features.windowing.time_stretch import Stretched
+from texture_features.windows import SEPARATOR, Stretched, axis_along
 from texture_simulation.offline import simulate_slide_streams
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.surfaces.curvature import Curved
+from texture_simulation.sensor_models import SENSORS
+from texture_simulation.surfaces import Curved
 
 NORMAL_95 = 1.959964
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.arrays import AnyArray, Array
+from texture_core.types import AnyArray, Array
 from texture_evaluation.charts import COLOURS, chart
 from texture_papers.protocol import (
     NONE,

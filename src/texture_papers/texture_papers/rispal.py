@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
-from texture_core.parameters import param
-from texture_estimation.learners.learner import Codes
-from texture_estimation.learners.standardisation import standardisation
-from texture_estimation.roughness.regressor import GRADES, ROUGH, SMOOTH
-from texture_estimation.search.cost import of_machines, of_networks
-from texture_estimation.search.halves import Mask
-from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHalf
+from texture_core.config import param
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes, standardisation
+from texture_estimation.roughness import REGRESSOR_GRADES as GRADES
+from texture_estimation.roughness import ROUGH, SMOOTH
+from texture_estimation.search import GradesOfHalf, Mask, of_machines, of_networks
 from texture_papers.roberge import (
     LINEAR,
     SIGMOID,

@@ -12,28 +12,32 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from texture_core.arrays import Array
-from texture_core.catalogue import find
-from texture_core.window import Window
-from texture_estimation.roughness.evidence import RoughnessAccumulator
-from texture_estimation.roughness.grades import TEST, TRAIN, Grades, read_grades
-from texture_estimation.roughness.model import NORMAL_90, RoughnessModel
-from texture_estimation.roughness.roughness_recipe import RoughnessRecipe, load_roughness_recipe
-from texture_estimation.roughness.training import train_grades
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.roughness_task import RoughnessTask
-from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+from texture_core.config import find
+from texture_core.types import Array, Window
+from texture_estimation.roughness import (
+    NORMAL_90,
+    TEST,
+    TRAIN,
+    Grades,
+    RoughnessAccumulator,
+    RoughnessModel,
+    RoughnessRecipe,
+    load_roughness_recipe,
+    read_grades,
+    train_grades,
+)
+from texture_estimation.search import ArrayStream, RecipeSpace, RoughnessTask, SlideArrays
 from texture_evaluation.charts import COLOURS, chart
+from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
-from texture_features.labelled_features import LabelledFeatures
-from texture_features.windowing.windows import CutWindow
+from texture_features.windows import CutWindow
 from texture_papers.protocol import Experiment, ExperimentResult, Finding, TunedRecipe, digest_of, mean, tune
 from texture_papers.report import finding_as_json
-from texture_simulation.effects.skids import Skids
+from texture_simulation.effects import Skids
 from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.sensor_models import SENSORS
 
 
 @dataclass(frozen=True, eq=False)

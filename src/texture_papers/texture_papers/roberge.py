@@ -10,22 +10,16 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
-from texture_core.catalogue import unknown_name
+from texture_core.config import param, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
-from texture_core.parameters import param
-from texture_core.plain_data import safe_repr
-from texture_estimation.learners.learner import Codes, Fitted, Learner
-from texture_estimation.learners.pair_coupling import uncalibrated
-from texture_estimation.learners.standardisation import standardisation
-from texture_estimation.learners.svm_predictor import SvmPredictor, export
-from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.search.cost import of_machines, of_networks, of_transform
-from texture_estimation.search.halves import Mask
-from texture_estimation.search.surrogates.surrogate import ScoresOfHalf
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes, Fitted, Learner, standardisation
+from texture_estimation.learners.svm import SvmPredictor, export, uncalibrated
+from texture_estimation.numerics import log_softmax
+from texture_estimation.search import Mask, ScoresOfHalf, of_machines, of_networks, of_transform
 from texture_features.feature import WindowBatch, first_difference, power
-from texture_features.recipe_entry import choose, entry_of
-from texture_features.spectra.spectrum import amplitudes_of
+from texture_features.feature_set import choose, entry_of
+from texture_features.spectra import amplitudes_of
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
+from texture_core.types import Array
 from texture_papers.protocol import (
     FEW,
     OURS,
@@ -35,9 +35,9 @@ from texture_papers.protocol import (
     reduced,
 )
 from texture_papers.report import at_least, figures_of, finding_as_json, higher, higher_elsewhere, lower_in, most_errors
-from texture_simulation.frictions import sliding_coefficient
+from texture_simulation.friction import sliding_coefficient
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.simulated_slide import SimulatedSlide
 
 LINEAR_S = 0.5
 LINEAR_SLIDES = 'linear slides'

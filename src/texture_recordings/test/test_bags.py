@@ -14,13 +14,19 @@ from lz4.frame import compress as lz4_compress
 from rosbags.rosbag2 import ReaderError, storage_mcap
 
 from texture_core.errors import InvalidData
-from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.features import FeatureVector
-from texture_core.signal import TactileSignal
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import find_bags, read_bag, read_raw, topics_in
-from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode
+from texture_core.types import ExplorationState, FeatureVector, Phase, RoughnessEstimate, TactileSignal, TextureEstimate
+from texture_recordings.bags import (
+    MESSAGES,
+    TYPES,
+    BagWriter,
+    SignalDecoder,
+    decode,
+    encode,
+    find_bags,
+    read_bag,
+    read_raw,
+    topics_in,
+)
 
 if sys.version_info >= (3, 14):
     from compression.zstd import compress as zstd_compress

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, UnknownName
-from texture_core.exploration import Phase
-from texture_core.signal import NANOSECONDS, TactileSignal, lost_samples
+from texture_core.types import NANOSECONDS, Phase, TactileSignal, lost_samples
 from texture_recordings.bags import read_bag
-from texture_recordings.importers.biotac20 import frame_indices, import_biotac20, restore_sign
-from texture_recordings.slides import find_slides
+from texture_recordings.dataset import find_slides
+from texture_recordings.public_sets import frame_indices, import_biotac20, restore_sign
 
 N_FRAMES = 610
 

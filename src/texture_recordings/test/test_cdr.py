@@ -1,9 +1,8 @@
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_core.exploration import ExplorationState, Phase
-from texture_recordings.cdr import TYPES, decode, encode
+from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate
+from texture_recordings.bags import TYPES, decode, encode
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from texture_recordings.commands.import_ import source_folder
-from texture_recordings.tables.mapping import mapping_from
+from texture_recordings.tables import mapping_from
 
 
 def test_the_parent_of_the_folder_of_a_data_set_may_be_given(tmp_path: Path) -> None:

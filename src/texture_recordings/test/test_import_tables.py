@@ -7,9 +7,8 @@ import pytest
 from foreign_tables import MAPPING, RATE_HZ, STROKE_ROWS, recordings, write_csv
 
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.tables.import_tables import ImportReport, import_tables
-from texture_recordings.tables.mapping import TableMapping, load_mapping, mapping_from
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.tables import ImportReport, TableMapping, import_tables, load_mapping, mapping_from
 
 FIRST_STROKE = 40  # row of the first stroke, after rest
 

@@ -5,12 +5,9 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from texture_core.errors import InvalidData
-from texture_core.signal import NANOSECONDS
-from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.tables.import_tables import ImportReport, import_tables
-from texture_recordings.tables.mapping import TableMapping, mapping_from
-from texture_recordings.tables.message_bag import _types
-from texture_recordings.tables.tables import MAPPED
+from texture_core.types import NANOSECONDS
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.tables import MAPPED, ImportReport, TableMapping, _types, import_tables, mapping_from
 
 START_NS = 1_700_000_000 * NANOSECONDS
 IMU_HZ, WRENCH_HZ, AUDIO_HZ = 100.0, 50.0, 4000.0

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from texture_core.ros.diagnostics import has_ended
-from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros import has_ended
+from texture_core.ros_testing import LocalGraph
 from texture_recordings.bags import read_bag
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -103,9 +103,7 @@ def test_what_a_recorder_has_until_a_second_before_it_is_killed_is_read(tmp_path
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
 
 
-@pytest.mark.parametrize(
-    'module', ['texture_recordings.slide_dataset', 'texture_features.spectra.spectrum', 'scipy.signal']
-)
+@pytest.mark.parametrize('module', ['texture_recordings.dataset', 'texture_features.spectra', 'scipy.signal'])
 def test_what_is_absent_here_cannot_be_imported(module: str) -> None:
     done = subprocess.run([sys.executable, '-c', ALONE, module], check=False, capture_output=True, text=True)
     assert 'ModuleNotFoundError' in done.stderr

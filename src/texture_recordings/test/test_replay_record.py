@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 from texture_msgs import msg
 
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.node_process import NodeProcess
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS
-from texture_core.signal import TactileSignal
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import read_bag
+from texture_core.ros import SENSOR_QOS
+from texture_core.ros_testing import LocalGraph, NodeProcess
+from texture_core.types import ExplorationState, Phase, TactileSignal
+from texture_recordings.bags import BagWriter, read_bag
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

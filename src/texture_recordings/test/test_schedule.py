@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_recordings.continuity import Continuity
-from texture_recordings.schedule import Schedule
+from texture_core.types import NANOSECONDS, TactileSignal
+from texture_recordings.dataset import Continuity
+from texture_recordings.nodes.replay import Schedule
 
 
 def test_messages_are_due_at_their_distances_divided_by_the_rate() -> None:

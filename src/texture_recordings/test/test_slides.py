@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.slides import STREAMS, find_slides, parse_selection
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
+from texture_recordings.bags import BagWriter
+from texture_recordings.dataset import STREAMS, find_slides, parse_selection
 
 
 def write(path: Path, surfaces: list[str], start_s: int) -> Path:

@@ -19,8 +19,7 @@ import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData
-from texture_recordings.tables.mapping import NameTemplate, TableMapping, mapping_from
-from texture_recordings.tables.tables import MAPPED, READERS, Table, TableFiles
+from texture_recordings.tables import MAPPED, READERS, NameTemplate, Table, TableFiles, TableMapping, mapping_from
 
 X = np.round(np.sin(np.arange(60.0)) * 0.5, 4)
 Y = np.round(np.cos(np.arange(60.0)) * 0.5, 4)
@@ -180,7 +179,7 @@ def test_a_file_that_takes_too_long_is_refused_and_the_next_one_is_read(
 ) -> None:
     path = made(tmp_path, '.csv')
     with TableFiles() as files:
-        monkeypatch.setattr('texture_recordings.tables.tables.DEADLINE_S', 1e-6)
+        monkeypatch.setattr('texture_recordings.tables.DEADLINE_S', 1e-6)
         with pytest.raises(InvalidData, match=r"'a\.csv' was refused: it takes longer to read than a file of its size"):
             list(files.tables('.csv', path, 'a.csv', mapping()))
         monkeypatch.undo()

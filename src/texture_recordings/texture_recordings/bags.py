@@ -1,26 +1,641 @@
-"""Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed."""
+"""Read and write bags (MCAP) of the suite's messages, within limits."""
 
 from __future__ import annotations
 
+import io
+import logging
 import os
+import re
 import struct
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
+from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, BinaryIO, NamedTuple, get_type_hints
+from zlib import crc32
 
 import apsw
+import numpy as np
 import yaml
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader, ReaderError
+from lz4.frame import LZ4FrameDecompressor
+from numpy.typing import NDArray
+from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import (
+    CompressionFormat,
+    CompressionMode,
+    Reader,
+    ReaderError,
+    StoragePlugin,
+    Writer,
+    reader,
+    storage_mcap,
+    storage_sqlite3,
+)
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError
+from rosbags.typesys.store import Typestore
 
+from texture_core.config import MB, Budget, FileRefused, folder, open_regular, parse_yaml, read_text, unpacked_limit
 from texture_core.errors import InvalidData
-from texture_core.plain_data import parse_yaml
-from texture_core.signal import TactileSignal
-from texture_recordings.bag_limits import CheckedPath, MessageLimit, check_index, check_storage, messages_budget
-from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode
-from texture_recordings.topic_names import connections_below, topic_names
+from texture_core.types import (
+    NANOSECONDS,
+    Array,
+    ExplorationState,
+    FeatureVector,
+    Phase,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
+
+# --------------------
+# Limits for bags of any origin where rosbags has none: what unpacks, how often, and which files are opened at all.
+#
+# An MCAP file without its end, of a recorder that was killed, is opened as if it ended behind its last whole chunk.
+#
+# rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory; it believes
+# the
+# index of an MCAP file, in which a chunk may stand a hundred thousand times; and what an SQLite file computes is not
+# bounded by its size.
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import ZstdDecompressor, ZstdError
+else:
+    from backports.zstd import ZstdDecompressor, ZstdError
+
+MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
+# Each record in a chunk becomes objects of 150 bytes, however little it takes in the file.
+RECORDS_AT_LEAST = 16
+PACKED_RECORD_BYTES = 8
+CHUNK = 0x06
+CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
+CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
+RECORD_HEAD = struct.Struct('<BQ')
+MAGIC = b'\x89MCAP0\r\n'
+# The end of a file: the footer with the place of the summary, which is 0 if there is none, and its checksum; the magic.
+END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
+FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
+# Signals are read in 10 µs each, other messages in 25 µs, and each becomes objects of up to 1.5 kB; a bag of 5 MB may
+# hold so many signals, or a third of it of other messages, and larger ones another for every 8 bytes.
+SIGNALS_AT_LEAST, OTHERS_COUNT = 200_000, 3
+SHORT_BYTES, TEXTS_BYTES = 512, 64  # of other messages; longer ones may hold a text, which takes 1 µs, in each 8 bytes
+SMALL_BAG_BYTES, SIGNAL_BYTES = 5 * MB, 8
+# Windows are cut from time that was sampled, however few samples that takes. Signals of the suite take 1 kB/s or more.
+RECORDED_AT_LEAST_S, BYTES_PER_S = 3600.0, 300
+# SQLite counts its own steps; reading a row three times takes fewer than a hundred, and a row 30 bytes or more.
+MAX_STEPS = 10_000_000
+STEPS_PER_BYTE = 4
+STEPS_AT_ONCE = 100_000
+MAX_TABLES = 100
+COMPUTED = re.compile(r'\bAS\s*\(|\bVIEW\b|\bVIRTUAL\b|\bTRIGGER\b', re.IGNORECASE)
+
+
+class CheckedPath(type(Path())):  # type: ignore[misc]
+    """A path from which only regular files are read, whoever opens them; files of text are short.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = CheckedPath(folder, 'metadata.yaml')
+    ...     _ = Path(path).write_bytes(b'version: 9')
+    ...     print(path.read_text())
+    version: 9
+    """
+
+    def open(self, *_args: Any, **_options: Any) -> IO[Any]:
+        """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
+        file = open_regular(self)
+        if self.suffix != '.mcap' or _has_end(file):
+            return file
+        end = _end_of_chunks(file)
+        logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
+        return io.BufferedReader(_Ended(file, end))
+
+    def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
+        """Return the text of a short file."""
+        return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
+
+
+class _Ended(io.RawIOBase):
+    """The first bytes of a file, and the end that it lacks."""
+
+    def __init__(self, file: BinaryIO, length: int) -> None:
+        self._file, self._length, self._at = file, length, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length + len(END)}[whence]
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        if self._at < self._length:
+            self._file.seek(self._at)
+            part = self._file.read(min(len(buffer), self._length - self._at))
+        else:
+            part = END[self._at - self._length :][: len(buffer)]
+        buffer[: len(part)] = part
+        self._at += len(part)
+        return len(part)
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
+def _has_end(file: BinaryIO) -> bool:
+    """Return whether an MCAP file has its end; FileRefused if the checksum of its summary is wrong."""
+    size = file.seek(0, io.SEEK_END)
+    file.seek(max(0, size - FOOTER_BYTES))
+    end = file.read()
+    if end[:9] != END[:9] or not end.endswith(MAGIC):
+        file.seek(0)
+        return False
+    summary, checksum = int.from_bytes(end[9:17], 'little'), int.from_bytes(end[-12:-8], 'little')
+    if summary and checksum:
+        file.seek(min(summary, size))
+        if crc32(file.read()[:-CHECKSUM_FROM_END]) != checksum:
+            raise FileRefused('its index was altered: the checksum is another')
+    file.seek(0)
+    return True
+
+
+def _end_of_chunks(file: BinaryIO) -> int:
+    """Return where the last whole chunk of an MCAP file ends; power that fails may leave one of the right length."""
+    size = file.seek(0, io.SEEK_END)
+    chunks = []
+    at = end = len(MAGIC)
+    for kind, length, _ in _records(file, size):
+        at += RECORD_HEAD.size + length
+        if at > size or not kind:
+            break
+        if kind == CHUNK:
+            chunks.append((at - length, length))
+        end = at
+    while chunks and not _is_whole(file, *chunks[-1]):
+        end = chunks.pop()[0] - RECORD_HEAD.size
+    file.seek(0)
+    return end
+
+
+def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
+    file.seek(at)
+    content = file.read(length)
+    try:
+        _, _, size, checksum = CHUNK_HEAD.unpack_from(content)
+        packed = CHUNK_HEAD.size + 4 + int.from_bytes(content[CHUNK_HEAD.size :][:4], 'little')
+        kind = content[CHUNK_HEAD.size + 4 : packed].decode()
+        storage_mcap.decompress(content[packed + 8 :], kind, size, checksum)
+    except (ReaderError, ValueError, struct.error, RuntimeError, ZstdError):
+        return False
+    return True
+
+
+def check_storage(path: Path) -> None:
+    """Raise FileRefused or OSError unless a file of a bag is a regular one, within the limits."""
+    with open_regular(path) as file:
+        if path.suffix == '.mcap':
+            _check_mcap(file)
+        elif path.suffix == '.db3':
+            _check_sqlite(path)
+
+
+def check_index(storage: Any) -> None:
+    """Raise FileRefused if the index of an opened MCAP file names a part of the file twice.
+
+    Raises
+    ------
+    FileRefused
+        If it does.
+    """
+    budget = _budget(Path(storage.path).stat().st_size)
+    end = 0
+    for chunk in sorted(storage.chunks, key=lambda chunk: int(chunk.chunk_start_offset)):
+        if chunk.chunk_start_offset < end:
+            raise FileRefused('it has an index in which chunks overlap')
+        end = chunk.chunk_start_offset + RECORD_HEAD.size + CHUNK_HEAD.size + chunk.compressed_size
+        budget.spend(chunk.uncompressed_size)
+
+
+def messages_budget(files: Iterable[Path]) -> Budget:
+    """Return how many bytes the messages of a bag may have: a damaged or altered file may give the same ones again."""
+    return _budget(sum(file.stat().st_size for file in files))
+
+
+class MessageLimit:
+    """How many messages a bag may still have.
+
+    Parameters
+    ----------
+    files
+        Files of the bag.
+
+    Examples
+    --------
+    >>> limit = MessageLimit([])  # of an empty bag
+    >>> for _ in range(SIGNALS_AT_LEAST):
+    ...     limit.spend(100, is_signal=True)
+    >>> try:
+    ...     limit.spend(100, is_signal=True)
+    ... except FileRefused as error:
+    ...     print(error)
+    it has more messages than a bag of 0 MB may hold; split the recording
+    """
+
+    def __init__(self, files: Iterable[Path]) -> None:
+        self._file_bytes = sum(file.stat().st_size for file in files)
+        self._left = SIGNALS_AT_LEAST + max(0, self._file_bytes - SMALL_BAG_BYTES) // SIGNAL_BYTES
+
+    def spend(self, n_bytes: int, is_signal: bool) -> None:
+        """Count a message; FileRefused if there are more than the size of the bag allows.
+
+        Raises
+        ------
+        FileRefused
+            If there are more.
+        """
+        self._left -= 1 if is_signal else OTHERS_COUNT + max(0, n_bytes - SHORT_BYTES) // TEXTS_BYTES
+        if self._left < 0:
+            raise FileRefused(
+                f'it has more messages than a bag of {self._file_bytes / MB:.3g} MB may hold; split the recording'
+            )
+
+
+def check_duration(path: Path, signals: Iterable[TactileSignal]) -> None:
+    """Raise FileRefused if the signals of a bag stand for much more time than its size can tell of.
+
+    Raises
+    ------
+    FileRefused
+        If they do.
+    """
+    size = sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]) if file.is_file())
+    seconds: defaultdict[str, float] = defaultdict(float)
+    for signal in signals:
+        seconds[signal.sensor] += len(signal.samples) / signal.sampling_rate_hz
+    most_s = RECORDED_AT_LEAST_S + size / BYTES_PER_S
+    longest_s = max(seconds.values(), default=0.0)
+    if longest_s > most_s:
+        raise FileRefused(
+            f'it has {longest_s / 3600:.3g} h of samples, and a bag of {size / MB:.3g} MB may have '
+            f'{most_s / 3600:.3g} h; check the sampling rate of its signals'
+        )
+
+
+def _budget(file_bytes: int) -> Budget:
+    return Budget(unpacked_limit(file_bytes))
+
+
+def _check_mcap(file: BinaryIO) -> None:
+    size = file.seek(0, 2)
+    budget = _budget(size)
+    for kind, _, head in _records(file, size):
+        if kind == CHUNK and len(head) == CHUNK_HEAD.size:
+            budget.spend(CHUNK_HEAD.unpack(head)[2])
+
+
+def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
+    """Yield the kind, the length and the first bytes of each record; what is damaged is left to who reads on."""
+    at = len(MAGIC)
+    while at + RECORD_HEAD.size <= size:
+        file.seek(at)
+        head = file.read(RECORD_HEAD.size + CHUNK_HEAD.size)
+        if len(head) < RECORD_HEAD.size:
+            return
+        kind, length = RECORD_HEAD.unpack_from(head)
+        yield kind, length, head[RECORD_HEAD.size :]
+        at += RECORD_HEAD.size + length
+
+
+def _check_sqlite(path: Path) -> None:
+    """Refuse what computes its content: what is stored is no more than the file holds."""
+    connection = apsw.Connection(
+        f'file:{path}?immutable=1', flags=apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI
+    )  # fmt: skip
+    try:
+        definitions = connection.execute('SELECT sql FROM sqlite_master LIMIT ?', (MAX_TABLES + 1,)).fetchall()
+    finally:
+        connection.close()
+    if len(definitions) > MAX_TABLES or any(COMPUTED.search(str(sql)) for (sql,) in definitions):
+        raise FileRefused('it has tables that are computed, which no bag has')
+
+
+class _Steps:
+    """How many steps of SQLite a connection may still take."""
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    def __call__(self) -> bool:
+        """Count; True ends the query with an error."""
+        self._left -= STEPS_AT_ONCE
+        return self._left < 0
+
+
+def _limit_sqlite(connection: apsw.Connection) -> None:
+    size = Path(connection.filename).stat().st_size
+    connection.limit(apsw.SQLITE_LIMIT_LENGTH, max(size, MB))
+    connection.set_progress_handler(_Steps(MAX_STEPS + STEPS_PER_BYTE * size), STEPS_AT_ONCE)
+
+
+def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
+    """Return a chunk that claims to unpack to `size`; one byte more is enough to tell that it does not."""
+    if size > unpacked_limit(len(data)):
+        raise ReaderError(f'a chunk of {len(data)} bytes claims to unpack to {size}')
+    content = bytes(decompressor.decompress(data, max_length=size + 1))
+    most = RECORDS_AT_LEAST + len(data) // PACKED_RECORD_BYTES
+    if next(islice(_starts(content), most, None), None) is not None:
+        raise ReaderError(f'a chunk of {len(data)} bytes unpacks to more than {most} records')
+    return content
+
+
+def _starts(content: bytes) -> Iterator[int]:
+    """Yield where the records of a chunk begin."""
+    at, end = 0, len(content) - RECORD_HEAD.size
+    while at <= end:
+        yield at
+        at += RECORD_HEAD.size + RECORD_HEAD.unpack_from(content, at)[1]
+
+
+def _no_quality_of_service(_text: Any) -> list[Any]:
+    """Return nothing: the suite reads no quality of service from bags, and reading it takes seconds if it is long."""
+    return []
+
+
+def set_limits() -> None:
+    """Set the limits in rosbags and SQLite, for this process."""
+    storage_mcap.DECOMPRESSORS.update(
+        zstd=lambda data, size: _unpacked(ZstdDecompressor(), data, size),
+        lz4=lambda data, size: _unpacked(LZ4FrameDecompressor(), data, size),
+    )
+    for module in (reader, storage_mcap, storage_sqlite3):
+        module.parse_qos = _no_quality_of_service  # type: ignore[attr-defined]
+    if _limit_sqlite not in apsw.connection_hooks:
+        apsw.connection_hooks.append(_limit_sqlite)
+
+
+set_limits()
+
+
+# --------------------
+# Data classes of texture_core to the bytes ROS 2 sends and records (CDR), and back, without ROS.
+#
+# The message definitions are read from the .msg files of texture_msgs, so they exist once.
+
+MESSAGES: Mapping[str, type] = {
+    f'texture_msgs/msg/{cls.__name__}': cls
+    for cls in (TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate)
+}
+TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
+PHASES = tuple(Phase)
+Convert = tuple[Callable[[Any], Any], Callable[[Any], Any]]
+# By the type of a field, where it is not the same on both sides: to the wire, and back.
+WIRE: Mapping[Any, Convert] = {
+    Phase: (lambda phase: phase.code, PHASES.__getitem__),
+    tuple[str, ...]: (list, tuple),
+    tuple[float, ...]: (lambda values: np.array(values, dtype=np.float64), lambda values: tuple(values.tolist())),
+    Array: (lambda values: np.ascontiguousarray(values, dtype=np.float64), lambda values: values),
+    NDArray[np.float32]: (lambda samples: np.ascontiguousarray(samples, dtype=np.float32).ravel(), lambda flat: flat),
+}
+SAME: Convert = (lambda value: value, lambda value: value)
+STAMPS = {'stamp_ns', 'start_ns'}
+
+
+@cache
+def typestore() -> Typestore:
+    """Return the message types of ROS 2 Jazzy and of the suite.
+
+    Raises
+    ------
+    InvalidData
+        If the message definitions of the suite are not installed.
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    directory = folder('texture_msgs', 'msg')
+    definitions = sorted(directory.glob('*.msg'))
+    if not definitions:
+        raise InvalidData(f"no message definitions in '{directory}'; build or source the workspace first")
+    for path in definitions:
+        store.register(get_types_from_msg(path.read_text(encoding='utf-8'), f'texture_msgs/msg/{path.stem}'))
+    return store
+
+
+def encode(value: Any) -> bytes:
+    """Return a data class of texture_core as CDR."""
+    types = typestore().types
+    cls: type = type(value)
+    given = {name: to_wire(getattr(value, name)) for name, (to_wire, _) in _fields(cls).items()}
+    if isinstance(value, ExplorationState):
+        given['phase_name'] = value.phase.value
+    seconds, nanoseconds = divmod(next(given.pop(name) for name in STAMPS if name in given), NANOSECONDS)
+    header = types['std_msgs/msg/Header'](
+        stamp=types['builtin_interfaces/msg/Time'](sec=int(seconds), nanosec=int(nanoseconds)),
+        frame_id=given.pop('frame_id', ''),
+    )
+    return bytes(typestore().serialize_cdr(types[TYPES[cls]](header=header, **given), TYPES[cls]))
+
+
+def decode(raw: bytes, msgtype: str) -> Any:
+    """Return the data class in the CDR of a message of texture_msgs; arrays are views of `raw`.
+
+    Raises
+    ------
+    InvalidData
+        If the bytes are not such a message, or it contradicts itself.
+    """
+    try:
+        return _data_class(typestore().deserialize_cdr(raw, msgtype), MESSAGES[msgtype])
+    except (SerdeError, struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError) as error:
+        raise InvalidData(f'{len(raw)} bytes came as a {msgtype}, which they are not: {error}') from error
+
+
+def _data_class(message: Any, cls: type) -> Any:
+    stamp_ns = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+    values: dict[str, Any] = {}
+    for name, (_, from_wire) in _fields(cls).items():
+        if name in STAMPS:
+            values[name] = stamp_ns
+        elif name == 'frame_id':
+            values[name] = message.header.frame_id
+        else:
+            values[name] = from_wire(getattr(message, name))
+    if cls is TactileSignal:
+        values['samples'] = values['samples'].reshape(-1, len(values['channels']))
+    return cls(**values)
+
+
+@cache
+def _fields(cls: type) -> Mapping[str, Convert]:
+    """Return what becomes of each field."""
+    return {name: WIRE.get(kind, SAME) for name, kind in get_type_hints(cls).items()}
+
+
+class SignalDecoder:
+    """Decode the signals of one stream fast: its batches differ in stamp, index and samples only.
+
+    Examples
+    --------
+    >>> batch = TactileSignal(5, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
+    >>> decoder = SignalDecoder()
+    >>> [decoder.decode(encode(batch)).samples[:, 0].tolist() for _ in range(2)]
+    [[1.0, 2.0], [1.0, 2.0]]
+    """
+
+    def __init__(self) -> None:
+        self._head = b''
+        self._like: TactileSignal | None = None
+        self._heads_left = MAX_HEADS_BYTES
+
+    def decode(self, raw: bytes) -> TactileSignal:
+        """Return the signal in the CDR of a TactileSignal; `samples` is a view of `raw`."""
+        like, tail = self._like, STAMP_END + len(self._head)
+        if like is None or raw[STAMP_END:tail] != self._head or not raw.startswith(LITTLE_ENDIAN):
+            return self._decode_first(raw)
+        seconds, nanoseconds = STAMP.unpack_from(raw, len(LITTLE_ENDIAN))
+        first, length = INDEX_AND_LENGTH.unpack_from(raw, tail)
+        columns = len(like.channels)
+        if length % columns or len(raw) < tail + INDEX_AND_LENGTH.size + 4 * length:
+            return self._decode_first(raw)
+        samples = np.frombuffer(raw, '<f4', length, tail + INDEX_AND_LENGTH.size)
+        return TactileSignal(
+            seconds * NANOSECONDS + nanoseconds, like.sensor, like.channels, like.units, like.sampling_rate_hz,
+            first, samples.reshape(-1, columns), like.frame_id,
+        )  # fmt: skip
+
+    def _decode_first(self, raw: bytes) -> TactileSignal:
+        _check_texts(raw)
+        signal: TactileSignal = decode(raw, TYPES[TactileSignal])
+        # The samples are the last field: what stands before them, without the stamp, is common to the stream.
+        tail = len(raw) - 4 * signal.samples.size - INDEX_AND_LENGTH.size
+        self._head, self._like = raw[STAMP_END:tail], signal
+        self._heads_left -= len(self._head)
+        if self._heads_left < 0:
+            raise InvalidData(f"the channels of sensor '{signal.sensor}' change again and again")
+        return signal
+
+
+def _check_texts(raw: bytes) -> None:
+    """Raise InvalidData if a TactileSignal has more channels or units than any sensor: a text takes 8 bytes."""
+    try:
+        at = STAMP_END
+        for _ in ('frame', 'sensor'):
+            at = _after_text(raw, at)
+        for name in ('channels', 'units'):
+            (count,) = LENGTH.unpack_from(raw, at)
+            if count > MAX_CHANNELS:
+                raise InvalidData(f'a signal has {count} {name}; {MAX_CHANNELS} are allowed')
+            at += LENGTH.size
+            for _ in range(count):
+                at = _after_text(raw, at)
+    except struct.error:
+        pass  # whoever reads on says what is wrong
+
+
+def _after_text(raw: bytes, at: int) -> int:
+    (length,) = LENGTH.unpack_from(raw, at)
+    return -(-(at + LENGTH.size + int(length)) // LENGTH.size) * LENGTH.size
+
+
+LITTLE_ENDIAN = b'\x00\x01'
+STAMP = struct.Struct('<2xiI')
+STAMP_END = 12
+INDEX_AND_LENGTH = struct.Struct('<QI')
+LENGTH = struct.Struct('<I')
+MAX_CHANNELS = 4096
+MAX_HEADS_BYTES = 2_000_000  # a stream says the same of itself all the time, unless its driver is started again
+
+
+# --------------------
+# The names of the topics of a sensor in a bag.
+
+EXPLORATION = 'exploration'
+
+
+def short_name(topic: str) -> str:
+    """Return the last part of a topic's name: 'signal' of '/left/signal'."""
+    return topic.rsplit('/', 1)[-1]
+
+
+def connections_below(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
+    """Return the connections of the suite's messages in a namespace, and those of the diagnostics.
+
+    Parameters
+    ----------
+    path
+        The bag, for messages.
+    connections
+        All connections of the bag.
+    namespace
+        Namespace of the sensor; None if there is only one.
+
+    Returns
+    -------
+    list of Connection
+
+    Raises
+    ------
+    InvalidData
+        If the bag has other messages, other definitions of them, several namespaces or not this one.
+    """
+    ours = [c for c in connections if c.msgtype in MESSAGES]
+    if not ours:
+        named = ', '.join(sorted({c.msgtype for c in connections})) or 'nothing'
+        raise InvalidData(
+            f"the bag '{path}' holds {named}; messages of texture_msgs are needed, record the suite's topics"
+        )
+    for connection in ours:
+        if connection.digest and connection.digest != typestore().hash_rihs01(connection.msgtype):
+            raise InvalidData(
+                f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it again"
+            )
+    names = topic_names(c.topic for c in ours)
+    namespaces = {topic: topic.removesuffix(name).rstrip('/') or '/' for topic, name in names.items()}
+    found = sorted(set(namespaces.values()))
+    if namespace is None and len(found) > 1:
+        raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them")
+    prefix = found[0] if namespace is None else '/' + namespace.strip('/')
+    if prefix not in found:
+        raise InvalidData(f"the bag '{path}' has no namespace '{prefix}'; it has {', '.join(found)}")
+    common = [c for c in connections if c.topic == '/diagnostics']
+    return [c for c in ours if namespaces[c.topic] == prefix] + common
+
+
+def topic_names(topics: Iterable[str]) -> dict[str, str]:
+    """Return the name of each topic below its namespace, which is the folder of its explorer.
+
+    Several fingers of one explorer stream on 'finger0/signal' and so on; a topic without an explorer above it belongs
+    to the folder in which it is.
+
+    Examples
+    --------
+    >>> topic_names(['/left/exploration', '/left/finger0/signal', '/right/signal'])
+    {'/left/exploration': 'exploration', '/left/finger0/signal': 'finger0/signal', '/right/signal': 'signal'}
+    """
+    given = list(topics)
+    explorers = {_folder(topic) for topic in given if short_name(topic) == EXPLORATION}
+    names = {}
+    for topic in given:
+        folder = _folder(topic)
+        while folder and folder not in explorers:
+            folder = _folder(folder)
+        names[topic] = topic.removeprefix(f'{folder}/') if folder in explorers else short_name(topic)
+    return names
+
+
+def _folder(topic: str) -> str:
+    return topic.rpartition('/')[0]
+
+
+# --------------------
+# Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
 if sys.version_info >= (3, 14):
     from compression.zstd import ZstdError
@@ -285,3 +900,132 @@ def _files(path: Path) -> list[Path]:
         raise ReaderError('it is compressed as a whole; let `ros2 bag convert` make it MCAP, which compresses inside')
     # As rosbags finds them: beside the metadata, wherever the entry says that they were.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
+
+
+# --------------------
+# Write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
+
+FOREVER = QosTime(2147483647, 4294967295)
+
+
+def _offered(reliability: QosReliability, durability: QosDurability, depth: int) -> list[Qos]:
+    keep, lively = QosHistory.KEEP_LAST, QosLiveliness.AUTOMATIC
+    return [Qos(keep, depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
+
+
+# The same as texture_core.ros, for `ros2 bag play`; by the last part of the topic's name.
+QOS: Mapping[str, list[Qos]] = {
+    'signal': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
+    'signal_static': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
+    'exploration': _offered(QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 200),
+    'features': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 200),
+    'texture': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
+    'roughness': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
+}
+
+
+class BagWriter:
+    """Write a new bag; use it in a `with` block, at the end of which the bag is complete.
+
+    Parameters
+    ----------
+    path
+        Folder to make; nothing may exist there.
+    namespace
+        Put before topics that do not start with '/': 'signal' becomes '/left/signal' in '/left'.
+
+    Each chunk carries its checksum, and `flush` ends one: a bag whose writer was killed is read up to the last.
+
+    Raises
+    ------
+    InvalidData
+        If something exists at `path`, or it cannot be made.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tempfile import TemporaryDirectory
+    >>> from texture_core.types import TactileSignal
+    >>> from texture_recordings.bags import read_bag
+    >>> batch = TactileSignal(5, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
+    >>> with TemporaryDirectory() as folder:
+    ...     with BagWriter(f'{folder}/bag') as bag:
+    ...         bag.write('signal', batch, log_ns=7)
+    ...     [(topic, log_ns, signal)] = read_bag(f'{folder}/bag')
+    >>> topic, log_ns, signal.samples[:, 0].tolist()
+    ('signal', 7, [1.0, 2.0])
+    """
+
+    def __init__(self, path: str | Path, namespace: str = '/') -> None:
+        self.path = Path(path)
+        self._namespace = '/' + namespace.strip('/')
+        self._connections: dict[tuple[str, str], Connection] = {}
+        if self.path.exists():
+            raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
+        self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
+        storage: Any = self._writer.storage
+        self._storage = storage
+        self._close_chunk = self._storage.close_chunk  # without a checksum
+        self._storage.close_chunk = self._close_with_checksum
+
+    def write(self, topic: str, value: Any, log_ns: int) -> None:
+        """Write a data class of texture_core as received at `log_ns`.
+
+        Parameters
+        ----------
+        topic
+            Name of the topic, such as 'signal'.
+        value
+            Data class of texture_core that has a message.
+        log_ns
+            Time at which it is logged, ns.
+        """
+        self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
+
+    def write_raw(self, message: RawMessage) -> None:
+        """Write a message that is CDR already."""
+        key = message.topic, message.msgtype
+        if key not in self._connections:
+            self._connections[key] = self._connect(*key)
+        self._writer.write(self._connections[key], message.log_ns, message.data)
+
+    def flush(self) -> None:
+        """Bring to the disk what was written: it can be read whatever happens to this process or machine."""
+        if self._storage.chunk.msgs:
+            self._storage.close_chunk()
+        self._storage.bio.flush()
+        os.fsync(self._storage.bio.fileno())
+
+    def close(self) -> None:
+        """Complete the bag."""
+        self._writer.close()
+        with self._storage.path.open('r+b') as file:
+            file.seek(-FOOTER_BYTES, os.SEEK_END)
+            file.seek(int.from_bytes(file.read(FOOTER_BYTES)[9:17], 'little'))
+            checksum = crc32(file.read()[:-CHECKSUM_FROM_END])
+            file.seek(-CHECKSUM_FROM_END, os.SEEK_END)
+            file.write(checksum.to_bytes(4, 'little'))
+
+    def _close_with_checksum(self) -> None:
+        file, checksum = self._storage.bio, crc32(self._storage.chunk.bio.getbuffer())
+        at = file.tell() + CHUNK_CHECKSUM_AT
+        self._close_chunk()
+        file.seek(at)
+        file.write(checksum.to_bytes(4, 'little'))
+        file.seek(0, os.SEEK_END)
+
+    def _connect(self, topic: str, msgtype: str) -> Connection:
+        name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
+        qos = QOS.get(short_name(name), [])
+        return self._writer.add_connection(name, msgtype, typestore=typestore(), offered_qos_profiles=qos)
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

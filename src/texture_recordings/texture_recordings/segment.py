@@ -7,12 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import TactileSignal
-from texture_features.segmentation.segments import SegmentationParams
-from texture_features.segmentation.slide_segmenter import segment_recording
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import RawMessage, find_bags, read_bag, read_named
+from texture_core.types import ExplorationState, Phase, TactileSignal
+from texture_features.segmentation import SegmentationParams, segment_recording
+from texture_recordings.bags import BagWriter, RawMessage, find_bags, read_bag, read_named
 
 FAST_TOPIC, SLOW_TOPIC, STATE_TOPIC = 'signal', 'signal_static', 'exploration'
 

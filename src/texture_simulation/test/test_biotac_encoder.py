@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from texture_core.framing import FrameDecoder
-from texture_drivers.biotac.protocol import decode
-from texture_drivers.biotac.tables import LAYOUTS, sampling_command
-from texture_simulation.devices.biotac_encoder import commands, encode_replies, reply_frame, serials_frame, stuff
+from texture_drivers.biotac import LAYOUTS, decode, sampling_command
+from texture_simulation.devices.fingers import commands, encode_replies, reply_frame, serials_frame, stuff
 
 
 @pytest.mark.parametrize('kind', LAYOUTS)

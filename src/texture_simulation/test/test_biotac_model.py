@@ -3,10 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.biotac import LAYOUTS
+from texture_simulation.path import Trajectory
 from texture_simulation.scene import scene_from
-from texture_simulation.sensors.biotac import PA_PER_N, PATH_RATE_HZ, PDC_PA, BioTacModel
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.sensor_models import BIOTAC_PATH_RATE_HZ as PATH_RATE_HZ
+from texture_simulation.sensor_models import PA_PER_N, PDC_PA, BioTacModel
 
 BIOTAC = LAYOUTS['biotac']
 PITCH_M = 1e-3

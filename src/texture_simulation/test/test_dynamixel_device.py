@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from texture_core.finger_state import FingerState
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, crc16
-from texture_simulation.devices.dynamixel_motors import (
+from texture_core.types import FingerState
+from texture_simulation.devices.dynamixel import (
     LEAP_FINGERS,
     OVERLOAD,
     DynamixelMotors,
+    EmulatedDynamixelBus,
     PressingMotor,
+    crc16,
     leap_hand,
 )
 

@@ -9,23 +9,28 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from texture_simulation.effects.catalogue import EFFECTS
-from texture_simulation.effects.contact_growth import ForceGain, PatchGrowth
-from texture_simulation.effects.drift import Drift
-from texture_simulation.effects.dropouts import Dropouts
-from texture_simulation.effects.finger_spread import FingerSpread
-from texture_simulation.effects.mains_hum import MainsHum
-from texture_simulation.effects.motor_vibration import MotorVibration
-from texture_simulation.effects.noise import Noise
-from texture_simulation.effects.protocols import ForceEffect, PathEffect, SignalEffect
-from texture_simulation.effects.quantisation import Quantisation
-from texture_simulation.effects.skids import Skids
-from texture_simulation.effects.skin import Skin
-from texture_simulation.effects.slide_error import SlideError
-from texture_simulation.effects.unevenness import Unevenness
+from texture_simulation.effects import (
+    EFFECTS,
+    Drift,
+    Dropouts,
+    FingerSpread,
+    ForceEffect,
+    ForceGain,
+    MainsHum,
+    MotorVibration,
+    Noise,
+    PatchGrowth,
+    PathEffect,
+    Quantisation,
+    SignalEffect,
+    Skids,
+    Skin,
+    SlideError,
+    Unevenness,
+)
+from texture_simulation.path import Trajectory
 from texture_simulation.scene import scene_from
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.sensor_models import SENSORS
 
 RATE_HZ = 1000.0
 CUTS = (0, 3, 3, 400, 401, 1000)

@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError, UnknownName
-from texture_core.finger_state import FingerState
-from texture_core.signal import TactileSignal, lost_samples
-from texture_drivers.params import SensorParams
-from texture_drivers.tsf85.sensor import Tsf85
-from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.emulator import Emulator
-from texture_simulation.emulator_params import EmulatorParams
+from texture_core.types import FingerState, TactileSignal, lost_samples
+from texture_drivers.sensor import SensorParams
+from texture_drivers.tsf85 import Tsf85
+from texture_simulation.devices.fingers import ByteFaults
+from texture_simulation.emulator import Emulator, EmulatorParams
 
 pytestmark = pytest.mark.realtime
 

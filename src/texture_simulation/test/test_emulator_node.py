@@ -12,9 +12,8 @@ from rclpy.parameter import Parameter
 from texture_msgs.msg import TactileSignal
 
 from texture_core.errors import UnknownName
-from texture_core.ros.conversions import from_msg
-from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros import SENSOR_QOS, from_msg
+from texture_core.ros_testing import LocalGraph
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.nodes.emulator import EmulatorNode
 

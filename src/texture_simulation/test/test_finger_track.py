@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from texture_core.finger_state import FingerState
-from texture_core.signal import NANOSECONDS
-from texture_simulation.finger_track import FingerTrack
+from texture_core.types import NANOSECONDS, FingerState
+from texture_simulation.path import FingerTrack
 
 MS = NANOSECONDS // 1000
 

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
+from texture_simulation.friction import CREEP_M_S, SlidingDrag, SlidingFriction, slow_drag
+from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide, Trajectory
 from texture_simulation.scene import Scene, scene_from
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.slide_batches import simulate_slides
-from texture_simulation.stick_slip.limit_cycle import slow_drag
-from texture_simulation.surfaces.sliding_friction import CREEP_M_S, SlidingDrag, SlidingFriction
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.sensor_models import SENSORS
 
 RATE_HZ = 2000.0
 HANGS = {'kind': 'stick_slip'}

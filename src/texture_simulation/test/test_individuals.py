@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_drivers.biotac.tables import LAYOUTS
-from texture_simulation.contact import Contact
-from texture_simulation.effects.finger_spread import SALT, FingerSpread
+from texture_drivers.biotac import LAYOUTS
+from texture_simulation.effects import SALT, FingerSpread
 from texture_simulation.offline import simulate_slide_streams
-from texture_simulation.scene import load_scene, scene_from
-from texture_simulation.sensors.biotac import COLUMNS, ELECTRODE_PITCH_M, BioTacModel
-from texture_simulation.sensors.biotac import ELECTRODE_BASELINE as BASELINE
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.surfaces.curvature import Curved
-from texture_simulation.trajectory import straight
+from texture_simulation.path import SimulatedSlide, straight
+from texture_simulation.scene import Contact, load_scene, scene_from
+from texture_simulation.sensor_models import COLUMNS, ELECTRODE_PITCH_M, BioTacModel
+from texture_simulation.sensor_models import ELECTRODE_BASELINE as BASELINE
+from texture_simulation.surfaces import Curved
 
 RELIEF = {'kind': 'self_affine', 'rms_m': 2e-5, 'hurst': 0.5, 'longest_m': 4e-3, 'shortest_m': 4e-4, 'seed': 1}
 SMOOTH = {'kind': 'self_affine', 'rms_m': 1e-9, 'hurst': 0.5, 'longest_m': 4e-3, 'shortest_m': 4e-4, 'seed': 1}

@@ -12,18 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from texture_core.finger_state import FingerState
-from texture_core.signal import NANOSECONDS
-from texture_drivers.biotac.sensor import BioTac
+from texture_core.types import NANOSECONDS, FingerState
+from texture_drivers.biotac import BioTac
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.daq.sensor import daq
-from texture_drivers.params import SensorParams
-from texture_drivers.pvdf.sensor import Pvdf
-from texture_simulation.emulator import Emulator
-from texture_simulation.emulator_params import EmulatorParams
-from texture_simulation.live_catalogue import live_biotac, live_biotac_hand, live_daq
+from texture_drivers.daq import daq
+from texture_drivers.pvdf import Pvdf
+from texture_drivers.sensor import SensorParams
+from texture_simulation.emulator import Emulator, EmulatorParams, live_biotac, live_biotac_hand, live_daq
+from texture_simulation.path import straight
 from texture_simulation.scene import load_scene
-from texture_simulation.trajectory import straight
 
 pytestmark = pytest.mark.realtime
 

@@ -4,9 +4,8 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.exploration import Phase
-from texture_core.signal import NANOSECONDS, lost_samples
-from texture_drivers.tsf85 import tables
+from texture_core.types import NANOSECONDS, Phase, lost_samples
+from texture_drivers import tsf85 as tables
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 

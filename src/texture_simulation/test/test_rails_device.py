@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from texture_core.framing import Frame, pack, unpack
-from texture_simulation.devices.rails_firmware import LOCKED, OVERLOAD, RailsFirmware, RailsMachine
+from texture_simulation.devices.rails import LOCKED, OVERLOAD, RailsFirmware, RailsMachine
 
 pytestmark = pytest.mark.realtime
 

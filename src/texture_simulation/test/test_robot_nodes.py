@@ -6,8 +6,8 @@ import time
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.finger_state import FingerState
-from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros_testing import LocalGraph
+from texture_core.types import FingerState
 from texture_simulation.nodes.leap_hand import LeapHandNode
 from texture_simulation.nodes.rails import RailsNode
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from texture_simulation.devices.sampler import SampledStream, encode
+from texture_simulation.devices.fingers import SampledStream
+from texture_simulation.devices.fingers import encode_samples as encode
 
 
 def test_a_frame_is_what_the_protocol_says_byte_by_byte():

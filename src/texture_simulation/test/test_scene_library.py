@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from texture_core.parameters import markdown_table
-from texture_core.resources import find_file, shipped
-from texture_simulation.effects.catalogue import EFFECTS
-from texture_simulation.emulator_params import EmulatorParams
-from texture_simulation.frictions import FRICTIONS
+from texture_core.config import find_file, markdown_table, shipped
+from texture_simulation.effects import EFFECTS
+from texture_simulation.emulator import EmulatorParams
+from texture_simulation.friction import FRICTIONS
 from texture_simulation.scene import load_scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.surfaces.catalogue import KINDS
+from texture_simulation.sensor_models import SENSORS
+from texture_simulation.surfaces import KINDS
 
 PACKAGE = Path(__file__).resolve().parents[1]
 README = (PACKAGE / 'README.md').read_text(encoding='utf-8')

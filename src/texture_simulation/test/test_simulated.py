@@ -2,10 +2,10 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_core.signal import lost_samples
+from texture_core.types import lost_samples
 from texture_recordings.bags import read_bag
-from texture_recordings.slides import find_slides
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_recordings.dataset import find_slides
+from texture_simulation.offline import SlidePlan, write_simulated
 
 
 def test_each_surface_has_its_slides_without_a_loss(tmp_path: Path) -> None:

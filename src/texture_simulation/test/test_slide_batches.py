@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import UnknownName
-from texture_simulation.offline import record, simulate_exploration
+from texture_simulation.offline import record, simulate_exploration, simulate_slide_streams, simulate_slides
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene, scene_from
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.slide_batches import simulate_slide_streams, simulate_slides
+from texture_simulation.sensor_models import SENSORS
 
 TABLE = {
     'surfaces': {'rough': [{'kind': 'self_affine', 'seed': 5}], 'flat': []},

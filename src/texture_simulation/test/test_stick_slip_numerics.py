@@ -2,13 +2,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_simulation.stick_slip.bristle import jacobian
-from texture_simulation.stick_slip.friction import StickSlip
-from texture_simulation.stick_slip.reference import solve
-from texture_simulation.stick_slip.semi_implicit import SEMI_IMPLICIT
-from texture_simulation.stick_slip.stability_limit import check_step
-from texture_simulation.stick_slip.tip_drag import TipDrag
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.friction import SEMI_IMPLICIT, StickSlip, TipDrag, check_step, jacobian, solve
+from texture_simulation.path import Trajectory
 
 USUAL = StickSlip()
 RATE_HZ = 2000.0

@@ -4,11 +4,23 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_simulation.stick_slip.bristle import AT_REST, Tip, energy_j, jacobian, rate
-from texture_simulation.stick_slip.friction import PASSIVE, StickSlip
-from texture_simulation.stick_slip.limit_cycle import nudged, slow_drag
-from texture_simulation.stick_slip.simulate import drag, pull_n
-from texture_simulation.stick_slip.stribeck import coefficient, critical_speed_m_s, slope_s_m, steady_force_n
+from texture_simulation.friction import (
+    AT_REST,
+    PASSIVE,
+    StickSlip,
+    Tip,
+    coefficient,
+    critical_speed_m_s,
+    drag,
+    energy_j,
+    jacobian,
+    nudged,
+    pull_n,
+    rate,
+    slope_s_m,
+    slow_drag,
+    steady_force_n,
+)
 
 STEP_S = 5e-5
 USUAL = StickSlip()

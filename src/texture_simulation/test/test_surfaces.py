@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_simulation.surfaces.grating import Grating
-from texture_simulation.surfaces.self_affine import SelfAffine
-from texture_simulation.surfaces.surface import MIN_BLUR_M, Surface
+from texture_simulation.surfaces import MIN_BLUR_M, Grating, SelfAffine, Surface
 
 SHARP = MIN_BLUR_M
 PLACES = np.linspace(0.0, 0.2, 20_000)

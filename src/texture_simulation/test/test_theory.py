@@ -7,15 +7,12 @@ import itertools
 import numpy as np
 import pytest
 
+from texture_simulation.contact import SkinContact
+from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide, Trajectory
 from texture_simulation.scene import Scene, load_scene, scene_from
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.skin_contact import SkinContact
-from texture_simulation.slide_batches import simulate_slides
-from texture_simulation.surfaces.sandpaper import Sandpaper
-from texture_simulation.surfaces.self_affine import SelfAffine
-from texture_simulation.surfaces.tiles import POINTS_PER_WAVE, SIDE
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.sensor_models import SENSORS
+from texture_simulation.surfaces import POINTS_PER_WAVE, SIDE, Sandpaper, SelfAffine
 
 PITCH_M = 1.5e-3
 SPEEDS_M_S = (0.02, 0.05, 0.1, 0.2, 0.4)

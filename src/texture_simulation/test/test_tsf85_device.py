@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
-from texture_simulation.devices.tsf85 import EmulatedTsf85
+from texture_simulation.devices.fingers import ByteFaults, EmulatedTsf85, FrameFaults
 
 pytestmark = pytest.mark.realtime
 

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from texture_drivers.tsf85.batch_cutter import SIGNAL
-from texture_drivers.tsf85.finger_stream import FingerStream
-from texture_drivers.tsf85.protocol import Tsf85Parser
-from texture_drivers.tsf85.sample_frames import SampleFrameSplitter
-from texture_simulation.devices.tsf85_encoder import Tsf85Encoder
+from texture_drivers.tsf85 import SIGNAL, FingerStream, SampleFrameSplitter, Tsf85Parser
+from texture_simulation.devices.fingers import Tsf85Encoder
 
 IMAGE = np.arange(28, dtype=np.uint16) + 0x1000
 IMAGE_HEX = ''.join(f'10{i:02X}' for i in range(28))

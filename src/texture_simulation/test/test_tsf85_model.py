@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from texture_simulation.offline import record
+from texture_simulation.path import Trajectory
 from texture_simulation.scene import Scene, scene_from
-from texture_simulation.sensors.tsf85 import OVERSAMPLING, PATH_RATE_HZ, Tsf85Model
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.sensor_models import TSF85_OVERSAMPLING as OVERSAMPLING
+from texture_simulation.sensor_models import TSF85_PATH_RATE_HZ as PATH_RATE_HZ
+from texture_simulation.sensor_models import Tsf85Model
 
 PITCH_M = 1.5e-3
 

@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_simulation.devices.twist_controller import GRAVITY_M_S2, EmulatedTwistArm
-from texture_simulation.devices.twist_controller_params import TwistControllerParams
+from texture_simulation.devices.twist_controller import GRAVITY_M_S2, EmulatedTwistArm, TwistControllerParams
 
 QUIET = TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, lag_s=0.02)
 ALONG = np.array([0.1, 0.0, 0.0])

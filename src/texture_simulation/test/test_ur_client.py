@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.finger_state import FingerState
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_core.types import FingerState
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = pytest.mark.realtime
 

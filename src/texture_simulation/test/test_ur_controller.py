@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_simulation.devices.ur.controller import EmulatedController
-from texture_simulation.devices.ur.dashboard import DashboardSession
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.tables import DONE, READY, SafetyMode, ScriptCommand
+from texture_simulation.devices.ur import (
+    DONE,
+    READY,
+    DashboardSession,
+    EmulatedController,
+    SafetyMode,
+    ScriptCommand,
+    UrControllerParams,
+)
 
 pytestmark = pytest.mark.realtime
 

@@ -5,7 +5,7 @@ import os
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros_testing import LocalGraph
 from texture_simulation.nodes.ur_controller import UrControllerNode
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]

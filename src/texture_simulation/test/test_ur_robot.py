@@ -3,10 +3,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_simulation.devices.ur.contact_plane import ContactPlane
-from texture_simulation.devices.ur.motions import LinearMove, ServoMove, SpeedMove, StopMove
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.robot import EmulatedRobot, ForceMode
+from texture_simulation.devices.ur import (
+    ContactPlane,
+    EmulatedRobot,
+    ForceMode,
+    LinearMove,
+    ServoMove,
+    SpeedMove,
+    StopMove,
+    UrControllerParams,
+)
 
 pytestmark = pytest.mark.realtime
 

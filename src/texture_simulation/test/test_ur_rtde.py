@@ -5,12 +5,17 @@ import struct
 import numpy as np
 import pytest
 
-from texture_simulation.devices.ur.controller import EmulatedController
-from texture_simulation.devices.ur.dashboard import BANNER, DashboardSession
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.rtde import InputClaims, RtdeSession
-from texture_simulation.devices.ur.script import ScriptSession
-from texture_simulation.devices.ur.tables import VERSIONS, RtdeMessage
+from texture_simulation.devices.ur import (
+    BANNER,
+    VERSIONS,
+    DashboardSession,
+    EmulatedController,
+    InputClaims,
+    RtdeMessage,
+    RtdeSession,
+    ScriptSession,
+    UrControllerParams,
+)
 
 
 @pytest.fixture

@@ -1,50 +1,233 @@
-"""Contact of a soft round finger with a texture at 1 N; how it depends on the force is an effect."""
+"""Force on the skin of a finger along a trajectory: the chain from positions to the variation of the force."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+import numpy as np
 
-from texture_core.parameters import param
+from texture_core.types import Array
+from texture_simulation.effects import BatchShape, ForceEffect, GrowthEffect, PathEffect, TextureEffect
+from texture_simulation.friction import Drag, make_drag
+from texture_simulation.path import Trajectory, before_first
+from texture_simulation.scene import Scene
+from texture_simulation.surfaces import Surface
+
+MAX_TILT_RAD = (
+    0.5  # a fingertip that slides over a curved object tilts to it by so much at most; then the hand turns it
+)
+START_TILT_RAD = 0.15  # assumption: how far the grip turns a finger to a curved object, at most, in either direction
+SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
+# A point of a fast path stands for the stretch up to the next: the texture is blurred by at least so much of the step.
+# Half of the sampling rate is then measured to 17 %, what would be folded down to nearly 0 Hz to 0.1 %.
+MIN_BLUR_PER_STEP = 0.6
 
 
-@dataclass(frozen=True)
-class Contact:
-    """A finger pressed on a plane with 1 N."""
+class SkinContact:
+    """Follow the skin over one surface, block by block.
 
-    blur_m: float = param(
-        1.2e-4,
-        'Sets the standard deviation of the spatial low-pass of the skin; a larger value removes coarser texture.',
-        unit='m',
-        low=1e-5,
-        high=1e-3,
-    )
-    stiffness_n_m: float = param(
-        2000.0,
-        'Sets the force per height of the texture; a larger value gives stronger signals.',
-        unit='N/m',
-        low=1.0,
-        high=1e6,
-    )
-    tip_radius_m: float = param(
-        7e-3,
-        'Sets the radius of curvature of the fingertip; on a curved object a larger one changes the contact more.',
-        unit='m',
-        low=1e-3,
-        high=0.1,
-    )
+    Parameters
+    ----------
+    scene, surface
+        How the finger senses, and what; the surface may be changed between blocks.
+    rng
+        All randomness: where a sample is touched, what the effects do.
+    rate_hz
+        Points of the path a second.
+    finger
+        Which individual of the sensor.
+    batch_shape
+        () for one slide at a time, (count,) for many at once.
+    """
 
-    def on(self, radius_m: float) -> float:
-        """Return how much smaller than on a plane the contact is on a convex object: a factor, at most 1.
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        rate_hz: float,
+        *,
+        finger: int,
+        batch_shape: BatchShape,
+    ) -> None:
+        self._surface = surface
+        self._rate_hz = rate_hz
+        self._contact = scene.contact
+        self._rng = rng
+        self._batch_shape = batch_shape
+        self._finger = finger
+        self._before: tuple[Array, Array] | None = None
+        self._growths = scene.effects_of(GrowthEffect)
+        self._gains = scene.effects_of(TextureEffect)
+        self._trajectory_filters = [
+            effect.start_path(rng, rate_hz, batch_shape) for effect in scene.effects_of(PathEffect)
+        ]
+        self._force_filters = [
+            effect.start_force(rng, rate_hz, batch_shape) for effect in scene.effects_of(ForceEffect)
+        ]
+        self.relocate()
 
-        Two spheres touch as one of radius 1 / (1 / r + 1 / R) touches a plane, and size and stiffness of the contact
-        are as the cube root of that.
+    @property
+    def surface(self) -> Surface:
+        """What is touched."""
+        return self._surface
+
+    @surface.setter
+    def surface(self, surface: Surface) -> None:
+        self._surface = surface
+        self._drag = self._make_drag()
+
+    @property
+    def start_m(self) -> tuple[Array, Array]:
+        """Where on the sample a path begins that begins at (0, 0): x and y, (..., 1) each."""
+        return self._x_m, self._y_m
+
+    def relocate(self) -> None:
+        """Let the sample lie otherwise from now on: no two touches meet the same place."""
+        self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._batch_shape, 1))
+        curved = np.isfinite(self._surface.shape.radius_m)
+        shape = (2, *self._batch_shape, 1)
+        self._tilt_rad = self._rng.uniform(-START_TILT_RAD, START_TILT_RAD, shape) if curved else np.zeros(shape)
+        self._before = None
+        self._drag = self._make_drag()
+
+    def blur_m(self, force_n: float) -> float:
+        """Return over what length the contact averages under a force."""
+        return float(self._blur_and_stiffness(np.array([force_n]))[0][0])
+
+    def placed(self, path: Trajectory) -> Trajectory:
+        """Return where the skin goes on the sample."""
+        placed = path.moved(self._x_m, self._y_m)
+        for apply in self._trajectory_filters:
+            placed = apply(placed)
+        return placed
+
+    def variation_n(
+        self, placed: Trajectory, own_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
+    ) -> Array:
+        """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air.
 
         Parameters
         ----------
-        radius_m
-            Radius of curvature of the object, R; infinite for a plane.
+        placed
+            The next piece of the way, as `placed` returns it; n points.
+        own_blur_m, offset_m : (n_elements, 1)
+            Over what length each element of the finger averages by itself, and where it lies; of one element in the
+            middle of the finger, which may be as sharp as the contact, if not given.
 
-        Source: Hertz 1882.
+        Returns
+        -------
+        (..., n) or (..., n_elements, n)
         """
-        return 1.0 if math.isinf(radius_m) else (radius_m / (radius_m + self.tip_radius_m)) ** (1 / 3)
+        if not len(placed):
+            return np.empty((*placed.x_m.shape[:-1], *np.shape(own_blur_m)[:-1], 0))
+        force_n = constant(placed.force_n)
+        blur_m, gain = self._blur_and_stiffness(force_n)
+        blur_m = np.maximum(blur_m, MIN_BLUR_PER_STEP * self._steps_m(placed))
+        for effect in self._gains:
+            gain = gain * effect.gain(placed, self._finger)
+        x_m, y_m = placed.x_m, placed.y_m
+        if offset_m is not None:
+            x_m, y_m = x_m[..., None, :] + offset_m[0], y_m[..., None, :] + offset_m[1]
+            blur_m, gain = np.hypot(blur_m[..., None, :], own_blur_m), gain[..., None, :]
+        variation_n = gain * self._surface.height_m(x_m, y_m, blur_m)
+        drag = self._drag  # may be replaced from another thread, where a sample is swapped
+        if drag:
+            # One skin is dragged as a whole: all elements of a finger with several sense the same.
+            dragged_n = drag.advance(placed)
+            variation_n = variation_n + (dragged_n if offset_m is None else dragged_n[..., None, :])
+        for apply in self._force_filters:
+            variation_n = apply(placed, variation_n)
+        return np.asarray(variation_n)
+
+    def static_variation_n(self, placed: Trajectory, blur_m: float, offset_m: tuple[Array, Array]) -> Array:
+        """Return the same of slow elements at chosen points, (..., n_elements, n): without what shakes the skin.
+
+        Parameters
+        ----------
+        placed
+            Points of the trajectory on the sample, n of them.
+        blur_m
+            Length over which each element averages.
+        offset_m : (n_elements, 1)
+            Position x and y of each element in the finger.
+
+        Returns
+        -------
+        (..., n_elements, n)
+            N.
+        """
+        _, gain = self._blur_and_stiffness(placed.force_n)
+        for effect in self._gains:
+            gain = gain * effect.gain(placed, self._finger)
+        x_m, y_m = placed.x_m[..., None, :] + offset_m[0], placed.y_m[..., None, :] + offset_m[1]
+        height = self._surface.height_m(x_m, y_m, np.full((1,), blur_m))
+        return np.asarray(gain[..., None, :] * height)
+
+    def centre_m(self, placed: Trajectory) -> tuple[Array | float, Array | float]:
+        """Return where on the fingertip the load is, x and y, (..., n) each; 0 on a plane.
+
+        Over a curved object the place wanders as the finger slides on: the normal of the object turns by the way over
+        the sum of both radii, as the finger keeps its direction.
+
+        Parameters
+        ----------
+        placed
+            Points of the trajectory on the sample, n of them.
+
+        Returns
+        -------
+        (..., n), or a number
+            x, m.
+        (..., n), or a number
+            y, m.
+        """
+        radius_m, tip_m = self._surface.shape.radius_m, self._contact.tip_radius_m
+        if np.isinf(radius_m):
+            return 0.0, 0.0
+        ways = placed.x_m - self._x_m, placed.y_m - self._y_m
+        tilts = [start + way / (radius_m + tip_m) for start, way in zip(self._tilt_rad, ways, strict=True)]
+        x_m, y_m = (tip_m * np.clip(tilt, -MAX_TILT_RAD, MAX_TILT_RAD) for tilt in tilts)
+        return x_m, y_m
+
+    @property
+    def patch_share(self) -> float:
+        """How much smaller than on a plane the contact is, at most 1."""
+        return self._contact.on(self._surface.shape.radius_m)
+
+    def _make_drag(self) -> Drag | None:
+        """Return what senses the friction from here on, if there is any."""
+        friction = self._surface.friction
+        return make_drag(friction, self._rate_hz, self._rng, self._batch_shape) if friction else None
+
+    def _blur_and_stiffness(self, force_n: Array) -> tuple[Array, Array]:
+        """Return blur and stiffness at forces."""
+        share = self.patch_share
+        blur_m: Array = share * self._contact.blur_m * np.ones_like(force_n)
+        stiffness: Array = share * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
+        for effect in self._growths:
+            blur_m, stiffness = blur_m * effect.blur_growth(force_n), stiffness * effect.gain_growth(force_n)
+        return blur_m, stiffness
+
+    def _steps_m(self, placed: Trajectory) -> Array:
+        """Return how far it is from point to point, (..., n), or (..., 1) where that hardly matters."""
+        x_m, y_m = self._before or before_first(placed)
+        self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
+        step_x, step_y = np.diff(placed.x_m, prepend=x_m), np.diff(placed.y_m, prepend=y_m)
+        longest = np.abs(step_x).max(initial=0.0) + np.abs(step_y).max(initial=0.0)
+        if MIN_BLUR_PER_STEP * longest < self._contact.blur_m / 2:
+            return np.zeros_like(placed.x_m[..., :1])
+        steps: Array = np.hypot(step_x, step_y)
+        return steps
+
+
+def constant(values: Array) -> Array:
+    """Return (..., 1) of values that numpy repeats without a copy, as `numpy.broadcast_to` does, else the values.
+
+    Parameters
+    ----------
+    values : (..., n)
+
+    Returns
+    -------
+    (..., 1) or (..., n)
+    """
+    return values[..., :1] if values.strides and values.strides[-1] == 0 and values.shape[-1] else values

@@ -1,24 +1,432 @@
-"""The emulator: a scene under a finger and an emulated sensor that measures it, in real time."""
+"""The emulated rig: one scene, its finger, its devices, driven by the motion that an arm reports."""
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from pathlib import Path as FilePath
+from typing import Protocol
 
 import numpy as np
 
-from texture_core.catalogue import find
-from texture_simulation.devices.device import EmulatedDevice
-from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.devices.tsf85 import EmulatedTsf85
-from texture_simulation.devices.tsf85_encoder import FINGERS
-from texture_simulation.emulator_params import EmulatorParams
-from texture_simulation.finger_receiver import FingerStateReceiver
-from texture_simulation.live_catalogue import LIVE_SENSORS, MakeLiveSensor, live_tsf85, live_tsf85_pair
+from texture_core.config import find, param
+from texture_core.errors import DeviceError
+from texture_core.types import LOOPBACK, NANOSECONDS, FingerState
+from texture_drivers.biotac import LAYOUTS
+from texture_drivers.tsf85 import LAYOUTS as TSF85S
+from texture_drivers.tsf85 import RATE_HZ
+from texture_simulation import sensor_models
+from texture_simulation.devices.fingers import (
+    FINGERS,
+    ByteFaults,
+    EmulatedAnySkin,
+    EmulatedBioTac,
+    EmulatedDaq,
+    EmulatedDevice,
+    EmulatedPapillArray,
+    EmulatedPvdf,
+    EmulatedTsf85,
+)
+from texture_simulation.path import FingerTrack, Trajectory
 from texture_simulation.scene import Scene, load_scene
+from texture_simulation.surfaces import Surface
+
+# --------------------
+# Receive finger states from emulated arms: datagrams on loopback.
+
+
+class FingerStateReceiver:
+    """A bound UDP socket, read without waiting; port 0 takes any free one.
+
+    Raises
+    ------
+    DeviceError
+        If the port is taken.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.received = 0
+        self.refused = 0  # datagrams that are no finger state
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind((LOOPBACK, port))
+        except OSError as error:
+            self._socket.close()
+            raise DeviceError(
+                f'UDP port {port} for the finger cannot be opened: {error}; choose another, or end what has it'
+            ) from error
+
+    @property
+    def port(self) -> int:
+        """The port in use."""
+        return int(self._socket.getsockname()[1])
+
+    def states(self) -> list[FingerState]:
+        """Return what has come since the last call."""
+        states = []
+        while (data := self._receive()) is not None:
+            state = FingerState.from_bytes(data)
+            self.received += 1
+            self.refused += state is None
+            if state is not None:
+                states.append(state)
+        return states
+
+    def _receive(self) -> bytes | None:
+        try:
+            return self._socket.recv(256)
+        except BlockingIOError:
+            return None
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+
+# --------------------
+# Sensors on the emulator: a model on its device, brought forward in real time.
+
+# After a longer stall of the machine the rest is skipped, and the driver sees a loss: the line's buffer takes no more.
+LONGEST_BURST_S = 0.25
+
+
+class SurfaceContact(Protocol):
+    """Where a finger, or several, touch a surface."""
+
+    @property
+    def surface(self) -> Surface:
+        """What is touched; it may be set."""
+
+    @surface.setter
+    def surface(self, surface: Surface) -> None: ...
+
+    def relocate(self) -> None:
+        """Let the sample lie otherwise from now on."""
+
+
+class ContactModel(Protocol):
+    """What a sensor model lets the emulator change."""
+
+    @property
+    def touch(self) -> SurfaceContact:
+        """Where it touches."""
+
+
+class LiveSensor:
+    """Follow the finger with one sensor.
+
+    Parameters
+    ----------
+    model, device
+        What senses, and what sends.
+    measure
+        Measures along a piece of path and sends.
+    skip
+        Lets so many steps pass of which nothing is sent.
+    rate_hz
+        Steps a second: samples, or frames of them.
+    points
+        Of the path in a step.
+    """
+
+    def __init__(
+        self,
+        model: ContactModel,
+        device: EmulatedDevice,
+        measure: Callable[[Trajectory], None],
+        skip: Callable[[int], None],
+        *,
+        rate_hz: float,
+        points: int,
+    ) -> None:
+        self.model = model
+        self.device = device
+        self.done = 0  # steps, those that were skipped among them
+        self.skipped = 0
+        self._measure = measure
+        self._skip = skip
+        self._rate_hz = rate_hz
+        self._points = points
+        self._track = FingerTrack()
+        self._start_ns: int | None = None
+
+    def update(self, state: FingerState) -> None:
+        """Take note of where the finger is."""
+        self._track.update(state)
+
+    def advance(self, now_ns: int) -> None:
+        """Measure and send what is due; the first call is the beginning of time."""
+        self._start_ns = now_ns if self._start_ns is None else self._start_ns
+        due = int((now_ns - self._start_ns) / NANOSECONDS * self._rate_hz) - self.done
+        skipped = max(0, due - round(LONGEST_BURST_S * self._rate_hz))
+        if skipped:
+            self.skipped += skipped
+            self._skip(skipped)
+        self.done += due
+        if due > skipped:
+            self._slide(due - skipped, self._start_ns + round(self.done / self._rate_hz * NANOSECONDS))
+
+    def _slide(self, steps: int, until_ns: int) -> None:
+        was_touching = self._track.touching
+        path = self._track.advance(until_ns, self._points * steps, self._points * self._rate_hz)
+        if not was_touching and self._track.touching:
+            self.model.touch.relocate()
+        self._measure(path)
+
+
+# --------------------
+# The sensors that can be emulated live: each model with the device that it sends through.
+
+
+class MakeLiveSensor(Protocol):
+    """Makes a live sensor."""
+
+    def __call__(self, scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator, /) -> LiveSensor:
+        """Return the sensor, not started: its first `advance` is the beginning of its time.
+
+        Parameters
+        ----------
+        scene
+            Scene: sensor, contact and effects.
+        surface
+            Surface that is touched.
+        link
+            Symbolic link that leads to the device.
+        rng
+            All random numbers: positions on the sample, effects, noise.
+
+        Returns
+        -------
+        LiveSensor
+        """
+
+
+def live_tsf85(
+    scene: Scene,
+    surface: Surface,
+    link: FilePath,
+    rng: np.random.Generator,
+    *,
+    layout: str = 'tsf85',
+    finger: int = 0,
+    long_stamps: bool = True,
+) -> LiveSensor:
+    """Return a TSF-85 of which one finger touches.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    layout
+        Name of the layout of the fingertip.
+    finger
+        Which individual of the sensor.
+    long_stamps
+        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+
+    Returns
+    -------
+    LiveSensor
+        Closed when its context ends.
+    """
+    model = sensor_models.Tsf85Model(scene, surface, rng, TSF85S[layout])
+    return _of_tsf85(model, EmulatedTsf85(link, rng, finger, long_stamps))
+
+
+def live_tsf85_pair(
+    scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator, *, long_stamps: bool = True
+) -> LiveSensor:
+    """Return a TSF-85 of which both fingers touch.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    long_stamps
+        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+
+    Returns
+    -------
+    LiveSensor
+        Not started: its first `advance` is the beginning of its time.
+    """
+    return _of_tsf85(sensor_models.Tsf85Pair(scene, surface, rng), EmulatedTsf85(link, rng, long_stamps=long_stamps))
+
+
+def _of_tsf85(model: sensor_models.Tsf85Model | sensor_models.Tsf85Pair, device: EmulatedTsf85) -> LiveSensor:
+    """Return the sensor of a TSF-85, whether one finger touches or both."""
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.advance(*model.advance(path)),
+        device.skip,
+        rate_hz=RATE_HZ,
+        points=sensor_models.TSF85_OVERSAMPLING,
+    )
+
+
+def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return a BioTac alone on its board."""
+    model, device = sensor_models.BioTacModel(scene, surface, rng, LAYOUTS['biotac']), EmulatedBioTac(link, rng)
+    return _on_board(model, device, lambda path: device.advance(model.advance(path)[:, :, None]))
+
+
+def live_biotac_hand(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return a board with BioTacs on two fingers."""
+    model = sensor_models.BioTacHand(scene, surface, rng, LAYOUTS['biotac'])
+    device = EmulatedBioTac(link, rng, sensor_models.SERIALS)
+    return _on_board(model, device, lambda path: device.advance(model.advance(path)))
+
+
+def _on_board(
+    model: sensor_models.BioTacModel | sensor_models.BioTacHand,
+    device: EmulatedBioTac,
+    advance: Callable[[Trajectory], None],
+) -> LiveSensor:
+    """Return the sensor of a board whose fingers are all served at the rate of its frames."""
+    rate_hz, points = LAYOUTS['biotac'].frame_rate_hz, model.points_per_frame
+    return LiveSensor(model, device, advance, device.skip, rate_hz=rate_hz, points=points)
+
+
+def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return the finger of paper 3."""
+    model, device = sensor_models.DaqModel(scene, surface, rng), EmulatedDaq(link, rng)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.sample(model.advance(path)),
+        lambda samples: device.skip(samples / sensor_models.DAQ_RATE_HZ),
+        rate_hz=sensor_models.DAQ_RATE_HZ,
+        points=sensor_models.DAQ_OVERSAMPLING,
+    )
+
+
+def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return the finger of paper 5."""
+    model, device = sensor_models.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng)
+    rate_hz = sensor_models.PVDF_PATH_RATE_HZ / sensor_models.PVDF_OVERSAMPLING
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.sample(*model.advance(path)),
+        lambda samples: device.skip(samples / rate_hz),
+        rate_hz=rate_hz,
+        points=sensor_models.PVDF_OVERSAMPLING,
+    )
+
+
+def live_anyskin(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return an AnySkin."""
+    model, device = sensor_models.AnySkinModel(scene, surface, rng), EmulatedAnySkin(link, rng)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.sample(model.advance(path)),
+        device.skip,
+        rate_hz=sensor_models.ANYSKIN_RATE_HZ,
+        points=sensor_models.ANYSKIN_OVERSAMPLING,
+    )
+
+
+def live_papillarray(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return a PapillArray alone on its hub."""
+    model, device = sensor_models.PapillArrayModel(scene, surface, rng), EmulatedPapillArray(link, rng)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.sample(model.advance(path)[:, None]),
+        device.skip,
+        rate_hz=sensor_models.PAPILLARRAY_PATH_RATE_HZ,
+        points=1,
+    )
+
+
+LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
+    'tsf85': live_tsf85,
+    'tsf85_pair': live_tsf85_pair,
+    'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
+    'biotac': live_biotac,
+    'biotac_hand': live_biotac_hand,
+    'daq': live_daq,
+    'pvdf': live_pvdf,
+    'anyskin': live_anyskin,
+    'papillarray': live_papillarray,
+}
+
+
+# --------------------
+# The parameters of the emulated rig.
+
+
+@dataclass(frozen=True)
+class EmulatorParams:
+    """What is emulated and where it is reached."""
+
+    scene: str = param(
+        'twelve_textures', 'Sets the scene that is emulated: the name of a shipped one or the path of a scene file.'
+    )
+    surface: str = param('glass', 'Sets the surface under the finger; setting it at run time swaps the sample.')
+    seed: int = param(0, 'Sets the seed of all randomness; equal seeds give equal signals.', low=0)
+    sensor: str = param(
+        '',
+        "Sets the emulated sensor, which appears at `sensor_link`; '' takes that of the scene.",
+        choices=('', *LIVE_SENSORS),
+    )
+    sensor_link: str = param(
+        '/tmp/texture/tsf85',
+        'Sets the path of the symbolic link to the emulated sensor, which is the device path of the sensor node.',
+    )
+    finger: int = param(0, 'Sets the index of the finger of a TSF-85 that touches the surface.', low=0, high=1)
+    long_stamps: bool = param(
+        True,
+        'Lets the TSF-85 send 64-bit stamps as firmware from 1.1.7 on does; false sends the 16-bit stamps '
+        'of older firmware.',
+    )
+    daq_link: str = param(
+        '', "Sets the path of the link to a data acquisition finger beside the sensor; '' leaves it out."
+    )
+    pvdf_link: str = param('', "Sets the path of the link to a PVDF finger beside the sensor; '' leaves it out.")
+    plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
+    unplugged_finger: int = param(
+        -1,
+        'Sets the finger of a TSF-85 whose plug is out of the hub, which may be set at run time; -1 is none.',
+        low=-1,
+        high=1,
+    )
+    bit_flips: float = param(
+        0.0,
+        'Sets the probability that one bit of a byte of the sensor flips on the line; it may be set at run time.',
+        low=0.0,
+        high=1.0,
+    )
+    finger_port: int = param(
+        28500,
+        'Sets the UDP port on loopback at which finger states are received; 0 takes any free port.',
+        low=0,
+        high=65535,
+    )
+
+
+# --------------------
+# The emulator: a scene under a finger and an emulated sensor that measures it, in real time.
 
 BURST_S = 0.005
 
@@ -80,7 +488,7 @@ class Emulator:
 
     @property
     def finger_port(self) -> int:
-        """UDP port for `texture_core.finger_state.FingerState` datagrams."""
+        """UDP port for `texture_core.types.FingerState` datagrams."""
         return self._link.port
 
     @property

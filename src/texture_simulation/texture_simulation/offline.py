@@ -1,23 +1,128 @@
-"""Recordings without devices: whole explorations at thousands of times real time."""
+"""Simulate slides without a clock: batches, bags, data sets."""
 
 from __future__ import annotations
 
+import heapq
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from texture_core.arrays import Array, Samples
-from texture_core.catalogue import find
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_simulation.effects.protocols import SlideEffect
-from texture_simulation.frictions import sliding_coefficient
-from texture_simulation.scene import Scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sensors.model import SensorKind, SimulatedStream
-from texture_simulation.simulated_slide import SimulatedSlide, trajectory_along
-from texture_simulation.slide_batches import simulate_slide_streams, simulate_slides
+from texture_core.config import find, param
+from texture_core.types import NANOSECONDS, Array, ExplorationState, Phase, Samples, TactileSignal
+from texture_recordings.bags import BagWriter
+from texture_simulation.effects import SlideEffect
+from texture_simulation.friction import sliding_coefficient
+from texture_simulation.path import SimulatedSlide, trajectory_along
+from texture_simulation.scene import Scene, load_scene
+from texture_simulation.sensor_models import SENSORS, SensorKind, SimulatedStream
+
+# --------------------
+# Simulate many short slides at once, as plain arrays: for training, where thousands are needed.
+
+POINTS_AT_ONCE = 40_000  # so that what is computed stays in the processor's cache
+
+
+def simulate_slides(
+    scene: Scene, surface: str, count: int, sliding: SimulatedSlide, rng: np.random.Generator, *, finger: int = 0
+) -> Samples:
+    """Return steady slides over one surface: the fast stream, (count, n_samples, n_channels).
+
+    Each slide meets another place of the sample, with the scene's effects. The samples are in the unit the driver
+    publishes. Speed, force and direction of `sliding` may be arrays (count,).
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Name of the surface.
+    count
+        Number of slides.
+    sliding
+        Speed, force, direction and duration of the slides.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    finger
+        Which individual of the sensor.
+
+    Returns
+    -------
+    (count, n_samples, n_channels)
+        In the unit the driver publishes.
+    """
+    return simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=False)['signal']
+
+
+def simulate_slide_streams(
+    scene: Scene,
+    surface: str,
+    count: int,
+    sliding: SimulatedSlide,
+    rng: np.random.Generator,
+    *,
+    finger: int = 0,
+    slow: bool = True,
+) -> dict[str, Samples]:
+    """Return the same by topic, with the slow stream if the sensor has one.
+
+    Parameters
+    ----------
+    scene, surface
+        What is touched.
+    count
+        How many slides.
+    sliding
+        How each goes.
+    rng
+        Decides where the sample is touched, and all effects.
+    finger
+        Which individual of the sensor.
+    slow
+        Whether the slow stream is wanted.
+
+    Returns
+    -------
+    dict
+        Samples by topic, (count, n_samples, n_channels).
+    """
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    touched = scene.surface(surface)
+    lengths = {stream.topic: round(sliding.duration_s * stream.rate_hz) for stream in kind.streams}
+    n_points = kind.step_points * math.ceil(sliding.duration_s * kind.path_rate_hz / kind.step_points - 1e-6)
+    made: dict[str, list[Samples]] = {}
+    for speed_m_s, force_n, part in _parts(scene, count, sliding, rng, n_points * len(kind.fast.channels)):
+        model = kind.make(
+            scene.of_finger(finger), touched, rng, finger=finger, batch_shape=(len(speed_m_s),), settled=True
+        )
+        path = part.steady_path(speed_m_s, force_n, n_points, kind.path_rate_hz)
+        for topic, samples in model.streams(path, slow=slow).items():
+            made.setdefault(topic, []).append(samples[:, : lengths[topic]])
+    return {topic: np.concatenate(parts) for topic, parts in made.items()}
+
+
+def _parts(
+    scene: Scene, count: int, sliding: SimulatedSlide, rng: np.random.Generator, points: int
+) -> Iterator[tuple[Array, Array, SimulatedSlide]]:
+    """Yield speed and force, (n, 1) each, as they become, and how these n slides go."""
+    speed_m_s, force_n, direction = (
+        np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
+        for value in (sliding.speed_m_s, sliding.force_n, sliding.direction_rad)
+    )
+    for effect in scene.effects_of(SlideEffect):
+        speed_m_s, force_n = effect.slide(speed_m_s, force_n, rng)
+    size = max(1, POINTS_AT_ONCE // points)
+    for first in range(0, count, size):
+        here = slice(first, first + size)
+        part = SimulatedSlide(speed_m_s[here], force_n[here], sliding.duration_s, direction[here], sliding.radius_m)
+        yield speed_m_s[here, None], force_n[here, None], part
+
+
+# --------------------
+# Recordings without devices: whole explorations at thousands of times real time.
 
 __all__ = [
     'SimulatedRecording',
@@ -234,3 +339,117 @@ def _batches(samples: Samples, stream: SimulatedStream, start_ns: int) -> list[T
         )
         for first in range(0, len(values), per_batch)
     ]
+
+
+# --------------------
+# Slides over the surfaces of a simulated scene, as labelled bags: no recording is needed, and any number is had.
+
+START_NS = 1_000_000_000 * NANOSECONDS
+PAUSE_NS = NANOSECONDS
+DELAY_NS = 100_000  # a batch is logged this long after its last sample, a state at its stamp
+Logged = tuple[int, str, Any]
+
+
+@dataclass(frozen=True)
+class SlidePlan:
+    """How each surface is explored."""
+
+    slides: int = param(10, 'Sets the number of slides over each surface.', low=1, high=100_000)
+    speed_m_s: float = param(
+        0.1,
+        'Sets the speed along the surface; a higher speed raises all frequencies of the signal.',
+        unit='m/s',
+        low=0.001,
+        high=1.0,
+    )
+    force_n: float = param(
+        2.0, 'Sets the normal force; a larger force gives a stronger signal.', unit='N', low=0.05, high=20.0
+    )
+    slide_s: float = param(3.0, 'Sets the duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
+    direction_rad: float = param(
+        0.0, 'Sets the direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0
+    )
+    fingers: int = param(
+        1,
+        "Sets the number of fingers that slide together; the topics of several are 'finger0/signal' and so on.",
+        low=1,
+        high=5,
+    )
+
+
+def write_simulated(
+    out: str | Path,
+    plan: SlidePlan,
+    rng: np.random.Generator,
+    scene: str = 'twelve_textures',
+    surfaces: Sequence[str] = (),
+) -> list[Path]:
+    """Write one bag a surface, named after it, and return their paths.
+
+    Parameters
+    ----------
+    out
+        Folder for the bags; made if missing.
+    plan
+        How many slides, how fast, how hard and which way.
+    rng
+        Decides where the surfaces are touched, errors and noise.
+    scene, surfaces
+        Name or file of the scene, and which of its surfaces; all if none is named.
+
+    Returns
+    -------
+    list of Path
+        Of the bags.
+    """
+    table = load_scene(scene)
+    chosen = [table.surface(name).name for name in surfaces] or list(table.surfaces)
+    start_ns = START_NS
+    for surface in chosen:
+        start_ns = _write_surface(Path(out) / surface, table, plan, start_ns, rng)
+    return [Path(out) / surface for surface in chosen]
+
+
+def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng: np.random.Generator) -> int:
+    """Write the bag of one surface, named as the path; return when the next one may start."""
+    first: dict[str, int] = {}
+    with BagWriter(path) as bag:
+        for number in range(1, plan.slides + 1):
+            states, signals = _slide(scene, plan, start_ns, f'{path.name}/slide{number:02d}', rng)
+            streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
+            for log_ns, topic, value in _in_order(states, streams):
+                bag.write(topic, value, log_ns)
+            start_ns = log_ns + PAUSE_NS
+    return start_ns
+
+
+def _slide(
+    scene: Scene, plan: SlidePlan, start_ns: int, exploration_id: str, rng: np.random.Generator
+) -> tuple[list[ExplorationState], dict[str, Iterable[TactileSignal]]]:
+    """Return the states of a slide, and the signals of all its fingers by topic, each finger with traits of its own."""
+    surface = exploration_id.rpartition('/')[0]
+    signals: dict[str, Iterable[TactileSignal]] = {}
+    for finger in reversed(range(plan.fingers)):
+        states, of_finger = simulate_exploration(
+            scene, surface, plan.speed_m_s, plan.force_n, plan.slide_s,
+            start_ns=start_ns, exploration_id=exploration_id, rng=rng,
+            direction_rad=plan.direction_rad, finger=finger,
+        )  # fmt: skip
+        prefix = f'finger{finger}/' if plan.fingers > 1 else ''
+        signals |= {f'{prefix}{topic}': batches for topic, batches in of_finger.items()}
+    return states, signals
+
+
+def _running_on(batches: Iterable[TactileSignal], first: dict[str, int], topic: str) -> list[TactileSignal]:
+    """Number the samples of a slide on from those of the slide before, as a driver does that is not restarted."""
+    offset = first.get(topic, 0)
+    moved = [replace(batch, first_sample=batch.first_sample + offset) for batch in batches]
+    first[topic] = moved[-1].next_sample
+    return moved
+
+
+def _in_order(states: Iterable[Any], streams: dict[str, list[TactileSignal]]) -> Iterator[Logged]:
+    tracks: list[Iterable[Logged]] = [[(state.stamp_ns, 'exploration', state) for state in states]]
+    for topic, batches in streams.items():
+        tracks.append([(batch.end_ns + DELAY_NS, topic, batch) for batch in batches])
+    return heapq.merge(*tracks, key=lambda logged: logged[0])

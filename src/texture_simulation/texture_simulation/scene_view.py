@@ -10,18 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.signal import welch
 
-from texture_core.arrays import Array
-from texture_core.catalogue import find
-from texture_core.parameters import param
+from texture_core.config import find, param
+from texture_core.types import Array
+from texture_simulation.path import SimulatedSlide, Trajectory
 from texture_simulation.scene import Scene
-from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.surfaces.circles import Circles
-from texture_simulation.surfaces.grating import Grating
-from texture_simulation.surfaces.grid import Grid
-from texture_simulation.surfaces.surface import MIN_BLUR_M, Surface
-from texture_simulation.surfaces.weave import Weave
-from texture_simulation.trajectory import Trajectory
+from texture_simulation.sensor_models import SENSORS
+from texture_simulation.surfaces import MIN_BLUR_M, Circles, Grating, Grid, Surface, Weave
 
 MIN_SIDE_M = 8e-3  # of the relief that is shown
 MAX_POINTS = 700  # of the relief along its longer side

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions, importing_once
-from texture_core.command_options import add_seed
+from texture_core.cli import add_seed
 from texture_core.errors import InvalidData, InvalidParameter
 
 ALL = 'all'

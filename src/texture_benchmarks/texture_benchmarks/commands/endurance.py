@@ -7,7 +7,7 @@ from pathlib import Path
 
 from texture_benchmarks.ros.soak import SoakPlan, endure
 from texture_benchmarks.soak import check_requirements, write
-from texture_core.command_options import add_seed
+from texture_core.cli import add_seed
 from texture_core.errors import InvalidData
 
 

@@ -17,16 +17,13 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from texture_core.arrays import Array
 from texture_core.errors import DeviceError
-from texture_core.estimates import TextureEstimate
-from texture_core.exploration import ExplorationState
-from texture_core.node_process import NodeProcess
-from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.ros import from_msg, to_msg
+from texture_core.ros_testing import NodeProcess
+from texture_core.types import NANOSECONDS, Array, ExplorationState, TactileSignal, TextureEstimate
 from texture_estimation.model import load_model
-from texture_features.windowing.sample_buffer import INDEX_TOLERANCE
-from texture_recordings.ros.topics import TOPICS, Topic
+from texture_features.windows import INDEX_TOLERANCE
+from texture_recordings.ros import TOPICS, Topic
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 

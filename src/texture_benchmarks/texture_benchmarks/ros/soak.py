@@ -28,16 +28,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
 from texture_benchmarks import soak
-from texture_bringup.demo.isolation import Isolation, isolate
-from texture_bringup.ros.operator import Operator
+from texture_bringup.demo import Isolation, isolate
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import Operator
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted, TextureError
-from texture_core.exploration import ExplorationRequest
-from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
-from texture_core.ros.time import to_ns
+from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, to_ns
+from texture_core.types import ExplorationRequest
 from texture_evaluation.train import train_from_bags
-from texture_launch.child import ChildLauncher
+from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 
 class Listener:

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from texture_core.arrays import Array
-from texture_estimation.roughness.evidence import RoughnessAccumulator
-from texture_estimation.roughness.model import RoughnessModel
-from texture_features.windowing.windows import CutWindow
+from texture_core.types import Array
+from texture_estimation.roughness import RoughnessAccumulator, RoughnessModel
+from texture_features.windows import CutWindow
 
 WARM_UP = 200
 

@@ -6,9 +6,7 @@ import numpy as np
 
 from texture_benchmarks.roughness.grade_latency import times_us
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, histogram_chart
-from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_estimation.roughness.training import train_grades
+from texture_estimation.roughness import TEST, TRAIN, load_roughness_recipe, read_grades, train_grades
 from texture_papers.rispal_experiment import FORCE_N, SPEED_M_S, USED_S, SimulatedTextures
 from texture_simulation.scene import load_scene
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.dashboard.access import TOKEN_VARIABLE
+from texture_bringup.dashboard import TOKEN_VARIABLE
 from texture_bringup.nodes.dashboard import DashboardNode, DashboardParams
-from texture_core.ros.run_node import run_node
+from texture_core.ros import run_node
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_bringup.demo.plan import DemoPlan
-from texture_bringup.demo.progress_log import ProgressLog
-from texture_bringup.demo.run import demonstrate
-from texture_core.command_options import add_channels, add_seed
+from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate
+from texture_core.cli import add_channels, add_seed
 from texture_evaluation.commands.train import WITH_SLOW_CHANNELS
 
 

@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from texture_bringup.ros.operator import ExplorationResult, Operator
-from texture_core.catalogue import find
+from texture_bringup.operator import ExplorationResult, Operator
+from texture_core.config import find
 from texture_core.errors import MotionRefused
-from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_core.exploration import ExplorationRequest, ExplorationState
-from texture_exploration.motions.catalogue import MOTIONS
+from texture_core.types import ExplorationRequest, ExplorationState, RoughnessEstimate, TextureEstimate
+from texture_exploration.motions import MOTIONS
 
 # Option, field of the request, unit or '', meaning.
 NUMBERS = (

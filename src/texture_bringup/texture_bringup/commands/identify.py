@@ -7,13 +7,11 @@ import argparse
 import numpy as np
 
 from texture_bringup.commands.explore import progress_line, show_progress, tell
-from texture_bringup.ros.operator import Operator
-from texture_core.arrays import Array
+from texture_bringup.operator import Operator
 from texture_core.errors import InvalidParameter
-from texture_core.exploration import ExplorationRequest
-from texture_core.slide_motion import SlideMotion
+from texture_core.types import Array, ExplorationRequest, SlideMotion
 from texture_estimation.model import TextureModel, load_model
-from texture_estimation.next_motion.next_touch_model import NextTouchModel, slide_values
+from texture_estimation.next_motion import NextTouchModel, slide_values
 
 SHOWN = 3  # textures, of those that are possible
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.ros.operator import Operator
+from texture_bringup.operator import Operator
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -4,15 +4,161 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from texture_bringup.scene_charts import caption, slide_picture, table_picture
-from texture_core.command_options import add_seed
-from texture_core.parameters import from_mapping
+from texture_core.cli import add_seed
+from texture_core.config import from_mapping
+from texture_evaluation.charts import COLOURS, chart
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.scene_view import ViewPlan, view
+from texture_simulation.scene_view import SceneView, ViewPlan, view
+
+# --------------------
+# Pictures of simulated scenes: one slide on a page, or all surfaces of a scene below each other.
+
+MM, UM = 1e3, 1e6
+SHOWN_S = 0.25
+WIDE = 2.5  # times as wide as high
+MIN_DENSITY = 1e-6  # of the highest: what lies below is not shown
+RELIEF_COLOURS = 'cividis'
+
+
+def slide_picture(view: SceneView, title: str, path: str | Path) -> Path:
+    """Draw one slide: relief with the way, profile, signal and spectrum.
+
+    Parameters
+    ----------
+    view
+        What the finger meets and measures.
+    title
+        Above the panels.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    wide = (view.extent_m[1] - view.extent_m[0]) > WIDE * (view.extent_m[3] - view.extent_m[2])
+    with chart(path, (11.0, 5.8 if wide else 7.2), title) as figure:
+        # A straight way lies above the curves, a round one beside them.
+        parts: Any = (
+            figure.subfigures(2, 1, height_ratios=[0.8, 1.0])
+            if wide
+            else figure.subfigures(1, 2, width_ratios=[1.2, 1])
+        )
+        surface, curves = parts
+        relief = surface.subplots()
+        profile, signal, spectrum = curves.subplots(*((1, 3) if wide else (3, 1)))
+        image = _relief(relief, view)
+        below = {} if wide else {'location': 'bottom'}
+        surface.colorbar(image, ax=relief, label='height (µm)', fraction=0.03, **below)
+        relief.set_title('1. The surface, and the way of the finger (from the dot)')
+        _profile(profile, view)
+        profile.set_title('2. Height along the way')
+        profile.legend(loc='upper center', bbox_to_anchor=(0.5, -0.2), ncols=2, fontsize=8)
+        _signal(signal, view)
+        signal.set_title(f'3. What the sensor publishes: {view.channel}')
+        _spectrum(spectrum, view)
+        spectrum.set_title('4. Its power' + ('; dotted: speed / pitch' if view.lines_hz else ''))
+    return Path(path)
+
+
+def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
+    """Draw all surfaces of a scene, one in each row.
+
+    Parameters
+    ----------
+    views
+        One for each surface.
+    title
+        Above the panels.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    with chart(path, (13.0, 0.8 + 1.75 * len(views)), title) as figure:
+        rows = figure.subplots(len(views), 4, squeeze=False, width_ratios=[1.5, 1, 1, 1])
+        for (relief, profile, signal, spectrum), view in zip(rows, views, strict=True):
+            image = _relief(relief, view)
+            figure.colorbar(image, ax=relief, label='µm', fraction=0.03)
+            relief.set_title(view.surface, fontweight='bold')
+            _profile(profile, view)
+            _signal(signal, view)
+            _spectrum(spectrum, view)
+        for axes, name in zip(rows[0][1:], ('height along the way', 'signal', 'its power'), strict=True):
+            axes.set_title(name)
+        rows[0][1].legend(loc='upper center', bbox_to_anchor=(0.5, -0.3), ncols=2, fontsize=7)
+    return Path(path)
+
+
+def caption(name: str, sensor: str, plan: ViewPlan) -> str:
+    """Return what is shown, in one line.
+
+    Parameters
+    ----------
+    name
+        Name of the scene.
+    sensor
+        Name of the sensor.
+    plan
+        Speed, force and way of the finger.
+
+    Returns
+    -------
+    str
+    """
+    way = f'a circle of {MM * plan.radius_m:g} mm' if plan.radius_m else 'a line'
+    return f'{name}, simulated: along {way} at {plan.speed_m_s:g} m/s with {plan.force_n:g} N ({sensor})'
+
+
+def _relief(axes: Any, view: SceneView) -> Any:
+    image = axes.imshow(
+        UM * view.relief_m,
+        origin='lower',
+        extent=[MM * edge for edge in view.extent_m],
+        cmap=RELIEF_COLOURS,
+        aspect='equal',
+    )
+    axes.plot(MM * view.way.x_m, MM * view.way.y_m, color='white', linewidth=2.4)
+    axes.plot(MM * view.way.x_m, MM * view.way.y_m, color=COLOURS[5], linewidth=1.2)
+    axes.plot(MM * view.way.x_m[0], MM * view.way.y_m[0], 'o', color=COLOURS[5], markeredgecolor='white')
+    axes.grid(visible=False)
+    axes.set_anchor('W')
+    axes.set(xlabel='x (mm)', ylabel='y (mm)')
+    return image
+
+
+def _profile(axes: Any, view: SceneView) -> None:
+    axes.plot(MM * view.along_m, UM * view.sharp_m, color=COLOURS[4], linewidth=0.8, label='as it is')
+    axes.plot(MM * view.along_m, UM * view.blurred_m, color=COLOURS[0], linewidth=1.2, label='as the skin measures it')
+    axes.set(xlabel='way (mm)', ylabel='height (µm)')
+    axes.set_xlim(0, MM * view.along_m[-1])
+
+
+def _signal(axes: Any, view: SceneView) -> None:
+    shown = view.time_s <= SHOWN_S
+    axes.plot(view.time_s[shown], view.signal[shown], color=COLOURS[0], linewidth=0.8)
+    axes.set(xlabel='time (s)', ylabel=f'signal ({view.unit})')
+
+
+def _spectrum(axes: Any, view: SceneView) -> None:
+    axes.semilogy(view.frequency_hz[1:], view.density[1:], color=COLOURS[0], linewidth=1.0)
+    for line in view.lines_hz:
+        axes.axvline(line, color=COLOURS[5], linestyle=':', linewidth=1.2)
+    axes.set(xlabel='frequency (Hz)', ylabel=f'{view.unit}²/Hz')
+    axes.set_xlim(0, view.frequency_hz[-1])
+    highest = view.density[1:].max()
+    if highest > 0:
+        axes.set_ylim(max(view.density[1:].min() / 2, MIN_DENSITY * highest), 3 * highest)
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.ros.operator import Operator
-from texture_launch.files import given_arguments
+from texture_bringup.launcher import given_arguments
+from texture_bringup.operator import Operator
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

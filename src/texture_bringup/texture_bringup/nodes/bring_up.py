@@ -14,10 +14,9 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.node import Node
 from rclpy.task import Future
 
+from texture_core.config import param
 from texture_core.errors import DeviceError
-from texture_core.parameters import param
-from texture_core.ros.parameters import declare
-from texture_core.ros.run import run
+from texture_core.ros import declare, run
 
 POLL_S = 0.1
 # What brings a lifecycle node from a state one step nearer to 'active'.

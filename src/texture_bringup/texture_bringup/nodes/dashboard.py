@@ -18,23 +18,24 @@ from rclpy.parameter_client import AsyncParameterClient
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
-from texture_bringup.dashboard.access import Access
-from texture_bringup.dashboard.feed import FRAME_PERIOD_S, Feed
-from texture_bringup.dashboard.motions import offered
-from texture_bringup.dashboard.recorder import Recorder
-from texture_bringup.dashboard.server import make_app
-from texture_bringup.dashboard.serving import Serving
-from texture_bringup.ros.answers import answer_of, ready
-from texture_bringup.ros.operator import VANISHED
+from texture_bringup.dashboard import FRAME_PERIOD_S, Access, Feed, Recorder, Serving, make_app, offered
+from texture_bringup.operator import VANISHED, answer_of, ready
+from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
-from texture_core.exploration import ExplorationRequest
-from texture_core.parameters import from_mapping, param
-from texture_core.resources import folder
-from texture_core.ros.conversions import from_msg, request_to_msg
-from texture_core.ros.diagnostics import LEVELS, DiagnosticReport, Diagnostics, has_ended
-from texture_core.ros.parameters import declare
-from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
-from texture_core.ros.run import run
+from texture_core.ros import (
+    ESTIMATE_QOS,
+    LEVELS,
+    SENSOR_QOS,
+    STATE_QOS,
+    DiagnosticReport,
+    Diagnostics,
+    declare,
+    from_msg,
+    has_ended,
+    request_to_msg,
+    run,
+)
+from texture_core.types import ExplorationRequest
 from texture_exploration.safety import SafetyLimits
 
 ANSWER_DEADLINE_S = 30.0

@@ -8,17 +8,11 @@ from typing import Any
 from rclpy.node import Node
 from texture_msgs import msg
 
-from texture_core.catalogue import find
+from texture_core.config import find, param
 from texture_core.errors import InvalidData
-from texture_core.parameters import param
-from texture_core.ros.conversions import to_msg
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.frames import frame_name
-from texture_core.ros.parameters import declare
-from texture_core.ros.qos import SENSOR_QOS
-from texture_core.ros.run import run
-from texture_drivers.biotac.messages import MESSAGES, BioTacMessageConverter
-from texture_drivers.message_types import import_message
+from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
+from texture_drivers.biotac import MESSAGES, BioTacMessageConverter
+from texture_drivers.nodes.tsf85_adaptor import import_message
 
 TOPICS = ('signal', 'signal_static')
 

@@ -10,25 +10,23 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
-from texture_core.catalogue import find
+from texture_core.config import find, param
 from texture_core.errors import TextureError
-from texture_core.parameters import param
-from texture_core.protocols import Sensor
-from texture_core.ros.conversions import to_msg
-from texture_core.ros.diagnostics import Diagnostics
-from texture_core.ros.frames import frame_name
-from texture_core.ros.lifecycle import PatientLifecycleNode
-from texture_core.ros.parameters import declare, read
-from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
-from texture_core.ros.run import run
-from texture_core.signal import TactileSignal
-from texture_drivers.baseline import Baseline
+from texture_core.ros import (
+    SENSOR_QOS,
+    STATE_QOS,
+    Diagnostics,
+    PatientLifecycleNode,
+    declare,
+    frame_name,
+    read,
+    run,
+    to_msg,
+)
+from texture_core.types import Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.channel_watch import ChannelWatch
-from texture_drivers.params import SensorParams
-from texture_drivers.sensor_health import SensorHealth
-from texture_drivers.sensor_reader import SensorReader
-from texture_drivers.stream_watch import TareParams
+from texture_drivers.health import Baseline, ChannelWatch, SensorHealth, TareParams
+from texture_drivers.sensor import SensorParams, SensorReader
 
 # Phases of an exploration in which nothing touches the finger; after an abort it may still.
 UNLOADED = frozenset({msg.ExplorationState.IDLE, msg.ExplorationState.APPROACH, msg.ExplorationState.DONE})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,17 +10,32 @@ from typing import Any
 from rclpy.node import Node
 from texture_msgs import msg
 
-from texture_core.errors import InvalidData
-from texture_core.parameters import param
-from texture_core.ros.conversions import to_msg
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.frames import frame_name
-from texture_core.ros.parameters import declare
-from texture_core.ros.qos import SENSOR_QOS
-from texture_core.ros.run import run
-from texture_drivers.message_types import import_message
-from texture_drivers.tsf85.messages import Tsf85MessageConverter
-from texture_drivers.tsf85.settings import Tsf85Settings
+from texture_core.config import param
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
+from texture_drivers.tsf85 import Tsf85MessageConverter, Tsf85Settings
+
+# --------------------
+# Find other people's message types at run time: the suite does not depend on their packages.
+
+
+def import_message(message_type: str, parameter: str) -> Any:
+    """Return the class of 'package/msg/Type', as a parameter of that name asks for.
+
+    Raises
+    ------
+    InvalidParameter
+        If it is not installed.
+    """
+    package, _, name = message_type.partition('/msg/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), name)
+    except (ImportError, AttributeError) as error:
+        raise InvalidParameter(
+            f"parameter '{parameter}' asks for '{message_type}', which cannot be imported ({error}); build the package "
+            'with these messages and source it, or name the type as package/msg/Type'
+        ) from error
+
 
 NEEDED = ('Dynamic', 'Timestamp', 'StaticData')
 INERTIAL = ('Accelerometer', 'Gyroscope')

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from texture_estimation.learners.learner import Learner
-from texture_estimation.learners.mlp import Mlp
-from texture_estimation.learners.onset_mlp import OnsetMlp
+from texture_estimation.learners.mlp import Mlp, OnsetMlp
 from texture_estimation.learners.sklearn_learner import SklearnLearner
-from texture_estimation.learners.svm_rbf import SvmRbf
+from texture_estimation.learners.svm import SvmRbf
 
 LEARNERS: Mapping[str, type[Learner]] = {
     'mlp': Mlp,  # one hidden layer, softmax, calibrated

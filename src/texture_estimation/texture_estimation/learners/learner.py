@@ -1,4 +1,4 @@
-"""What a learner is: parameters that fit examples, and the predictor that it exports."""
+"""What a learner is: fit, predict, export; folds and standardisation that learners share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
+from texture_core.types import Array
+
+# --------------------
+# What a learner is: parameters that fit examples, and the predictor that it exports.
 
 Codes = NDArray[np.intp]
 
@@ -172,3 +175,77 @@ def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
     """
     names: tuple[str, ...] = getattr(learner, 'extras', ())
     return names
+
+
+# --------------------
+# Divide examples for cross-validation so that no slide is on both sides.
+
+
+def assign_folds(y: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
+    """Return the part (0 to count - 1) in which each example is held out, and how they were divided.
+
+    The slides of each label, in the order in which they come, are cut into `count` stretches: sensors and surfaces
+    drift, and a neighbour in time would flatter. A label with a single slide is divided by its windows instead, which
+    does flatter. None if a label has a single window.
+
+    Parameters
+    ----------
+    y, groups : (n,)
+        Number of the label and of the slide of each example.
+    count
+        Number of parts, at least 2.
+
+    Returns
+    -------
+    ((n,), str), or None
+        Part of each example, and the division in words.
+    """
+    folds_of = np.empty(len(y), dtype=np.intp)
+    note = f'held-out slides, {count} parts'
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
+        slides = _numbered(groups[rows])
+        if not slides.any():
+            note = 'held-out windows, as a label has a single slide: too confident'
+            slides = np.arange(len(rows))
+        if len(rows) < 2:
+            return None
+        folds_of[rows] = slides * count // (slides.max() + 1)
+    return folds_of, note
+
+
+def _numbered(groups: Codes) -> Codes:
+    """Return 0, 1, … for the groups in the order of their first appearance."""
+    _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.intp)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[inverse.reshape(-1)]
+
+
+# --------------------
+# Bring features to zero mean and unit variance, as plain arrays.
+
+# A deviation below this share of the largest value is rounding: the feature is constant.
+ROUNDING = 1e-13
+
+
+def standardisation(values: Array) -> tuple[Array, Array]:
+    """Return mean and scale of each feature, (n_features,), of examples (n, n_features).
+
+    The scale is the standard deviation; 1 for a constant feature, which then is 0 for every example.
+
+    Parameters
+    ----------
+    values : (n, n_features)
+
+    Returns
+    -------
+    (n_features,)
+        Mean of each feature.
+    (n_features,)
+        Scale of each feature, above 0.
+    """
+    mean = values.mean(axis=0)
+    deviation = values.std(axis=0)
+    constant = deviation <= ROUNDING * np.abs(values).max(axis=0)
+    return mean, np.where(constant, 1.0, deviation)

@@ -1,22 +1,273 @@
-"""Multilayer perceptron: one hidden layer, softmax output, trained with noise on its inputs."""
+"""The networks of our recipes: training with augmented copies, plain-array predictors, onset network."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
-from texture_core.parameters import param
-from texture_estimation.learners.augmented_examples import AugmentedBatches, AugmentedExamples
-from texture_estimation.learners.folds import assign_folds
-from texture_estimation.learners.learner import Codes, Fitted, FoldFit
-from texture_estimation.learners.mlp_predictor import MlpPredictor
-from texture_estimation.log_probabilities import chunks, log_loss, log_softmax
+from texture_core.config import param
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes, Fitted, FoldFit, assign_folds
+from texture_estimation.numerics import chunks, log_loss, log_softmax
+from texture_features.augmentation import Augmentation
+from texture_features.features.temporal import SLIDE_ONSET
+
+# --------------------
+# Augmented training examples of a learner: copies of slides, gains and slide jitter, drawn batch by batch.
+
+Inputs = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class AugmentedExamples:
+    """What a learner draws besides the examples of the undisturbed slides.
+
+    Parameters
+    ----------
+    values : (n, n_features) float32
+        Windows of changed copies of the slides.
+    codes, groups : (n,)
+        Number of the label and of the slide of each.
+    rows : (n_rows,)
+        Windows to draw from, those that count more often several times.
+    gain_response : (n_features,)
+        Change of each feature per natural logarithm of the gain.
+    slide_deviations : (n_slides, n_features)
+        Mean of each undisturbed slide less that of its class.
+    slides : (n_slides,)
+        Number of each of these.
+    augmentation
+        Ranges and shares.
+
+    Examples
+    --------
+    >>> nothing = np.zeros((0, 2), dtype=np.float32)
+    >>> none = np.zeros(0, dtype=np.intp)
+    >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
+    >>> augmented = AugmentedExamples(nothing, none, none, none, zeros[0], zeros, slides, Augmentation())
+    >>> augmented.without(np.array([1])).slides.tolist()
+    [0]
+    """
+
+    values: Inputs
+    codes: Codes
+    groups: Codes
+    rows: Codes
+    gain_response: Array
+    slide_deviations: Array
+    slides: Codes
+    augmentation: Augmentation
+
+    def without(self, held_out: Codes) -> AugmentedExamples:
+        """Return the examples without those of the slides with these numbers; class means stay as they are."""
+        kept = ~np.isin(self.slides, held_out)
+        return dataclasses.replace(
+            self,
+            rows=self.rows[~np.isin(self.groups[self.rows], held_out)],
+            slide_deviations=self.slide_deviations[kept],
+            slides=self.slides[kept],
+        )
+
+
+class AugmentedBatches:
+    """Draw batches of standardised inputs: undisturbed examples and copies, with random gains and slide jitter.
+
+    Parameters
+    ----------
+    inputs : (n, n_features) float32
+        Undisturbed examples, standardised.
+    y : (n,)
+        Their labels.
+    augmented
+        What is drawn besides.
+    mean, scale : (n_features,)
+        Of the standardisation.
+
+    Examples
+    --------
+    >>> inputs = np.ones((4, 2), dtype=np.float32)
+    >>> none = np.zeros(0, dtype=np.intp)
+    >>> changes = Augmentation(gain_probability=0.0, slide_jitter=0.0, clean_share=1.0)
+    >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
+    >>> augmented = AugmentedExamples(inputs[:0], none, none, none, zeros[0], zeros, slides, changes)
+    >>> rng = np.random.default_rng(0)
+    >>> batches = AugmentedBatches(inputs, np.arange(4) // 2, augmented, rng, mean=zeros[0], scale=np.ones(2))
+    >>> drawn, codes = batches.draw(3)
+    >>> drawn.shape, codes.shape
+    ((3, 2), (3,))
+    """
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        y: Codes,
+        augmented: AugmentedExamples,
+        rng: np.random.Generator,
+        *,
+        mean: Array,
+        scale: Array,
+    ) -> None:
+        self._inputs, self._codes, self._augmented, self._rng = inputs, y, augmented, rng
+        self._mean, self._factor = mean.astype(np.float32), (1.0 / scale).astype(np.float32)
+        self._response = (augmented.gain_response / scale).astype(np.float32)
+        self._deviations = (augmented.slide_deviations / scale).astype(np.float32)
+        self._clean, self._copies = _Rows(np.arange(len(inputs)), rng), _Rows(augmented.rows, rng)
+
+    def draw(self, count: int) -> tuple[Inputs, Codes]:
+        """Return so many inputs, (count, n_features), and their labels, (count,)."""
+        n_clean = round(count * self._augmented.augmentation.clean_share) if len(self._augmented.rows) else count
+        clean, copies = self._clean.take(n_clean), self._copies.take(count - n_clean)
+        changed = (self._augmented.values[copies] - self._mean) * self._factor
+        drawn = np.concatenate([self._inputs[clean], changed])
+        drawn += self._log_gains(count) * self._response
+        if len(self._deviations):
+            drawn += self._jitter(count) * self._deviations[self._rng.integers(len(self._deviations), size=count)]
+        return drawn, np.concatenate([self._codes[clean], self._augmented.codes[copies]])
+
+    def _log_gains(self, count: int) -> Inputs:
+        params = self._augmented.augmentation
+        widest = math.log(params.gain_range)
+        changed = self._rng.random((count, 1)) < params.gain_probability
+        gains: Inputs = (self._rng.uniform(-widest, widest, (count, 1)) * changed).astype(np.float32)
+        return gains
+
+    def _jitter(self, count: int) -> Inputs:
+        factors = self._rng.standard_normal((count, 1), dtype=np.float32)
+        jitter: Inputs = np.float32(self._augmented.augmentation.slide_jitter) * factors
+        return jitter
+
+
+class _Rows:
+    """Numbers in random order, each once before any comes again."""
+
+    def __init__(self, rows: Codes, rng: np.random.Generator) -> None:
+        self._rows, self._rng = rows, rng
+        self._left = rows[:0]
+
+    def take(self, count: int) -> Codes:
+        while len(self._left) < count:
+            self._left = np.concatenate([self._left, self._rng.permutation(self._rows)])
+        taken, self._left = self._left[:count], self._left[count:]
+        return taken
+
+
+# --------------------
+# Linear discriminant analysis with a shrunk covariance, as one linear layer.
+
+CONSTANT = 1e-12
+
+
+def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> tuple[Array, Array]:
+    """Return the layer that gives the log-probabilities of Gaussian classes with one covariance, up to a constant.
+
+    Parameters
+    ----------
+    X : (n, n_features)
+        Features.
+    y : (n,)
+        Number of the label of each.
+    n_labels
+        Number of labels, which are equally probable before.
+    shrinkage
+        0 for the covariance within classes as it is, 1 for its diagonal alone.
+
+    Returns
+    -------
+    (n_features, n_labels)
+        Weights; 0 for features that are constant, and all 0 where a label has fewer than two examples.
+    (n_labels,)
+        Offsets.
+
+    Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis".
+
+    Examples
+    --------
+    >>> X, y = np.array([[0.0], [2.0], [4.0], [6.0]]), np.array([0, 0, 1, 1])  # means 1 and 5, variance 1
+    >>> weights, offsets = linear_discriminant(X, y, 2, shrinkage=0.0)
+    >>> scores = 3.0 * weights[0] + offsets  # in the middle
+    >>> bool(np.isclose(scores[0], scores[1])), round(float(weights[0, 1] - weights[0, 0]), 6)  # (5 - 1) / 1
+    (True, 4.0)
+    """
+    nothing = np.zeros((X.shape[1], n_labels)), np.zeros(n_labels)
+    if np.bincount(y, minlength=n_labels).min() < 2:
+        return nothing
+    means = np.stack([X[y == code].mean(axis=0) for code in range(n_labels)])
+    centre = means.mean(axis=0)
+    rest = X - means[y]
+    scale = np.sqrt(np.mean(rest * rest, axis=0))
+    scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
+    rest /= scale
+    correlations = (1.0 - shrinkage) * (rest.T @ rest) / len(rest)
+    correlations[np.diag_indices_from(correlations)] += shrinkage + CONSTANT
+    relative = (means - centre) / scale
+    weights = np.linalg.solve(correlations, relative.T)
+    offsets = -0.5 * np.einsum('cf,fc->c', relative, weights)
+    weights /= scale[:, None]
+    return weights, offsets - centre @ weights
+
+
+# --------------------
+# Predict with a fitted multi-layer perceptron.
+
+
+@dataclass(frozen=True, eq=False)
+class MlpPredictor:
+    """The two layers, made for features as they come.
+
+    Parameters
+    ----------
+    hidden : (n_features, n_hidden)
+    hidden_offset : (n_hidden,)
+    output : (n_hidden, n_labels)
+    output_offset : (n_labels,)
+
+    Examples
+    --------
+    >>> predictor = MlpPredictor(np.eye(2), np.zeros(2), np.eye(2), np.zeros(2))
+    >>> predictor(np.array([3.0, -1.0])).tolist()
+    [3.0, 0.0]
+    """
+
+    hidden: Array
+    hidden_offset: Array
+    output: Array
+    output_offset: Array
+
+    def activations(self, X: Array) -> Array:
+        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
+        active: Array = X @ self.hidden
+        active += self.hidden_offset
+        np.maximum(active, 0.0, out=active)
+        return active
+
+    def __call__(self, X: Array) -> Array:
+        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
+        return self.scores(self.activations(X))
+
+    def scores(self, activations: Array) -> Array:
+        """Return the same, (..., n_labels), from the outputs of the hidden layer, (..., n_hidden).
+
+        Parameters
+        ----------
+        activations : (..., n_hidden)
+
+        Returns
+        -------
+        (..., n_labels)
+        """
+        scores: Array = activations @ self.output
+        scores += self.output_offset
+        return scores
+
+
+# --------------------
+# Multilayer perceptron: one hidden layer, softmax output, trained with noise on its inputs.
 
 Weights = list[NDArray[np.float32]]  # hidden: (n_features, hidden), (hidden,); output: (hidden, n_labels), (n_labels,)
 BATCH = 128
@@ -256,3 +507,134 @@ def _slopes(weights: Weights, inputs: NDArray[np.float32], truth: NDArray[np.flo
     error = (odds / odds.sum(axis=1, keepdims=True) - truth) / np.float32(len(inputs))
     back = (error @ output.T) * (before > 0)
     return [inputs.T @ back, back.sum(axis=0), active.T @ error, error.sum(axis=0)]
+
+
+# --------------------
+# Predict with a fitted multi-layer perceptron and a linear discriminant for first windows.
+
+
+@dataclass(frozen=True, eq=False)
+class OnsetMlpPredictor(MlpPredictor):
+    """The layers of the network, and one that is added to its scores for first windows.
+
+    Parameters
+    ----------
+    onset : (n_features, n_labels)
+    onset_offset : (n_labels,)
+    column
+        Number of the feature that is 1 for first windows.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> predictor = OnsetMlpPredictor(np.eye(2), np.zeros(2), np.eye(2), np.zeros(2), np.eye(2), np.ones(2), column=1)
+    >>> predictor(np.array([[3.0, 0.0], [3.0, 1.0]])).tolist()
+    [[3.0, 0.0], [7.0, 3.0]]
+    """
+
+    onset: Array
+    onset_offset: Array
+    column: int
+
+    def __call__(self, X: Array) -> Array:
+        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
+        scores, first = super().__call__(X), X[..., self.column, None]
+        if first.any():
+            scores += first * (X @ self.onset + self.onset_offset)
+        return scores
+
+
+# --------------------
+# Multilayer perceptron with a linear discriminant for the first window of a slide.
+
+UNBOUND = -1
+
+
+@dataclass(frozen=True)
+class OnsetMlp(Mlp):
+    """The network `mlp` for all windows; the first of a slide is also judged by linear discriminant analysis.
+
+    While friction, contact and sensor settle, features have other means and another covariance than later: a classifier
+    of all windows knows little of it. First windows therefore have class-conditional Gaussians of their own, with one
+    covariance that is shrunk towards its diagonal, as there is one example a slide. Their log-probabilities are added
+    to those of the network. The feature `slide_onset` says which windows these are; the network does not see it.
+    Without this feature there is the network alone.
+
+    Source: Fisher 1936; Friedman 1989 for the shrinkage.
+
+    Examples
+    --------
+    >>> codes, slides = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> X = np.stack([codes + 0.1 * np.random.default_rng(0).standard_normal(40), np.arange(40) % 5 == 0], axis=1)
+    >>> learner = OnsetMlp(epochs=1).of_examples(['signal/mean/pac', 'signal/slide_onset'], ['cork', 'felt'])
+    >>> predictor = learner.predictor(learner.fit(X, codes, slides).parameters)
+    >>> predictor(np.array([[0.0, 1.0], [1.0, 1.0]])).argmax(axis=1).tolist()
+    [0, 1]
+    """
+
+    onset_weight: float = param(
+        1.0,
+        'Sets the weight of the discriminant of the first window, relative to the network; a larger one lets the first '
+        'window count more in the whole slide.',
+        low=0.0,
+        high=100.0,
+    )
+    shrinkage: float = param(
+        0.3,
+        'Sets how far the correlations within classes are shrunk towards 0; more needs fewer slides and separates '
+        'less finely.',
+        low=0.0,
+        high=1.0,
+    )
+    column: int = param(
+        UNBOUND, 'Number of the feature `slide_onset`; set by the training from the names of the features.', low=UNBOUND
+    )
+
+    def of_examples(self, names: Sequence[str], _labels: Sequence[str]) -> OnsetMlp:
+        """Return the learner for examples with these features; without `slide_onset` it is the network alone."""
+        found = [number for number, name in enumerate(names) if name.rsplit('/', 1)[-1] == SLIDE_ONSET]
+        return dataclasses.replace(self, column=found[0] if found else UNBOUND)
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> OnsetMlpPredictor:
+        """Return the predictor made from the stored parameters."""
+        network = Mlp.predictor(parameters)
+        return OnsetMlpPredictor(
+            network.hidden,
+            network.hidden_offset,
+            network.output,
+            network.output_offset,
+            np.asarray(parameters['onset'], dtype=np.float64, order='F'),
+            np.asarray(parameters['onset_offset'], dtype=np.float64),
+            int(parameters['onset_column']),
+        )
+
+    def _fit(
+        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
+    ) -> dict[str, Array]:
+        """Return the layers of the network and that of the onset."""
+        blind = X.copy()
+        first: Codes = np.zeros(0, dtype=np.intp)
+        if self.column != UNBOUND:
+            first = np.flatnonzero(X[:, self.column] > 0.0)
+            blind[:, self.column] = 0.0  # what is constant tells nothing
+        network = super()._fit(blind, y, n_labels, augmented, share)
+        values, codes = X[first].astype(np.float64), y[first]
+        if augmented is not None and len(first):
+            values, codes = self._with_copies(values, codes, augmented)
+        onset, offset = linear_discriminant(values, codes, n_labels, self.shrinkage)
+        return {
+            **network,
+            'onset': self.onset_weight * onset,
+            'onset_offset': self.onset_weight * offset,
+            'onset_column': np.array(self.column),
+        }
+
+    def _with_copies(self, values: Array, codes: Codes, augmented: AugmentedExamples) -> tuple[Array, Codes]:
+        """Return the first windows with those of changed copies, and all of them at both ends of the range of gains."""
+        rows = np.unique(augmented.rows)
+        rows = rows[augmented.values[rows, self.column] > 0.0]
+        every = np.concatenate([values, augmented.values[rows].astype(np.float64)])
+        labels = np.concatenate([codes, augmented.codes[rows]])
+        louder = np.log(augmented.augmentation.gain_range) / np.sqrt(3.0) * augmented.gain_response
+        return np.concatenate([every + louder, every - louder]), np.concatenate([labels, labels])

@@ -8,15 +8,14 @@ from typing import Any
 from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
+from texture_core.config import param
 from texture_core.errors import ModelMismatch, TextureError
-from texture_core.estimates import TextureEstimate
-from texture_core.features import FeatureVector
-from texture_core.parameters import param
-from texture_core.ros.run import run
+from texture_core.ros import run
+from texture_core.types import FeatureVector, TextureEstimate
 from texture_estimation.evidence import NO_MODEL, EvidenceAccumulator
-from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
+from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.model import TextureModel, load_model
-from texture_estimation.ros.estimator_node import EstimatorNode
+from texture_estimation.ros import EstimatorNode
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,10 @@ from typing import Any
 
 from texture_msgs import msg
 
-from texture_core.parameters import param
-from texture_core.ros.run import run
-from texture_estimation.ros.estimator_node import EstimatorNode
-from texture_estimation.roughness.evidence import NO_MODEL, RoughnessAccumulator
-from texture_estimation.roughness.model import load_roughness_model
+from texture_core.config import param
+from texture_core.ros import run
+from texture_estimation.ros import EstimatorNode
+from texture_estimation.roughness import NO_MODEL, RoughnessAccumulator, load_roughness_model
 
 
 @dataclass(frozen=True)

@@ -8,25 +8,24 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from texture_core.command_options import add_channels, add_dask, add_seed, add_slides
+from texture_core.cli import add_channels, add_dask, add_seed, add_slides
+from texture_core.config import refuse_inputs, shipped, write_json
 from texture_core.errors import InvalidParameter, ModelMismatch
-from texture_core.output_files import refuse_inputs
-from texture_core.plain_data import write_json
-from texture_core.resources import shipped
-from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.model_files import both_files
-from texture_estimation.recipe import load_recipe
-from texture_estimation.search.parallel import dask_backend
+from texture_estimation.recipe import FAST_TOPIC, load_recipe, with_channels
+from texture_estimation.search import dask_backend
 from texture_evaluation.charts import refuse_chart_format
-from texture_evaluation.cross_validation.comparison import PairedComparison, compare_all
-from texture_evaluation.cross_validation.comparison_chart import comparison_chart
-from texture_evaluation.cross_validation.cross_validate import cross_validate
-from texture_evaluation.cross_validation.cross_validation import CrossValidation
-from texture_evaluation.cross_validation.splits import parse_split
-from texture_evaluation.evaluate import evaluate
-from texture_evaluation.evaluation_text import sentence, summary, table
-from texture_recordings.slide_dataset import SlideDataset
+from texture_evaluation.cross_validation import (
+    CrossValidation,
+    PairedComparison,
+    compare_all,
+    comparison_chart,
+    cross_validate,
+    parse_split,
+)
+from texture_evaluation.evaluate import evaluate, sentence, summary, table
+from texture_recordings.dataset import SlideDataset
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -7,11 +7,9 @@ import sys
 import time
 from dataclasses import dataclass, field
 
-from texture_core.command_options import add_channels, add_dask, add_seed, add_slides
-from texture_core.parameters import from_mapping
-from texture_estimation.search.generation import OBJECTIVES, Generation, SearchParams
-from texture_estimation.search.parallel import parallel_map_for
-from texture_estimation.search.recipe_files import checkpoint_of
+from texture_core.cli import add_channels, add_dask, add_seed, add_slides
+from texture_core.config import from_mapping
+from texture_estimation.search import OBJECTIVES, Generation, SearchParams, checkpoint_of, parallel_map_for
 from texture_evaluation.optimise import Wanted, optimise_from_bags
 
 BAR = 20  # letters

@@ -6,10 +6,8 @@ import argparse
 import math
 from pathlib import Path
 
-from texture_estimation.roughness.ratings import read_ratings
-from texture_estimation.roughness.regressor import ROUGH, SMOOTH
-from texture_evaluation.panel import PanelReport, examine
-from texture_evaluation.panel_charts import deviations_chart, votes_chart
+from texture_estimation.roughness import ROUGH, SMOOTH, read_ratings
+from texture_evaluation.panel import PanelReport, deviations_chart, examine, votes_chart
 
 SHOWN_VIOLATIONS = 5
 

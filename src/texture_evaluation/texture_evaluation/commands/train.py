@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_core.cli import add_channels, add_seed, add_slides
 from texture_estimation.model import TextureModel
-from texture_estimation.roughness.model import RoughnessModel
+from texture_estimation.roughness import RoughnessModel
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 
 # What `--channels all` makes of a recipe that uses the vibration alone.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from texture_exploration.arms.arm import ArmClass
 from texture_exploration.arms.in_hand import InHandArm
-from texture_exploration.arms.protocol import ArmClass
 from texture_exploration.arms.rails import RailsArm
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.simulated import SimulatedArm

@@ -6,15 +6,12 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from texture_core.catalogue import find
+from texture_core.config import find, param
 from texture_core.errors import DeviceError
-from texture_core.finger_state import FingerSender, FingerState
-from texture_core.parameters import param
-from texture_exploration.arms.command_limits import CommandLimits
-from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
-from texture_exploration.hands.dynamixel import DynamixelHand
-from texture_exploration.hands.protocol import FingerSet, Fingertip, Hand, RebootableHand
-from texture_exploration.hands.simulated import SimulatedHand
+from texture_core.types import FingerSender, FingerState
+from texture_exploration.arms.arm import ArmCommand, ArmState, CommandLimits, Vector
+from texture_exploration.arms.dynamixel import DynamixelHand
+from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, RebootableHand, SimulatedHand
 
 HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_SHARE = 0.5  # one that presses less has lost it
@@ -68,7 +65,7 @@ HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
 
 
 class InHandArm:
-    """Hold from `connect` on, move the sliding fingers alike; see `texture_exploration.arms.protocol.Arm`.
+    """Hold from `connect` on, move the sliding fingers alike; see `texture_exploration.arms.arm.Arm`.
 
     The state is the mean of the sliding fingers. A holding finger that presses with less than half of the wanted force
     is a fault.

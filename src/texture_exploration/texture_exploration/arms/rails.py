@@ -9,15 +9,50 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from struct import Struct
 
 import serial
 
+from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
-from texture_core.parameters import param
-from texture_exploration.arms import rails_tables as tables
-from texture_exploration.arms.command_limits import CommandLimits
-from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.arms.arm import ArmCommand, ArmState, CommandLimits, Vector
+
+# --------------------
+# Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of our own.
+#
+# Orders and answers are frames of `texture_core.framing` with one row and one column, little endian:
+#
+# | kind | direction | body |
+# |---|---|---|
+# | 0xA0 move | to the rails | i32 vx, i32 vy in µm/s; u8 mode; i32 value |
+# | 0xA1 stop | to the rails | – |
+# | 0xA2 clear | to the rails | – |
+# | 0x20 state | from the rails | i32 x, i32 y, i32 z in encoder counts; i32 force in mN; u8 flags; u16 watchdog stops
+# |
+#
+# A state comes 100 times a second. Modes of the pressing motor: 0 it holds (it locks itself), 1 it moves at `value`
+# µm/s,
+# positive away from the surface, 2 it presses until `value` mN are reached, and locks. A motor without an encoder
+# counts
+# the way it was told to go.
+
+VERSION = 1
+MOVE, STOP, CLEAR, STATE = 0xA0, 0xA1, 0xA2, 0x20
+HOLD, MOVING, PRESS = 0, 1, 2
+MOVE_BODY = Struct('<iiBi')
+STATE_BODY = Struct('<iiiiBH')
+STATE_PERIOD_S = 0.01
+WATCHDOG_S = 0.15  # so long an order holds
+MICRO, MILLI = 1e6, 1e3
+
+# Flags of a state.
+LOW_X, HIGH_X, LOW_Y, HIGH_Y, TOP, LOCKED, OVERLOAD, STALL = (1 << bit for bit in range(8))
+FAULTS = {
+    OVERLOAD: 'its force sensor was overloaded, and the finger was lifted',
+    STALL: 'an encoder does not follow its motor; is something in the way?',
+}
+
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
 LINE_FAULTS = (serial.SerialException, OSError, termios.error, TypeError)
@@ -64,7 +99,7 @@ class RailsParams(CommandLimits):
 
 
 class RailsArm:
-    """The rails as an arm; see `texture_exploration.arms.protocol.Arm`."""
+    """The rails as an arm; see `texture_exploration.arms.arm.Arm`."""
 
     Params = RailsParams
 
@@ -104,7 +139,7 @@ class RailsArm:
         self._thread = threading.Thread(target=self._read, name='rails', daemon=True)
         self._thread.start()
         try:
-            self._send(tables.CLEAR)
+            self._send(CLEAR)
             if not self._fresh.wait(FIRST_STATE_S):
                 raise DeviceError(
                     self._failure
@@ -119,7 +154,7 @@ class RailsArm:
         """Stop, and close the line."""
         if self._port is not None:
             with contextlib.suppress(DeviceError):
-                self._send(tables.STOP)
+                self._send(STOP)
         self._closing.set()
         if self._thread is not None:
             self._thread.join()
@@ -145,17 +180,17 @@ class RailsArm:
     def command(self, command: ArmCommand) -> None:
         """Send an order."""
         self._params.check(command, self.stop)
-        vx, vy = (round(speed * tables.MICRO) for speed in command.tangential_m_s)
-        mode, value = tables.MOVING, round(command.normal_m_s * tables.MICRO)
+        vx, vy = (round(speed * MICRO) for speed in command.tangential_m_s)
+        mode, value = MOVING, round(command.normal_m_s * MICRO)
         if command.force_n is not None:
-            mode, value = tables.PRESS, round(command.force_n * tables.MILLI)
+            mode, value = PRESS, round(command.force_n * MILLI)
         elif value == 0:
-            mode = tables.HOLD
-        self._send(tables.MOVE, tables.MOVE_BODY.pack(vx, vy, mode, value))
+            mode = HOLD
+        self._send(MOVE, MOVE_BODY.pack(vx, vy, mode, value))
 
     def stop(self) -> None:
         """Let the rails stand still; the pressing motor locks."""
-        self._send(tables.STOP)
+        self._send(STOP)
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -172,7 +207,7 @@ class RailsArm:
         if self._failure or self._port is None:
             raise DeviceError(self._failure)
         with self._sending, self._line():
-            frame = Frame(kind, tables.VERSION, self._sent, time.monotonic_ns() // 1000, 1, 1, body)
+            frame = Frame(kind, VERSION, self._sent, time.monotonic_ns() // 1000, 1, 1, body)
             self._sent += 1
             self._port.write(pack(frame))
 
@@ -187,16 +222,16 @@ class RailsArm:
 
     def _take(self, frame: Frame) -> None:
         """Make a state of a frame; frames of other kinds are the finger's, on the same line."""
-        if frame.kind != tables.STATE:
+        if frame.kind != STATE:
             return
-        if frame.version != tables.VERSION or len(frame.body) != tables.STATE_BODY.size:
+        if frame.version != VERSION or len(frame.body) != STATE_BODY.size:
             self._refused += 1
             self._failure = (
-                f'the rails send states of version {frame.version}, and {tables.VERSION} is known; update the firmware '
+                f'the rails send states of version {frame.version}, and {VERSION} is known; update the firmware '
                 'or this package'
             )
             return
-        x, y, z, force_mn, flags, self._watchdog_stops = tables.STATE_BODY.unpack(frame.body)
+        x, y, z, force_mn, flags, self._watchdog_stops = STATE_BODY.unpack(frame.body)
         per_m, params = self._params.xy_counts_m, self._params
         place: Vector = (x / per_m, y / per_m, params.height_m + z / params.z_counts_m)
         self._states.append((frame.time_us, place))
@@ -204,9 +239,9 @@ class RailsArm:
             time_ns=time.monotonic_ns(),
             position=place,
             velocity=self._velocity(),
-            force_n=force_mn / tables.MILLI,
-            fault='; '.join(text for flag, text in tables.FAULTS.items() if flags & flag),
-            watchdog_s=tables.WATCHDOG_S,
+            force_n=force_mn / MILLI,
+            fault='; '.join(text for flag, text in FAULTS.items() if flags & flag),
+            watchdog_s=WATCHDOG_S,
         )
         self._fresh.set()
 

@@ -1,8 +1,4 @@
-"""An arm that ROS controllers drive: it commands velocities, and reads pose and force, over standard topics.
-
-The force is controlled by the velocity loop of the suite, or by a compliance controller if one is named. This file
-knows no ROS: the topics are behind `texture_exploration.arms.ros_controllers_topics.ControllerTopics`.
-"""
+"""An arm that ROS drives: a twist controller, poses and wrenches on topics."""
 
 from __future__ import annotations
 
@@ -10,20 +6,527 @@ import importlib
 import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Protocol
 
-from texture_core.errors import DeviceError
-from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading, Vector
-from texture_exploration.arms.ros_controllers_params import RosControllersParams
-from texture_exploration.arms.ros_controllers_topics import ControllerTopics
-from texture_exploration.arms.ros_controllers_watch import FollowWatch, stale
-from texture_exploration.arms.surface_frame import SurfaceFrame
-from texture_exploration.arms.tool_state import ToolState
-from texture_exploration.arms.velocity_only import CommandedVelocity
+import numpy as np
+
+from texture_core.config import param
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.types import Array, quaternion_matrix
+from texture_exploration.arms.arm import (
+    ArmCommand,
+    ArmState,
+    CommandedVelocity,
+    CommandLimits,
+    ForceReading,
+    ForceZero,
+    SurfaceFrame,
+    SurfacePoseParams,
+    Vector,
+    tangential_force_n,
+)
+from texture_exploration.force_control import ForceLoopParams
+
+# --------------------
+# What can be chosen about an arm that is driven by ROS controllers.
+
+
+@dataclass(frozen=True)
+class RosControllersParams(ForceLoopParams, SurfacePoseParams, CommandLimits):
+    """Topics, frames and rates of the controllers, the tool, the surface, and the supervision."""
+
+    twist_topic: str = param(
+        'twist_controller/twist',
+        'Sets the topic of the commanded velocities (geometry_msgs/TwistStamped).',
+    )
+    pose_topic: str = param(
+        'tcp_pose_broadcaster/pose',
+        'Sets the topic of the measured pose of the fingertip in the base frame (geometry_msgs/PoseStamped).',
+    )
+    wrench_topic: str = param(
+        'force_torque_sensor_broadcaster/wrench', 'Sets the topic of the measured force (geometry_msgs/WrenchStamped).'
+    )
+    target_wrench_topic: str = param(
+        '',
+        'Sets the topic of the commanded force (geometry_msgs/WrenchStamped) for a compliance controller that presses '
+        "by itself; '' presses by velocities.",
+    )
+    base_frame_id: str = param(
+        'base', 'Sets the name of the base frame, which the measured pose must carry in its header.'
+    )
+    tool_frame_id: str = param(
+        'tool0_controller',
+        'Sets the name of the frame of the fingertip; a force with another name than this and the base frame is '
+        'refused.',
+    )
+    twist_frame_id: str = param(
+        '', "Sets the frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
+    )
+    controller_manager: str = param(
+        '',
+        'Sets the controller manager that is asked to switch controllers when the arm is connected and let go, such as '
+        "'controller_manager'; '' switches nothing.",
+    )
+    activate_controllers: str = param(
+        'twist_controller',
+        'Sets the controllers, separated by spaces, that are active only while the arm is connected.',
+    )
+    deactivate_controllers: str = param(
+        'scaled_joint_trajectory_controller',
+        'Sets the controllers, separated by spaces, that are inactive only while the arm is connected.',
+    )
+    rate_hz: float = param(
+        250.0,
+        'Sets the rate of commands; a higher rate reacts faster and costs more computing time.',
+        unit='Hz',
+        low=20.0,
+        high=500.0,
+    )
+    loop_delay_s: float = param(
+        0.02,
+        'Sets the largest delay from a measured force to the motion that answers it; a longer one is measured as the '
+        'finger comes down. A larger value lowers the gain.',
+        unit='s',
+        low=0.0,
+        high=0.1,
+    )
+    command_timeout_s: float = param(
+        0.1,
+        'Sets how long a command holds without a new one; afterwards the arm stands still.',
+        unit='s',
+        low=0.02,
+        high=2.0,
+    )
+    controller_timeout_s: float = param(
+        0.0,
+        'Declares after which time without a command the controller itself stops the arm; 0 declares that it never '
+        "does, which is refused unless 'accept_no_timeout' is set.",
+        unit='s',
+        low=0.0,
+        high=0.5,
+    )
+    accept_no_timeout: bool = param(
+        False,
+        'Accepts a controller that holds the last velocity for ever: then nothing stops the arm when this machine or '
+        'its network fails, but the limits of the robot.',
+    )
+    heartbeat_s: float = param(
+        0.05,
+        'Sets the longest silence of the commanding process after which its guard commands zero velocity; a larger '
+        'value bears a busier machine.',
+        unit='s',
+        low=0.02,
+        high=1.0,
+    )
+    deadman_s: float = param(
+        0.08,
+        'Sets the age of the newest pose or force above which zero velocity is commanded and a fault is reported; a '
+        'larger value bears more jitter.',
+        unit='s',
+        low=0.01,
+        high=2.0,
+    )
+    follow_m: float = param(
+        0.002,
+        'Sets the commanded distance over which the arm must have followed, or its controller counts as lost; a larger '
+        'value notices it later.',
+        unit='m',
+        low=0.0005,
+        high=0.1,
+    )
+    tool_mass_kg: float = param(
+        0.0,
+        'Sets the mass of the tool whose weight is removed from the measured force; 0 if the sensor does so itself.',
+        unit='kg',
+        low=0.0,
+        high=20.0,
+    )
+    invert_force: bool = param(
+        False, 'Inverts the measured force, for a sensor that reports what the tool does to its surroundings.'
+    )
+    force_is_quantised: bool = param(
+        False,
+        'Lets a measured force repeat itself, as of a sensor that rounds; false takes a force that repeats itself for '
+        'a frozen sensor.',
+    )
+    force_smoothing_s: float = param(
+        0.0,
+        'Sets the time constant of the low-pass filter of the measured force; a longer one removes more noise and is '
+        'added to the delay of the loop.',
+        unit='s',
+        low=0.0,
+        high=0.1,
+    )
+    zero_rise_m: float = param(
+        0.003,
+        'Sets the rise, at constant force, after which the force is zeroed; a larger rise zeroes it less often.',
+        unit='m',
+        low=0.001,
+        high=0.05,
+    )
+    zero_steady_n: float = param(
+        0.5,
+        'Sets the largest change of the smoothed force that counts as constant; it must exceed the noise of the '
+        'sensor.',
+        unit='N',
+        low=0.05,
+        high=5.0,
+    )
+    connect_timeout_s: float = param(
+        5.0,
+        'Sets how long the first pose, the first force and the controller may take before connecting fails.',
+        unit='s',
+        low=0.1,
+        high=60.0,
+    )
+
+    @property
+    def activated(self) -> tuple[str, ...]:
+        """Controllers that command the arm while it is connected."""
+        return tuple(self.activate_controllers.split())
+
+    @property
+    def deactivated(self) -> tuple[str, ...]:
+        """Controllers that command the arm otherwise."""
+        return tuple(self.deactivate_controllers.split())
+
+    def __post_init__(self) -> None:
+        if self.twist_frame_id not in ('', self.base_frame_id, self.tool_frame_id):
+            raise InvalidParameter(
+                f"parameter 'twist_frame_id' is '{self.twist_frame_id}'; it must be the base frame "
+                f"'{self.base_frame_id}' or the frame of the fingertip '{self.tool_frame_id}'"
+            )
+
+
+# --------------------
+# What an arm driven by ROS controllers exchanges with them, without ROS.
+
+
+@dataclass(frozen=True)
+class PoseSample:
+    """A measured pose: `position_m` in the frame `frame_id`, `rotation` as the quaternion x, y, z, w.
+
+    `stamp_ns` is the time of its header, on the clock of the sender; 0 if there is none. `age_ns` is its age by that
+    stamp and the clock of this machine, which may not agree; 0 if there is no stamp.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    position_m: Vector
+    rotation: tuple[float, float, float, float]
+    age_ns: int = 0
+
+
+@dataclass(frozen=True)
+class ForceSample:
+    """A measured force, N, in the frame `frame_id`; `stamp_ns` and `age_ns` as of a pose."""
+
+    stamp_ns: int
+    frame_id: str
+    force_n: Vector
+    age_ns: int = 0
+
+
+class ControllerTopics(Protocol):
+    """The topics of the controllers; `texture_exploration.ros.controllers` makes them."""
+
+    def newest_pose(self) -> PoseSample | None:
+        """Return the newest pose that came since the last call, None if none did."""
+
+    def newest_force(self) -> ForceSample | None:
+        """Return the newest force that came since the last call, None if none did."""
+
+    def listeners(self) -> int:
+        """Return how many nodes listen to the commanded velocities."""
+
+    def unsafe(self) -> str:
+        """Return why the arm must not go on although it obeys: another commands it, or no guard would stop it."""
+
+    def beat(self, *, moving: bool) -> None:
+        """Tell the guard that the commanding process lives, in each period, and whether the arm would go on alone."""
+
+    def send_velocity(self, velocity_m_s: Vector) -> None:
+        """Command a velocity in the frame `twist_frame_id`."""
+
+    def send_force(self, force_n: Vector) -> None:
+        """Command the force of the tool on its surroundings in the base frame; no effect without such a topic."""
+
+    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
+        """Let the controller manager switch both sets or nothing; DeviceError, with the reason, if it does not."""
+
+    def close(self) -> None:
+        """Wait until what was sent has arrived, at most for a fraction of a second, and leave."""
+
+
+# --------------------
+# Whether the controllers of an arm still work: pose and force are fresh, somebody listens, the arm follows.
+
+FOLLOW_NS = 300_000_000  # an arm with lag needs time to set off
+LONGEST_NS = 3_000_000_000  # what is slower than `follow_m` in this time is no motion: a force being held
+FOLLOWED_SHARE = 0.1  # a controller may limit speed and acceleration to its own
+
+
+class FollowWatch:
+    """Compare the way that was commanded with the way that the finger has gone.
+
+    The comparison begins again when the commanded velocity turns back: a late arm still goes the old way for its lag,
+    which is no sign of a lost controller.
+
+    Parameters
+    ----------
+    follow_m
+        Commanded distance after which it counts, m.
+    """
+
+    def __init__(self, follow_m: float) -> None:
+        self._follow_m = follow_m
+        self._begin: tuple[int, Array] | None = None
+        self._asked_m: Array = np.zeros(3)
+
+    def restart(self) -> None:
+        """Begin again: nothing was commanded, or nobody looked."""
+        self._begin = None
+
+    def update(self, now_ns: int, position: Vector, velocity_m_s: Vector, held_s: float) -> str:
+        """Return in a sentence that the arm does not follow, '' if it does.
+
+        Parameters
+        ----------
+        now_ns
+            The time.
+        position : (3,)
+            Of the finger, m.
+        velocity_m_s : (3,)
+            That was commanded until now.
+        held_s
+            For how long, s.
+
+        Returns
+        -------
+        str
+            A sentence without a full stop, or ''.
+        """
+        place, velocity = np.array(position), np.array(velocity_m_s)
+        if self._begin is None or velocity @ self._asked_m < 0.0:
+            self._begin, self._asked_m = (now_ns, place), np.zeros(3)
+        self._asked_m = self._asked_m + velocity * held_s
+        begin_ns, start = self._begin
+        asked_m = float(np.linalg.norm(self._asked_m))
+        if asked_m < self._follow_m or now_ns - begin_ns < FOLLOW_NS:
+            if now_ns - begin_ns > LONGEST_NS:
+                self.restart()
+            return ''
+        gone_m = float((place - start) @ self._asked_m) / asked_m
+        took_s = (now_ns - begin_ns) * 1e-9
+        self.restart()
+        if gone_m >= FOLLOWED_SHARE * asked_m:
+            return ''
+        return f'the arm went {1e3 * gone_m:.1f} mm of the {1e3 * asked_m:.1f} mm commanded in {took_s:.1f} s'
+
+
+def stale(params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int) -> str:
+    """Return in a sentence that pose or force are older than the parameters allow, '' if they are not.
+
+    Parameters
+    ----------
+    params
+        Names of the topics and the longest allowed age.
+    now_ns
+        The time, ns.
+    pose_ns, force_ns
+        When pose and force came last, ns.
+
+    Returns
+    -------
+    str
+        A sentence without a full stop, or ''.
+    """
+    for what, topic, time_ns in (('pose', params.pose_topic, pose_ns), ('force', params.wrench_topic, force_ns)):
+        age_s = (now_ns - time_ns) * 1e-9
+        if age_s > params.deadman_s:
+            return (
+                f"no {what} has come on '{topic}' for {1e3 * age_s:.0f} ms, so zero velocity was commanded; check that "
+                'its broadcaster is active'
+            )
+    return ''
+
+
+# --------------------
+# State of a fingertip from stamped poses and forces: frames, velocity, weight of the tool, zero and age.
+
+GRAVITY_M_S2 = 9.81
+VELOCITY_OVER_NS = 30_000_000
+STILL_M_S = 1e-4  # a slower finger is at rest: what remains is the noise of its place
+AGREE_NS = 1_000_000_000  # clocks by which a sample is older than this, or comes from the future, do not agree
+REST: Vector = (0.0, 0.0, 0.0)
+
+
+class ToolState:
+    """Turn what the controllers report into the state of an arm.
+
+    Parameters
+    ----------
+    params
+        Frames, tool and surface.
+
+    Attributes
+    ----------
+    zero : ForceZero
+        Of the force sensor.
+    pose_ns, force_ns : int
+        When the newest pose and force were measured that differ from the ones before by their stamps: by the stamp
+        where the clocks agree, else when they came; 0 before the first.
+    misplaced : str
+        In a sentence, that a pose or a force came in an unknown frame; '' if none did.
+    """
+
+    def __init__(self, params: RosControllersParams) -> None:
+        self._params = params
+        self._frame = SurfaceFrame(params.surface_pose)
+        self.zero = ForceZero(params.zero_rise_m, params.zero_steady_n)
+        self.pose_ns = self.force_ns = 0
+        self._force_came_ns = 0
+        self._late = {'pose': '', 'force': ''}
+        self.misplaced = ''
+        self.rotation: Array = np.eye(3)  # of the tool in the base frame
+        self._position: Vector = (math.nan, math.nan, math.nan)
+        self._velocity = REST
+        self._force_n = math.nan
+        self._force_vector_n: Vector = (math.nan, math.nan, math.nan)  # zeroed, without the weight, not smoothed
+        self._reading_n: Array | None = None  # of the sensor, as it came
+        self._stamps_ns = {'pose': -1, 'force': -1}
+        self._track: deque[tuple[int, Vector]] = deque()
+
+    def take_pose(self, now_ns: int, sample: PoseSample) -> None:
+        """Take a pose that came at `now_ns`."""
+        params = self._params
+        if sample.frame_id != params.base_frame_id:
+            self.misplaced = (
+                f"the pose on '{params.pose_topic}' is given in the frame '{sample.frame_id}'; "
+                f"'{params.base_frame_id}' is needed, see the parameter 'base_frame_id'"
+            )
+            return
+        if not self._is_new('pose', sample.stamp_ns):
+            return
+        self.pose_ns = now_ns - self._age_ns('pose', sample.age_ns)
+        self.rotation = quaternion_matrix(sample.rotation)
+        self._position = self._frame.place(sample.position_m)
+        self._update_velocity(sample.stamp_ns or now_ns)
+
+    def take_force(self, now_ns: int, sample: ForceSample, *, moving: bool) -> None:
+        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is told to move.
+
+        Parameters
+        ----------
+        now_ns
+            The time, ns.
+        sample
+            Force and its place.
+        moving
+            Whether the arm is commanded to move.
+        """
+        params = self._params
+        if sample.frame_id not in (params.base_frame_id, params.tool_frame_id):
+            self.misplaced = (
+                f"the force on '{params.wrench_topic}' is given in the frame '{sample.frame_id}'; "
+                f"'{params.tool_frame_id}' or '{params.base_frame_id}' is needed, see the parameter 'tool_frame_id'"
+            )
+            return
+        if not self._is_new('force', sample.stamp_ns):
+            return
+        passed_s = (now_ns - self._force_came_ns) * 1e-9 if self._force_came_ns else math.inf
+        self._force_came_ns = now_ns
+        self.force_ns = now_ns - self._age_ns('force', sample.age_ns)
+        to_base = self.rotation if sample.frame_id == params.tool_frame_id else np.eye(3)
+        reading = np.array(sample.force_n) * (-1.0 if params.invert_force else 1.0)
+        repeated = self._reading_n is not None and bool((reading == self._reading_n).all())
+        self._reading_n = reading
+        # What the sensor shows of the weight turns with it; what is left in free air is its offset.
+        unweighted = reading - to_base.T @ np.array([0.0, 0.0, -params.tool_mass_kg * GRAVITY_M_S2])
+        normal_n = self._at_surface(to_base, unweighted)[2]
+        zeroings = self.zero.zeroings
+        self.zero.update(now_ns, self._position, normal_n, unweighted, moving=moving)
+        self._force_vector_n = self._at_surface(to_base, unweighted - self.zero.offset_n)
+        zeroed_n = self._force_vector_n[2]
+        if self.zero.zeroings != zeroings:
+            self._force_n = zeroed_n  # what was smoothed had another zero
+        elif not repeated:  # a frozen reading must stay one to the last bit
+            self._force_n = self._smoothed(zeroed_n, passed_s)
+
+    def state(self, fault: str) -> ArmState:
+        """Return the newest state; its time is that of the older of pose and force."""
+        return ArmState(
+            min(self.pose_ns, self.force_ns),
+            self._position,
+            self._velocity,
+            self._force_n,
+            fault,
+            tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
+            along_n=self._force_vector_n[:2],
+        )
+
+    def _is_new(self, kind: str, stamp_ns: int) -> bool:
+        """Return whether a sample differs from the one before; a broadcaster may repeat what it had."""
+        new = stamp_ns == 0 or stamp_ns != self._stamps_ns[kind]
+        self._stamps_ns[kind] = stamp_ns
+        return new
+
+    def _age_ns(self, kind: str, age_ns: int) -> int:
+        """Return the age of a sample as far as clocks agree, and note whether that is too much."""
+        if not 0 <= age_ns <= AGREE_NS:
+            age_ns = 0
+        params = self._params
+        topic = params.pose_topic if kind == 'pose' else params.wrench_topic
+        self._late[kind] = (
+            ''
+            if age_ns * 1e-9 <= params.deadman_s
+            else (
+                f"the {kind} on '{topic}' comes {age_ns * 1e-6:.0f} ms after its stamp, and "
+                f"{1e3 * params.deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find what "
+                'holds it up, or set the clocks of both machines by each other (chrony)'
+            )
+        )
+        return age_ns
+
+    @property
+    def late(self) -> str:
+        """In a sentence, that the newest pose or force came too late after its stamp; '' if not."""
+        return self._late['pose'] or self._late['force']
+
+    def _at_surface(self, to_base: Array, force_n: Array) -> Vector:
+        return self._frame.direction((to_base @ force_n).tolist())
+
+    def _smoothed(self, force_n: float, passed_s: float) -> float:
+        smoothing_s = self._params.force_smoothing_s
+        if smoothing_s == 0.0 or not math.isfinite(self._force_n) or not math.isfinite(passed_s):
+            return force_n
+        return self._force_n - (force_n - self._force_n) * math.expm1(-passed_s / smoothing_s)
+
+    def _update_velocity(self, time_ns: int) -> None:
+        """Take the velocity from the places of the last moment, by the clock of the sender."""
+        track = self._track
+        if track and time_ns <= track[-1][0]:  # its clock was set back
+            track.clear()
+        track.append((time_ns, self._position))
+        while len(track) > 2 and time_ns - track[1][0] >= VELOCITY_OVER_NS:
+            track.popleft()
+        (begin_ns, first), (end_ns, last) = track[0], track[-1]
+        if end_ns == begin_ns:
+            return
+        vx, vy, vz = ((b - a) / ((end_ns - begin_ns) * 1e-9) for a, b in zip(first, last, strict=True))
+        self._velocity = (vx, vy, vz) if math.hypot(vx, vy, vz) > STILL_M_S else REST
+
+
+# --------------------
+# An arm that ROS controllers drive: it commands velocities, and reads pose and force, over standard topics.
+#
+# The force is controlled by the velocity loop of the suite, or by a compliance controller if one is named. This file
+# knows no ROS: the topics are behind `texture_exploration.arms.ros_controllers.ControllerTopics`.
 
 STANDSTILL = ArmCommand()
-REST: Vector = (0.0, 0.0, 0.0)
 HALTING_NS = 500_000_000  # so long zero velocity is repeated; afterwards others may command the controller
 GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
 RISE_M_S = 0.02
@@ -45,7 +548,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
         If ROS is not installed.
     """
     try:
-        module = importlib.import_module('texture_exploration.ros.controller_topics')
+        module = importlib.import_module('texture_exploration.ros.controllers')
     except ImportError as error:
         raise DeviceError(
             f"the arm 'ros_controllers' needs ROS 2, which is not installed here ({error}); see docs/index.md"
@@ -55,7 +558,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
 
 
 class RosControllersArm:
-    """The arm as the explorer uses it; see `texture_exploration.arms.protocol.Arm`.
+    """The arm as the explorer uses it; see `texture_exploration.arms.arm.Arm`.
 
     Zero velocity is commanded on every way out: a stop, a fault, a command that is too old, `close`, and by a process
     of its own if this one is killed.
@@ -81,7 +584,7 @@ class RosControllersArm:
 
     def __init__(
         self,
-        params: RosControllersParams = RosControllersParams(),  # noqa: B008 (frozen)
+        params: RosControllersParams = RosControllersParams(),
         clock: Callable[[], int] = time.monotonic_ns,
         open_topics: Callable[[RosControllersParams], ControllerTopics] = open_topics,
         own_thread: bool = True,

@@ -4,19 +4,728 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
+import json
+import math
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import astuple, dataclass
 
+from texture_core.config import param
 from texture_core.errors import DeviceError
-from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
-from texture_exploration.arms.surface_frame import SurfaceFrame
-from texture_exploration.arms.tangential_force import tangential_force_n
-from texture_exploration.arms.ur_link import WorkerLink
-from texture_exploration.arms.ur_messages import RECOVER, STOP, UrCommand, UrReport
-from texture_exploration.arms.ur_params import UrArmParams
-from texture_exploration.arms.ur_probe import check_ready, unlock_protective_stop
-from texture_exploration.arms.ur_program import check_program
-from texture_exploration.arms.ur_tables import CB3, SAFETY_FAULTS
+from texture_exploration.arms.arm import (
+    ArmCommand,
+    ArmState,
+    CommandLimits,
+    ForceReading,
+    SurfaceFrame,
+    SurfacePoseParams,
+    Vector,
+    tangential_force_n,
+)
+
+# --------------------
+# A TCP connection to a controller, with a time limit on every answer.
+
+
+class TcpConnection:
+    """A TCP connection on which every wait ends in time, and every failure is a sentence."""
+
+    def __init__(self, ip: str, port: int, timeout_s: float) -> None:
+        self._where = f'{ip}:{port}'
+        self._timeout_s = timeout_s
+        self._end_s = time.monotonic() + timeout_s
+        try:
+            self._socket = socket.create_connection((ip, port), timeout_s)
+        except ConnectionRefusedError as error:
+            raise DeviceError(
+                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address?"
+            ) from error
+        except TimeoutError as error:
+            raise DeviceError(
+                f'{self._where} cannot be reached within {timeout_s:g} s; check the cable, the network and parameter '
+                "'ip'"
+            ) from error
+        except OSError as error:
+            raise DeviceError(f"{self._where} cannot be reached: {error}; check parameter 'ip'") from error
+
+    def close(self) -> None:
+        """End the conversation."""
+        self._socket.close()
+
+    def send(self, data: bytes) -> None:
+        """Send all of it."""
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise self._silent() from error
+
+    def read(self, size: int) -> bytes:
+        """Return exactly so many bytes.
+
+        Raises
+        ------
+        DeviceError
+            If the other side is silent for too long or ends the connection.
+        """
+        data = b''
+        while len(data) < size:
+            try:
+                self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
+                chunk = self._socket.recv(size - len(data))
+            except OSError as error:
+                raise self._silent() from error
+            if not chunk:
+                raise DeviceError(f'{self._where} ended the conversation; is it a UR controller, and has it started?')
+            data += chunk
+        return data
+
+    def read_line(self) -> str:
+        """Return the next line."""
+        line = b''
+        while not line.endswith(b'\n'):
+            line += self.read(1)
+        return line.decode('utf-8', 'replace').strip()
+
+    def _silent(self) -> DeviceError:
+        return DeviceError(
+            f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+            "wait until it has started, restart it, or correct parameter 'ip'"
+        )
+
+
+# --------------------
+# Messages between the arm and its worker process: datagrams on a socket pair, one message each.
+
+COMMAND, STOP, RECOVER, REPORT, FAILURE = (bytes([number]) for number in range(1, 6))
+COMMAND_FORMAT = struct.Struct('<q4d')
+REPORT_FORMAT = struct.Struct('<q10di4?5I')
+LARGEST = 4096
+
+
+@dataclass(frozen=True)
+class UrCommand:
+    """Command to the arm in the base frame: a velocity, (3,), and perhaps a force that presses on the surface.
+
+    `time_ns` is when it was commanded, of CLOCK_MONOTONIC: a wish that waited for the worker is old.
+    """
+
+    time_ns: int
+    velocity_m_s: Vector
+    force_n: float | None
+
+    def to_bytes(self) -> bytes:
+        """Return the message."""
+        force = math.nan if self.force_n is None else self.force_n
+        return COMMAND + COMMAND_FORMAT.pack(self.time_ns, *self.velocity_m_s, force)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> UrCommand:
+        """Return what a message says."""
+        time_ns, vx, vy, vz, force = COMMAND_FORMAT.unpack(data[1:])
+        return cls(time_ns, (vx, vy, vz), None if math.isnan(force) else force)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What was counted since the arm was connected.
+
+    `late`: gaps of more than 20 ms in what the controller sends. `refused`: commands that it did not take. `zeroed`:
+    how often the force sensor was zeroed. `slow_acknowledgements`: commands that took longer than the watchdog waits
+    while the arm moves; `slowest_acknowledgement_ms`: the longest that any took.
+    """
+
+    late: int = 0
+    refused: int = 0
+    zeroed: int = 0
+    slow_acknowledgements: int = 0
+    slowest_acknowledgement_ms: int = 0
+
+
+@dataclass(frozen=True)
+class UrReport:
+    """What the controller measured last, in the base frame, and how it is.
+
+    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
+    says that the force sensor could not be zeroed, because the force changed all the while the finger rose; `zeroed`,
+    that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
+    """
+
+    time_ns: int
+    position_m: Vector
+    velocity_m_s: Vector
+    force_n: Vector
+    watchdog_s: float
+    safety_mode: int
+    playing: bool
+    silent: bool
+    unsteady: bool
+    zeroed: bool
+    counts: Counts
+
+    def to_bytes(self) -> bytes:
+        """Return the message."""
+        vectors = (*self.position_m, *self.velocity_m_s, *self.force_n, self.watchdog_s)
+        status = (self.safety_mode, self.playing, self.silent, self.unsteady, self.zeroed, *astuple(self.counts))
+        return REPORT + REPORT_FORMAT.pack(self.time_ns, *vectors, *status)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> UrReport:
+        """Return what a message says."""
+        numbers = REPORT_FORMAT.unpack(data[1:])
+        position, velocity, force = numbers[1:4], numbers[4:7], numbers[7:10]
+        watchdog_s, safety_mode, playing, silent, unsteady, zeroed = numbers[10:16]
+        status = (safety_mode, playing, silent, unsteady, zeroed, Counts(*numbers[16:]))
+        return cls(numbers[0], position, velocity, force, watchdog_s, *status)
+
+
+def failure_message(text: str) -> bytes:
+    """Return the message that the worker gives up, and why."""
+    return FAILURE + text.encode()[: LARGEST - 1]
+
+
+# --------------------
+# What can be chosen about an arm of Universal Robots.
+
+
+@dataclass(frozen=True)
+class UrArmParams(SurfacePoseParams, CommandLimits):
+    """Where the controller is, where the surface is, and how the arm is supervised."""
+
+    ip: str = param('127.0.0.2', 'Sets the IP address of the controller; the default is that of the emulated one.')
+    rate_hz: float = param(
+        250.0,
+        'Sets the rate of commands and states; a higher rate reacts faster and costs more computing time.',
+        unit='Hz',
+        low=50.0,
+        high=500.0,
+    )
+    arm_acceleration_m_s2: float = param(
+        2.0,
+        'Sets the acceleration towards a new velocity; a larger value follows commands faster.',
+        unit='m/s²',
+        low=0.1,
+        high=10.0,
+    )
+    force_speed_m_s: float = param(
+        0.05,
+        'Sets the highest normal speed under force control; a higher speed corrects force errors faster.',
+        unit='m/s',
+        low=0.001,
+        high=0.25,
+    )
+    command_timeout_s: float = param(
+        0.2,
+        'Sets how long a command holds without a new one; afterwards the arm stands still.',
+        unit='s',
+        low=0.02,
+        high=2.0,
+    )
+    watchdog_hz: float = param(
+        10.0,
+        'Sets the lowest rate of commands at which the controller keeps the arm moving; a higher rate stops it sooner.',
+        unit='Hz',
+        low=1.0,
+        high=50.0,
+    )
+    silence_s: float = param(
+        0.1,
+        'Sets how long the controller may send no state before that is a fault; a longer time notices faults later.',
+        unit='s',
+        low=0.02,
+        high=2.0,
+    )
+    acknowledge_s: float = param(
+        1.0,
+        'Sets how long the controller may take to stop, to end its force control and to zero the force '
+        'sensor; the watchdog waits as long.',
+        unit='s',
+        low=0.2,
+        high=5.0,
+    )
+    zero_rise_m: float = param(
+        0.003,
+        'Sets the rise, at constant force, after which the force sensor is zeroed; a larger rise zeroes it less often.',
+        unit='m',
+        low=0.001,
+        high=0.05,
+    )
+    zero_steady_n: float = param(
+        0.5,
+        'Sets the largest change of the smoothed force that counts as constant; it must exceed the noise of'
+        ' the sensor.',
+        unit='N',
+        low=0.05,
+        high=5.0,
+    )
+    unlock_protective_stop: bool = param(
+        False, 'Releases a protective stop when connecting; false leaves that to a person at the pendant.'
+    )
+    take_over: bool = param(
+        False, 'Stops a program of another user that runs or pauses on the controller; false refuses to connect.'
+    )
+    upper_range_registers: bool = param(
+        False,
+        'Lets the control program use the registers 24 to 47, so that a fieldbus (EtherNet/IP, PROFINET) may keep 0 to '
+        '23; false uses 0 to 23.',
+    )
+    probe_timeout_s: float = param(
+        1.5,
+        'Sets how long the controller may take to answer the first requests before connecting fails.',
+        unit='s',
+        low=0.1,
+        high=10.0,
+    )
+    connect_timeout_s: float = param(
+        10.0,
+        'Sets how long the arm may take to be ready to move before connecting fails.',
+        unit='s',
+        low=0.5,
+        high=60.0,
+    )
+
+
+# --------------------
+# The worker process as its parent sees it: start it, exchange messages with it, end it.
+
+MODULE = 'texture_exploration.arms.ur_worker'
+UR_LINK_STOPPING_S = 1.5  # time to brake, beside what the controller takes to acknowledge it
+ACKNOWLEDGEMENTS = 2  # of a stop and of the end of force control
+FINAL_MESSAGE_S = 0.05
+
+
+class WorkerLink:
+    """One worker process, from its start to its end."""
+
+    def __init__(self, params: UrArmParams) -> None:
+        self.report: UrReport | None = None
+        self._failure = ''
+        self._timeout_s = params.connect_timeout_s
+        self._stopping_s = UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * params.acknowledge_s
+        self._state_received = threading.Event()
+        self._channel, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        command = [sys.executable, '-m', MODULE, str(end.fileno()), json.dumps(dataclasses.asdict(params))]
+        with end:
+            self._process = subprocess.Popen(
+                command, pass_fds=[end.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+            )
+        self._reader = threading.Thread(target=self._read, name='ur_link', daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    def wait_for_report(self) -> None:
+        """Return when the first report has come.
+
+        Raises
+        ------
+        DeviceError
+            If the worker ends before, or none comes in time.
+        """
+        if not self._state_received.wait(self._timeout_s):
+            raise DeviceError(
+                f'the controller did not let the arm be ready within {self._timeout_s:g} s; '
+                'look at its pendant, and restart it if it hangs'
+            )
+        self.check()
+
+    def check(self) -> None:
+        """Return if the worker is there.
+
+        Raises
+        ------
+        DeviceError
+            With the reason why it is not.
+        """
+        if not self._reader.is_alive() or self.report is None:
+            raise DeviceError(self._why_ended())
+
+    def send(self, data: bytes) -> None:
+        """Send a message to the worker, without waiting.
+
+        Raises
+        ------
+        DeviceError
+            If it is gone or does not read.
+        """
+        try:
+            self._channel.send(data, socket.MSG_DONTWAIT)
+        except BlockingIOError as error:
+            raise DeviceError('the process that talks to the controller hangs; connect again') from error
+        except OSError as error:
+            raise DeviceError(self._why_ended()) from error
+
+    def end(self) -> None:
+        """Let the arm come to rest and the worker end; kill it if it does not: then the watchdog stops the arm."""
+        self._channel.shutdown(socket.SHUT_RDWR)
+        try:
+            self._process.wait(self._stopping_s)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._reader.join()
+        self._channel.close()
+
+    def _read(self) -> None:
+        while data := self._receive():
+            kind = data[:1]
+            if kind == REPORT:
+                self.report = UrReport.from_bytes(data)
+                self._state_received.set()
+            elif kind == FAILURE:
+                self._failure = data[1:].decode()
+        self._state_received.set()
+
+    def _receive(self) -> bytes:
+        try:
+            return self._channel.recv(LARGEST)
+        except OSError:
+            return b''
+
+    def _why_ended(self) -> str:
+        self._reader.join(FINAL_MESSAGE_S)  # what the worker said before it ended may still be on its way
+        if self._failure:
+            return self._failure
+        if self._process.poll() == -signal.SIGALRM:
+            return 'the controller stopped answering in the middle of a command; look at its pendant, and connect again'
+        return 'the process that talks to the controller ended; connect again'
+
+
+# --------------------
+# Facts about controllers of Universal Robots.
+#
+# Source: the RTDE guide and the dashboard guide of Universal Robots.
+
+RTDE_PORT = 30004
+DASHBOARD_PORT = 29999
+DASHBOARD_BANNER = 'Universal Robots Dashboard Server'
+FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X
+FIRST_WITH_REMOTE_CONTROL = (5, 6)
+# Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
+# control; a PolyScope X that takes programs on the port where ur-rtde sends its own.
+OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
+CB3 = 3  # the series without a force sensor in the flange
+CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
+# Which it obeys; one client only may write it. By whether the upper range is used (FLAG_UPPER_RANGE_REGISTERS).
+COMMAND_REGISTERS: Mapping[bool, str] = {False: 'input_int_register_0', True: 'input_int_register_24'}
+
+REQUEST_VERSION = 86  # 'V', types of RTDE messages
+CONTROLLER_VERSION = 118  # 'v'
+SETUP_OUTPUTS, SETUP_INPUTS, START, DATA = 79, 73, 83, 85
+PROTOCOL_VERSION = 2
+
+PROGRAM_STOPPED, PROGRAM_PLAYING = 1, 2  # runtime_state
+
+# safety_mode -> why the arm cannot move; what is not listed lets it move
+SAFETY_FAULTS: Mapping[int, str] = {
+    3: 'protective stop',
+    4: 'recovery mode',
+    5: 'safeguard stop',
+    6: 'emergency stop of the system',
+    7: 'emergency stop of the robot',
+    8: 'violation of a safety limit',
+    9: 'fault of the safety system',
+    10: 'a joint must be validated',
+    11: 'undefined safety mode',
+    12: 'safeguard stop of the automatic mode',
+    13: 'three-position enabling stop',
+}
+
+# Force control about a fixed frame; the other axes may leave their path by so much: 0.1 m and 20°, as PolyScope does.
+FORCE_FRAME_FIXED = 2
+FORCE_DEVIATION_M = 0.1
+FORCE_DEVIATION_RAD = 0.349
+STOP_DECELERATION_M_S2 = 10.0  # the default of ur-rtde
+
+
+# --------------------
+# Find out in plain Python, within a fixed time, whether a UR controller is there and ready.
+#
+# ur-rtde waits without a limit for a controller that does not answer; so it is only told to connect where one does.
+
+HEADER = struct.Struct('>HB')
+STATE = struct.Struct('>BI')  # recipe, runtime state
+RUNTIME_HZ = 10.0
+FREE_MODES = ('NORMAL', 'REDUCED')
+UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
+UNLOCK_RETRY_S = 0.25
+
+
+def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
+    """Return the major and minor version of the controller.
+
+    Raises
+    ------
+    DeviceError
+        If there is none, or it does not answer in time.
+    """
+    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        answer = _ask(line, CONTROLLER_VERSION, b'')
+    if len(answer) < 8:
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell its version; is it a UR controller?')
+    major, minor = struct.unpack_from('>2I', answer)
+    return major, minor
+
+
+def runtime_state(ip: str, timeout_s: float) -> int:
+    """Return the runtime state of the controller: 1 if no program runs or pauses.
+
+    Raises
+    ------
+    DeviceError
+        If it does not answer in time.
+    """
+    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        _ask(line, SETUP_OUTPUTS, struct.pack('>d', RUNTIME_HZ) + b'runtime_state')
+        _ask(line, START, b'')
+        data = _await(line, DATA)
+    if len(data) != STATE.size:
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell whether a program runs; is it a UR controller?')
+    state: int
+    _, state = STATE.unpack(data)
+    return state
+
+
+def claims_register(ip: str, name: str, timeout_s: float) -> bool:
+    """Return whether an input register is free, by claiming it for a moment.
+
+    Parameters
+    ----------
+    ip
+        Address of the controller.
+    name
+        Name of the input register, such as 'input_double_register_24'.
+    timeout_s
+        Longest time to wait for the answers.
+
+    Returns
+    -------
+    bool
+        False if another program writes the register.
+
+    Raises
+    ------
+    DeviceError
+        If the controller does not answer in time.
+    """
+    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        return b'IN_USE' not in _ask(line, SETUP_INPUTS, name.encode())
+
+
+def _ask(line: TcpConnection, kind: int, payload: bytes) -> bytes:
+    """Send a message and return the payload of the answer of the same type."""
+    line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
+    return _await(line, kind)
+
+
+def _await(line: TcpConnection, kind: int) -> bytes:
+    """Return the payload of the next message of a type; others, such as texts, are passed over."""
+    while True:
+        size, answered = HEADER.unpack(line.read(HEADER.size))
+        answer = line.read(max(0, size - HEADER.size))
+        if answered == kind:
+            return answer
+
+
+class DashboardClient(TcpConnection):
+    """The dashboard server of a controller: a line is asked, a line is answered."""
+
+    def __init__(self, ip: str, timeout_s: float) -> None:
+        super().__init__(ip, DASHBOARD_PORT, timeout_s)
+        try:
+            banner = self.read_line()
+            if DASHBOARD_BANNER not in banner:
+                raise DeviceError(f"{self._where} greets with '{banner}' and not as the dashboard of a UR controller")
+        except DeviceError:
+            self.close()
+            raise
+
+    def ask(self, line: str) -> str:
+        """Return the answer to a command."""
+        self.send(line.encode() + b'\n')
+        return self.read_line()
+
+
+def check_ready(ip: str, timeout_s: float, unlock: bool) -> tuple[int, int]:
+    """Return the version of a controller whose arm can move; release a protective stop if `unlock` says so.
+
+    Parameters
+    ----------
+    ip
+        Address of the controller.
+    timeout_s
+        Longest time for all questions and answers.
+    unlock
+        Whether a protective stop is released.
+
+    Returns
+    -------
+    (int, int)
+        Version of the controller, such as (5, 12).
+
+    Raises
+    ------
+    DeviceError
+        With what stands in the way, and what to do.
+    """
+    end_s = time.monotonic() + timeout_s
+    version = rtde_version(ip, timeout_s)
+    _check_version(ip, version)
+    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+        return version
+    with closing(DashboardClient(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
+        mode = dashboard.ask('robotmode')
+        if 'RUNNING' not in mode:
+            raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
+        if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in dashboard.ask('is in remote control'):
+            raise DeviceError(f'the arm at {ip} is under local control; switch the pendant to remote control')
+        safety = _safety(dashboard)
+    if safety in FREE_MODES:
+        return version
+    if safety != 'PROTECTIVE_STOP' or not unlock:
+        raise DeviceError(
+            f'the arm at {ip} is held by its safety system ({safety}); find out why, release it on the pendant, '
+            'and ask again'
+        )
+    unlock_protective_stop(ip, timeout_s)
+    return version
+
+
+def _check_version(ip: str, version: tuple[int, int]) -> None:
+    oldest = OLDEST.get(version[0], min(OLDEST.values()))
+    if version < oldest:
+        raise DeviceError(
+            f'the controller at {ip} has the software {version[0]}.{version[1]}, which is too old for force control, '
+            f'zeroing of the force sensor or the watchdog; update it to {oldest[0]}.{oldest[1]} or newer'
+        )
+
+
+def unlock_protective_stop(ip: str, timeout_s: float) -> None:
+    """Release a protective stop, as soon as the controller allows it.
+
+    Raises
+    ------
+    DeviceError
+        If it does not.
+    """
+    end_s = time.monotonic() + UNLOCK_WAIT_S
+    while True:
+        with closing(DashboardClient(ip, timeout_s)) as dashboard:
+            if _safety(dashboard) in FREE_MODES:
+                return
+            answer = dashboard.ask('unlock protective stop')
+        if time.monotonic() > end_s:
+            raise DeviceError(f"the controller at {ip} does not release the protective stop: '{answer}'")
+        time.sleep(UNLOCK_RETRY_S)
+
+
+def _safety(dashboard: DashboardClient) -> str:
+    """Return the safety mode, such as NORMAL."""
+    return dashboard.ask('safetymode').rpartition(' ')[2]
+
+
+# --------------------
+# See to it that connecting stops nobody else's program on a UR controller: ur-rtde stops whatever runs there.
+
+SAMPLE_PERIOD_S = 0.05
+UR_PROGRAM_STOPPING_S = 2.0
+
+
+def check_program(
+    ip: str,
+    version: tuple[int, int],
+    timeout_s: float,
+    *,
+    take_over: bool,
+    pause_is_ours: bool,
+    patience_s: float,
+    upper_range: bool = False,
+) -> None:
+    """Return if no program runs or pauses on the controller, or none that anybody needs.
+
+    A stop by the safety system may pause the program of the connection before: `pause_is_ours`. A control script of
+    ours whose process was killed is ended by its watchdog within `patience_s`; one that has none yet is known by its
+    name and by nobody writing the register that it obeys: one of the upper range if `upper_range`.
+
+    Parameters
+    ----------
+    ip
+        Address of the controller.
+    version
+        Version of the controller, as `check_ready` gives it.
+    timeout_s
+        Longest time to wait for one answer.
+    take_over
+        Whether a program of others is stopped.
+    pause_is_ours
+        Whether a paused program is one that this connection started before.
+    patience_s
+        How long a running program may take to end by itself.
+    upper_range
+        Whether the registers of the upper range are used.
+
+    Raises
+    ------
+    DeviceError
+        If there is one and `take_over` does not allow to stop it.
+    """
+    end_s = time.monotonic() + patience_s
+    while program := _program(ip, version, timeout_s):
+        if take_over or (pause_is_ours and program.upper().startswith('PAUSED')):
+            break
+        if time.monotonic() > end_s:
+            if _is_orphan(ip, program, timeout_s, COMMAND_REGISTERS[upper_range]):
+                break
+            raise DeviceError(
+                f"another program is on the controller at {ip} ('{program}'), and connecting would stop it; stop it on "
+                "the pendant, or set parameter 'take_over' to true"
+            )
+        time.sleep(SAMPLE_PERIOD_S)
+    else:
+        return
+    _stop(ip, version, timeout_s)
+
+
+def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
+    """Return what runs or pauses, as the controller says it; '' if nothing does."""
+    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+        runtime = runtime_state(ip, timeout_s)
+        return '' if runtime == PROGRAM_STOPPED else f'runtime state {runtime}'
+    with closing(DashboardClient(ip, timeout_s)) as dashboard:
+        running, state = dashboard.ask('running'), dashboard.ask('programState')
+    return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
+
+
+def _is_orphan(ip: str, program: str, timeout_s: float, register: str) -> bool:
+    return CONTROL_SCRIPT in program and claims_register(ip, register, timeout_s)
+
+
+def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
+    """Stop it by the dashboard; without one ur-rtde has to."""
+    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+        return
+    with closing(DashboardClient(ip, timeout_s)) as dashboard:
+        dashboard.ask('stop')
+    end_s = time.monotonic() + UR_PROGRAM_STOPPING_S
+    while program := _program(ip, version, timeout_s):
+        if time.monotonic() > end_s:
+            raise DeviceError(
+                f"the program on the controller at {ip} ('{program}') does not stop; stop it on the pendant"
+            )
+        time.sleep(SAMPLE_PERIOD_S)
+
 
 BASE_FRAME_ID = 'base'  # as ur_robot_driver and UR's own description call it, without a prefix
 STANDSTILL = ArmCommand()
@@ -41,7 +750,7 @@ class UrArm:
     Params = UrArmParams
     force_reading = ForceReading.NOISY  # in double precision
 
-    def __init__(self, params: UrArmParams = UrArmParams()) -> None:  # noqa: B008 (frozen)
+    def __init__(self, params: UrArmParams = UrArmParams()) -> None:
         self._params = params
         self._frame = SurfaceFrame(params.surface_pose)
         self._link: WorkerLink | None = None
@@ -196,7 +905,7 @@ class UrArm:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of this connection; see `texture_exploration.arms.ur_messages.Counts`."""
+        """Totals of this connection; see `texture_exploration.arms.ur.Counts`."""
         return dataclasses.asdict(self._report().counts)
 
     def _connected(self) -> WorkerLink:

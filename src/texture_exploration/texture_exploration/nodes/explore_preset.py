@@ -12,10 +12,8 @@ from typing import Any
 from rclpy.node import Node
 from texture_msgs import srv
 
-from texture_core.parameters import param
-from texture_core.ros.conversions import request_to_msg
-from texture_core.ros.parameters import declare
-from texture_core.ros.run import run
+from texture_core.config import param
+from texture_core.ros import declare, request_to_msg, run
 from texture_exploration.presets import load_preset
 
 SAMPLE_PERIOD_S = 0.1

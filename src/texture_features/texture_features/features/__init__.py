@@ -1,1 +1,1 @@
-"""The features, one a file; `texture_features.catalogue` lists them."""
+"""The features, one a file; `texture_features.feature_set` lists them."""

@@ -11,15 +11,21 @@ from typing import Any
 from rclpy.node import Node
 from texture_msgs import msg
 
+from texture_core.config import param
 from texture_core.errors import TextureError
-from texture_core.parameters import param
-from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.parameters import declare
-from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
-from texture_core.ros.run import run
+from texture_core.ros import (
+    FEATURE_QOS,
+    SENSOR_QOS,
+    STATE_QOS,
+    DiagnosticReport,
+    Diagnostics,
+    declare,
+    from_msg,
+    run,
+    to_msg,
+)
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import WindowCutter, WindowEvent
+from texture_features.windows import WindowCutter, WindowEvent
 
 TIMEOUT_PERIOD_S = 0.1
 

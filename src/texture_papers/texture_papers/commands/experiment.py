@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_core.command_options import add_seed
-from texture_papers.catalogue import EXPERIMENTS, Experiment, run_experiment, run_over_seeds
+from texture_core.cli import add_seed
+from texture_papers.catalogue import EXPERIMENTS, run_experiment, run_over_seeds
+from texture_papers.protocol import Experiment
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

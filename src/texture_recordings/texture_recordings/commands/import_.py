@@ -5,13 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_core.catalogue import find
-from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_core.cli import add_channels, add_seed, add_slides
+from texture_core.config import find
 from texture_core.errors import InvalidParameter
-from texture_recordings.importers.catalogue import IMPORTS
-from texture_recordings.tables.import_tables import import_tables
-from texture_recordings.tables.mapping import load_mapping
-from texture_recordings.tables.tables import MAPPED
+from texture_recordings.public_sets import IMPORTS
+from texture_recordings.tables import MAPPED, import_tables, load_mapping
 
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from texture_core.ros.run_node import run_node
+from texture_core.ros import run_node
 from texture_recordings.nodes.record import RecordNode
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from texture_core.parameters import check_option
-from texture_core.ros.run_node import run_node
+from texture_core.config import check_option
+from texture_core.ros import run_node
 from texture_recordings.nodes.replay import ReplayNode, ReplayParams
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from texture_core.parameters import from_mapping, parameters_of
-from texture_features.segmentation.segments import SegmentationParams
+from texture_core.config import from_mapping, parameters_of
+from texture_features.segmentation import SegmentationParams
 from texture_recordings.segment import segment_bags
 
 

@@ -13,17 +13,12 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.parameters import param
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.parameters import declare
-from texture_core.ros.run import run
-from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import RawMessage
-from texture_recordings.cdr import SignalDecoder
-from texture_recordings.continuity import Continuity
-from texture_recordings.ros.topics import TOPICS, Topic
-from texture_recordings.topic_names import short_name
+from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
+from texture_recordings.bags import BagWriter, RawMessage, SignalDecoder, short_name
+from texture_recordings.dataset import Continuity
+from texture_recordings.ros import TOPICS, Topic
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2

@@ -16,17 +16,53 @@ from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockTime
 
+from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter, TextureError
-from texture_core.parameters import param
-from texture_core.ros.parameters import declare
-from texture_core.ros.run import run
-from texture_core.ros.time import to_stamp
-from texture_recordings.bags import RawMessage, find_bags, read_named, topics_in
-from texture_recordings.ros.sole_publisher import refuse_other_publishers
-from texture_recordings.ros.topics import TOPICS
-from texture_recordings.schedule import Schedule
-from texture_recordings.slides import find_slides
-from texture_recordings.topic_names import short_name
+from texture_core.ros import declare, run, to_stamp
+from texture_core.types import NANOSECONDS
+from texture_recordings.bags import RawMessage, find_bags, read_named, short_name, topics_in
+from texture_recordings.dataset import find_slides
+from texture_recordings.ros import TOPICS, refuse_other_publishers
+
+# --------------------
+# When each message of a recording is due in a replay.
+
+
+class Schedule:
+    """Turn log times, given in their order, into seconds since the replay began.
+
+    Parameters
+    ----------
+    rate
+        How many times faster than recorded.
+    longest_pause_s
+        Longer pauses between messages, such as those between two slides, are cut to this; s of the recording.
+
+    Examples
+    --------
+    >>> schedule = Schedule(rate=2.0, longest_pause_s=1.0)
+    >>> [schedule.due_s(second * NANOSECONDS) for second in (0, 1, 60)]  # the pause of 59 s is cut to one
+    [0.0, 0.5, 1.0]
+    """
+
+    def __init__(self, rate: float, longest_pause_s: float) -> None:
+        self._rate = rate
+        self._longest_ns = round(longest_pause_s * NANOSECONDS)
+        self._last_ns: int | None = None
+        self._played_ns = 0
+
+    def due_s(self, log_ns: int) -> float:
+        """Return when the message logged at `log_ns` is due."""
+        if self._last_ns is not None:
+            self._played_ns += min(max(log_ns - self._last_ns, 0), self._longest_ns)
+        self._last_ns = log_ns
+        return self._played_ns / self._rate / NANOSECONDS
+
+    @property
+    def played_s(self) -> float:
+        """Seconds of the recording up to the last message asked for, with shortened pauses."""
+        return self._played_ns / NANOSECONDS
+
 
 # What is derived from these is left out: the live graph derives it again.
 INPUTS = ('signal', 'signal_static', 'exploration')

@@ -8,11 +8,8 @@ from typing import Any
 from rclpy.node import Node
 
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_core.ros.diagnostics import Diagnostics
-from texture_core.ros.parameters import declare, on_change
-from texture_core.ros.run import run
-from texture_simulation.emulator import Emulator
-from texture_simulation.emulator_params import EmulatorParams
+from texture_core.ros import Diagnostics, declare, on_change, run
+from texture_simulation.emulator import Emulator, EmulatorParams
 
 # What an operator can do at run time: swap the sample, unplug the sensor, disturb the line.
 CHANGEABLE = ('surface', 'plugged', 'unplugged_finger', 'bit_flips')

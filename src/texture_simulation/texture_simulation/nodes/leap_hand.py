@@ -9,12 +9,9 @@ from typing import Any
 
 from rclpy.node import Node
 
-from texture_core.parameters import param
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.parameters import declare
-from texture_core.ros.run import run
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, leap_hand
+from texture_core.config import param
+from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
+from texture_simulation.devices.dynamixel import LEAP_FINGERS, EmulatedDynamixelBus, leap_hand
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,10 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from rclpy.node import Node
 
-from texture_core.finger_state import FingerSender
-from texture_core.parameters import param
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.parameters import declare, on_change
-from texture_core.ros.run import run
-from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
-from texture_simulation.devices.twist_controller_params import TwistControllerParams
+from texture_core.config import param
+from texture_core.ros import DiagnosticReport, Diagnostics, declare, on_change, run
+from texture_core.types import FingerSender
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 COMMANDED_S = 0.3  # who commands an arm that moves does so more often
 LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills

@@ -6,11 +6,8 @@ from typing import Any
 
 from rclpy.node import Node
 
-from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
-from texture_core.ros.parameters import declare
-from texture_core.ros.run import run
-from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.process import ControllerProcess
+from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
+from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 
 class UrControllerNode(Node):

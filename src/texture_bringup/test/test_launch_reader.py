@@ -1,0 +1,219 @@
+import contextlib
+import os
+from pathlib import Path
+
+import pytest
+
+from texture_bringup.launcher import NodeDescription, all_arguments, command, declared_arguments, joined_namespace, read
+from texture_core.errors import InvalidLaunch, UnknownName
+
+NODE = '<node pkg="p" exec="e"/>'
+
+
+@pytest.fixture
+def launch(tmp_path, monkeypatch):
+    """Return a function: elements of a launch file, arguments → nodes; a package 'p' is installed."""
+    (tmp_path / 'share/ament_index/resource_index/packages').mkdir(parents=True)
+    (tmp_path / 'share/ament_index/resource_index/packages/p').touch()
+    (tmp_path / 'lib/p').mkdir(parents=True)
+    (tmp_path / 'lib/p/e').touch(mode=0o755)
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path}')
+
+    def read_elements(elements: str, **given: str) -> list[NodeDescription]:
+        file = tmp_path / 'a.launch.xml'
+        file.write_text(f'<launch>{elements}</launch>')
+        return read(file, given, {'HOME': '/home/me'})
+
+    read_elements.folder = tmp_path
+    return read_elements
+
+
+def test_an_argument_has_its_default_until_one_is_given(launch) -> None:
+    elements = '<arg name="who" default="$(env HOME)"/><node pkg="p" exec="e" name="$(var who)"/>'
+    assert launch(elements)[0].name == '/home/me'
+    assert launch(elements, who='you')[0].name == 'you'
+
+
+@pytest.mark.parametrize(('model', 'started'), [('', 0), ('a b/rough.json', 1)])
+def test_a_node_can_depend_on_whether_an_argument_is_given(launch, model, started) -> None:
+    condition = 'if="$(not-equals \'m$(var model)\' m)"'
+    nodes = launch(f'<arg name="model" default=""/><node pkg="p" exec="e" {condition}/>', model=model)
+    assert len(nodes) == started
+
+
+def test_a_required_argument_must_be_given(launch) -> None:
+    with pytest.raises(InvalidLaunch, match='give bag:=VALUE'):
+        launch('<arg name="bag"/>')
+
+
+def test_an_argument_outside_its_choices_is_refused(launch) -> None:
+    with pytest.raises(InvalidLaunch, match='one of cork, birch'):
+        launch('<arg name="s" default="cork"><choice value="cork"/><choice value="birch"/></arg>', s='felt')
+
+
+@pytest.mark.parametrize(
+    ('elements', 'nearest'),
+    [
+        ('<nod pkg="p" exec="e"/>', "'node'"),
+        ('<node pkg="p" exe="e"/>', "'exec'"),
+        ('<node pkg="p" exec="e"><parm name="a" value="1"/></node>', "'param'"),
+        ('<arg name="speed" default="1"/><let name="x" value="$(var sped)"/>', "'speed'"),
+        ('<let name="x" value="$(find-pkg-shar p)"/>', "'find-pkg-share'"),
+    ],
+)
+def test_what_is_not_known_gets_the_nearest_name(launch, elements, nearest) -> None:
+    with pytest.raises(UnknownName, match=nearest):
+        launch(elements)
+
+
+def test_an_undeclared_argument_gets_the_nearest_also_of_one_behind_a_condition(launch) -> None:
+    elements = '<group if="false"><arg name="model" default=""/></group>'
+    assert launch(elements, model='x') == []
+    with pytest.raises(UnknownName, match="'model'"):
+        launch(elements, modl='x')
+
+
+@pytest.mark.parametrize(
+    ('condition', 'nodes'),
+    [('if="true"', 1), ('if="0"', 0), ('unless="True"', 0), ('unless="$(var off)"', 1)],
+)
+def test_conditions_choose(launch, condition, nodes) -> None:
+    assert len(launch(f'<let name="off" value="false"/><node pkg="p" exec="e" {condition}/>')) == nodes
+
+
+def test_a_condition_that_is_neither_true_nor_false_is_refused(launch) -> None:
+    with pytest.raises(InvalidLaunch, match='true, false, 1 or 0'):
+        launch('<node pkg="p" exec="e" if="yes"/>')
+
+
+def test_a_group_keeps_its_changes_to_itself_and_an_unscoped_one_does_not(launch) -> None:
+    change = '<push_ros_namespace namespace="left"/><let name="n" value="inner"/><set_env name="E" value="1"/>'
+    node = '<node pkg="p" exec="e" name="$(var n)"/>'
+    inner, outer = launch(f'<let name="n" value="outer"/><group>{change}{node}</group>{node}')
+    assert (inner.name, inner.namespace, inner.environment['E']) == ('inner', '/left', '1')
+    assert (outer.name, outer.namespace, 'E' in outer.environment) == ('outer', '', False)
+    assert launch(f'<let name="n" value="outer"/><group scoped="false">{change}</group>{node}')[0].namespace == '/left'
+
+
+def test_an_empty_namespace_is_the_root(launch) -> None:
+    (node,) = launch('<push_ros_namespace namespace=""/><node pkg="p" exec="e" name="n"/>')
+    assert (node.namespace, node.parameter_key, node.label) == ('/', '/n', 'n')
+    assert launch('<node pkg="p" exec="e" namespace=""/>')[0].namespace == '/'
+
+
+def test_an_include_gets_its_arguments_and_leaves_them_set_as_upstream_does(launch) -> None:
+    inner = launch.folder / 'inner.launch.xml'
+    inner.write_text('<launch><arg name="n" default="none"/><node pkg="p" exec="e" name="$(var n)"/></launch>')
+    include = f'<include file="{inner}"><arg name="n" value="given"/></include>'
+    assert [node.name for node in launch(include + '<node pkg="p" exec="e" name="$(var n)"/>')] == ['given', 'given']
+    with pytest.raises(UnknownName, match=r"no argument of inner.launch.xml 'm'"):
+        launch(include.replace('name="n"', 'name="m"'))
+
+
+def test_a_file_that_includes_itself_is_refused(launch) -> None:
+    with pytest.raises(InvalidLaunch, match='include itself'):
+        launch(f'<include file="{launch.folder / "a.launch.xml"}"/>')
+
+
+def test_params_are_typed_nested_and_kept_in_their_order_with_files(launch) -> None:
+    (launch.folder / 'p.yaml').write_text('{}')
+    params = (
+        '<param name="rate" value="2.5"/>'
+        '<param name="pid"><param name="p" value="1"/><param name="i" value="0.5"/></param>'
+        f'<param from="{launch.folder}/p.yaml"/><param name="id" value="7" type="str"/>'
+    )
+    (node,) = launch(f'<node pkg="p" exec="e">{params}</node>')
+    assert node.parameters == ({'rate': 2.5}, {'pid.p': 1, 'pid.i': 0.5}, launch.folder / 'p.yaml', {'id': '7'})
+
+
+def test_the_command_line_is_that_of_ros(launch, tmp_path) -> None:
+    (node,) = launch(
+        '<let name="x" value="a b"/><node pkg="p" exec="e" name="n" namespace="ns" args="--flag $(var x) \'c d\'">'
+        '<remap from="signal" to="/s"/><param name="rate" value="2"/></node>'
+    )
+    words = command(node, tmp_path / 'params')
+    assert words[1:4] == ['--flag', 'a b', 'c d']
+    assert words[4:10] == ['--ros-args', '-r', '__node:=n', '-r', '__ns:=/ns', '--params-file']
+    assert words[11:] == ['-r', 'signal:=/s']
+    assert Path(words[10]).read_text() == '/ns/n:\n  ros__parameters:\n    rate: 2\n'
+
+
+def test_an_unknown_package_or_executable_gets_the_nearest(launch, tmp_path) -> None:
+    with pytest.raises(UnknownName, match="'p'"):
+        command(NodeDescription('pp', 'e'), tmp_path)
+    with pytest.raises(UnknownName, match="no executable of package 'p' 'ee'"):
+        command(NodeDescription('p', 'ee'), tmp_path)
+
+
+def test_broken_xml_and_another_root_are_named(tmp_path) -> None:
+    file = tmp_path / 'x.launch.xml'
+    for text, sentence in {'<launch>': 'not well-formed', '<robot/>': '<launch> is needed'}.items():
+        file.write_text(text)
+        with pytest.raises(InvalidLaunch, match=sentence):
+            read(file, {}, {})
+
+
+def test_declared_arguments_are_listed_with_their_description(tmp_path) -> None:
+    file = tmp_path / 'x.launch.xml'
+    file.write_text('<launch><arg name="a" default="1" description="first"/><arg name="b"/></launch>')
+    assert [(a.name, a.default, a.description) for a in declared_arguments(file)] == [
+        ('a', '1', 'first'),
+        ('b', None, ''),
+    ]
+
+
+@pytest.mark.parametrize(
+    ('base', 'name', 'joined'),
+    [
+        ('', '', ''),
+        ('/a', '', '/a'),
+        ('', 'b', '/b'),
+        ('/a', 'b', '/a/b'),
+        ('/a', '/c', '/c'),
+        ('/', 'b', '/b'),
+        ('/', '', '/'),
+    ],
+)
+def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None:
+    assert joined_namespace(base, name) == joined
+
+
+HOSTILE = {
+    'nested groups': '<group>' * 20_000 + '</group>' * 20_000,
+    'many elements': "<let name='a' value='b'/>" * 6000,
+    'texts that double': "<let name='a' value='xx'/>" + "<let name='a' value='$(var a)$(var a)'/>" * 40,
+    'a variable of doubling length': "<let name='a' value='xx'/>"
+    + "<set_env name='a' value='$(env a x)$(env a x)'/>" * 40,
+    'calls within calls': "<let name='a' value='" + '$(var ' * 1000 + "'/>",
+    'a parameter nested deeply': "<node pkg='a' exec='b'><param name='a' value='" + '[' * 3000 + "'/></node>",
+    'a list nested deeply': "<node pkg='a' exec='b'><param name='a' type='list_of_int' value='"
+    + '[' * 3000
+    + "'/></node>",
+    'quotes that are not closed': """<node pkg='a' exec='b' args='it"s'/>""",
+    'two includes of itself': "<include file='{file}'/>" * 2,
+    'a comment of 300 kB': '<!--' + ' ' * 300_000 + '-->',
+}
+
+
+@pytest.mark.parametrize('what', HOSTILE)
+def test_a_launch_file_that_grows_without_end_is_refused_with_a_sentence(what: str, tmp_path: Path) -> None:
+    file = tmp_path / 'hostile.launch.xml'
+    file.write_text(f'<launch>{HOSTILE[what].replace("{file}", str(file))}</launch>')
+    with pytest.raises(InvalidLaunch):
+        read(file, {}, {})
+    with contextlib.suppress(InvalidLaunch):
+        all_arguments(file, {})
+
+
+def test_entities_that_multiply_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / 'laughs.launch.xml'
+    entities = ''.join(f'<!ENTITY {b} "{f"&{a};" * 9}">' for a, b in zip('abcdefghi', 'bcdefghij', strict=True))
+    file.write_text(f'<!DOCTYPE x [<!ENTITY a "ha">{entities}]><launch><let name="a" value="&j;"/></launch>')
+    with pytest.raises(InvalidLaunch, match='DOCTYPE'):
+        read(file, {}, {})
+
+
+def test_a_named_pipe_is_no_launch_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'pipe.launch.xml')
+    with pytest.raises(InvalidLaunch, match='named pipe'):
+        read(tmp_path / 'pipe.launch.xml', {}, {})

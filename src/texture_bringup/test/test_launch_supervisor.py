@@ -1,0 +1,197 @@
+"""The launcher as a program, with shell scripts for nodes: no ROS is needed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.realtime
+
+GOOD = 'trap "exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'
+STUBBORN = 'trap "" INT; trap "exit 0" TERM; echo "ready $$"; while :; do sleep 0.05; done'
+PARENT = 'sleep 1000 & trap "exit 0" INT TERM; echo "ready $!"; while :; do sleep 0.05; done'
+DEADLINE_S = 20.0
+
+
+class Launched:
+    """A running launcher."""
+
+    def __init__(self, file: Path, prefix: Path, options: tuple[str, ...] = ()) -> None:
+        environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
+        command = [sys.executable, '-m', 'texture_bringup.commands.launch', *options, str(file)]
+        self.process = subprocess.Popen(
+            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        self.lines = []
+
+    def wait_for(self, text: str) -> str:
+        """Return the next line that holds a text."""
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip())
+            if text in line:
+                return line
+        raise AssertionError(f"the launcher ended without '{text}': {self.lines}")
+
+    def ready(self) -> int:
+        """Return the process id that the next node says it is ready with."""
+        return int(self.wait_for('ready').split()[-1])
+
+    def end(self) -> int:
+        """Return the exit code once it ends."""
+        output, _ = self.process.communicate(timeout=DEADLINE_S)
+        self.lines += output.splitlines()
+        return self.process.returncode
+
+
+@pytest.fixture
+def launch(tmp_path):
+    """Return a function: scripts by node name (and extra attributes of a node) → a running launcher."""
+    (tmp_path / 'share/ament_index/resource_index/packages').mkdir(parents=True)
+    (tmp_path / 'share/ament_index/resource_index/packages/p').touch()
+    (tmp_path / 'lib/p').mkdir(parents=True)
+    started = []
+
+    def start(scripts: dict[str, str], *options: str, **attributes: str) -> Launched:
+        nodes = ''
+        for name, script in scripts.items():
+            (tmp_path / 'lib/p' / name).write_text(f'#!/bin/sh\n{script}\n')
+            (tmp_path / 'lib/p' / name).chmod(0o755)
+            nodes += f'<node pkg="p" exec="{name}" output="screen" {attributes.get(name, "")}/>'
+        (tmp_path / 'a.launch.xml').write_text(f'<launch>{nodes}</launch>')
+        started.append(Launched(tmp_path / 'a.launch.xml', tmp_path, options))
+        return started[-1]
+
+    yield start
+    for item in started:
+        item.process.kill()
+        item.process.wait()
+        item.process.stdout.close()
+
+
+def gone(pid: int) -> bool:
+    """Return whether a process ends before the deadline (one that waits to be reaped has ended)."""
+    deadline = time.monotonic() + DEADLINE_S
+    while time.monotonic() < deadline:
+        try:
+            if Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] == 'Z':
+                return True
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        time.sleep(0.02)
+    return False
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_ends_every_node_and_what_nodes_started(launch, number) -> None:
+    launched = launch({'good': GOOD, 'parent': PARENT})
+    pids = [launched.ready(), launched.ready()]
+    launched.process.send_signal(number)
+    assert launched.end() == 0
+    assert all(gone(pid) for pid in pids)
+    assert any(line.startswith('[good] ready') for line in launched.lines)
+
+
+def test_a_second_ctrl_c_goes_on_to_sigterm_at_once(launch) -> None:
+    launched = launch({'stubborn': STUBBORN})
+    launched.ready()
+    launched.process.send_signal(signal.SIGINT)
+    launched.wait_for('SIGINT to stubborn')
+    begin = time.monotonic()
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 0
+    assert time.monotonic() - begin < 4.0
+
+
+def test_a_python_node_that_is_still_importing_ends_without_a_traceback(launch) -> None:
+    # Python handles SIGINT from its start by an exception, and SIGTERM not at all: as it is while a node imports.
+    program = 'import time; print("ready 1", flush=True); time.sleep(60)'
+    launched = launch({'importing': f"exec {sys.executable} -c '{program}'"})
+    launched.ready()
+    launched.process.send_signal(signal.SIGINT)
+    launched.end()
+    assert not [line for line in launched.lines if 'Traceback' in line or 'KeyboardInterrupt' in line]
+    assert any('importing was killed by SIGTERM' in line for line in launched.lines)
+
+
+def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) -> None:
+    launched = launch({'good': GOOD, 'bad': 'exit 3'})
+    launched.wait_for('bad died with exit code 3')
+    assert launched.process.poll() is None
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 1
+
+
+def test_the_death_of_a_needed_node_stops_the_others(launch) -> None:
+    launched = launch({'good': GOOD, 'bad': 'exit 3'}, bad='on_exit="shutdown"')
+    assert launched.end() == 1
+    assert any('bad is needed' in line for line in launched.lines)
+
+
+def test_a_node_killed_by_a_signal_is_named_with_it(launch) -> None:
+    launched = launch({'victim': GOOD})
+    os.kill(launched.ready(), signal.SIGKILL)
+    assert launched.end() == 1
+    assert '[launch] victim was killed by SIGKILL' in launched.lines
+
+
+def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
+    launched = launch({'phoenix': GOOD}, phoenix='respawn="true"')
+    first = launched.ready()
+    os.kill(first, signal.SIGKILL)
+    second = launched.ready()
+    assert second != first
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 0
+
+
+@pytest.mark.parametrize(('given', 'again'), [('', 'restart.xml'), ('/mine.xml', 'mine.xml')])
+def test_a_node_in_the_place_of_a_dead_one_gets_the_profile_for_restarts(launch, monkeypatch, given, again) -> None:
+    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', given)
+    launched = launch({'phoenix': f'echo "profile $FASTRTPS_DEFAULT_PROFILES_FILE"; {GOOD}'}, phoenix='respawn="true"')
+    profiles = []
+    for _ in range(2):
+        profiles.append(launched.wait_for('profile').split('profile')[1].strip())
+        os.kill(launched.ready(), signal.SIGKILL)
+    assert profiles[0] == given
+    assert Path(profiles[1]).name == again
+
+
+def test_a_node_that_was_started_wrongly_is_not_restarted_and_stops_the_others(launch) -> None:
+    launched = launch({'good': GOOD, 'wrong': 'echo why; exit 2'}, wrong='respawn="true"')
+    assert launched.end() == 1
+    assert launched.lines.count('[wrong] why') == 1
+    assert any('wrong is needed' in line for line in launched.lines)
+
+
+def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) -> None:
+    launched = launch({'good': GOOD, 'phoenix': GOOD}, '--together', phoenix='respawn="true"')
+    pids = [launched.ready(), launched.ready()]
+    phoenix = next(line for line in launched.lines if line.startswith('[phoenix] ready'))
+    os.kill(int(phoenix.split()[-1]), signal.SIGKILL)
+    assert launched.end() == 1
+    assert all(gone(pid) for pid in pids)
+
+
+def test_nodes_end_with_a_launcher_that_is_killed(launch) -> None:
+    launched = launch({'good': GOOD})
+    pid = launched.ready()
+    launched.process.kill()
+    assert gone(pid)
+
+
+def test_nodes_that_all_finish_end_the_launcher_and_their_last_line_is_shown(launch) -> None:
+    launched = launch({'short': 'printf "no line end"'})
+    assert launched.end() == 0
+    assert '[short] no line end' in launched.lines
+
+
+def test_nodes_are_stopped_when_nobody_reads_the_output_any_more(launch) -> None:
+    launched = launch({'chatty': 'trap "exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; echo more; done'})
+    pid = launched.ready()
+    launched.process.stdout.close()
+    assert gone(pid)
+    assert launched.process.wait(DEADLINE_S) == 0

@@ -1,0 +1,922 @@
+"""The dashboard: a web page with the state of the nodes, and its server."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import hmac
+import ipaddress
+import json
+import math
+import os
+import re
+import secrets
+import socket
+import threading
+import zlib
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+from urllib.parse import urlsplit
+
+import numpy as np
+from aiohttp import WSCloseCode, web
+from numpy.typing import NDArray
+
+from texture_bringup.launcher import ChildLauncher
+from texture_core.config import parse_json
+from texture_core.errors import InvalidParameter, LaunchFailed, TextureError
+from texture_core.types import ENDED, ExplorationState, Phase, RoughnessEstimate, TactileSignal, TextureEstimate
+from texture_exploration import motions
+from texture_exploration.safety import RANGES, SafetyLimits
+
+# --------------------
+# Who may use the page: requests of this page alone, and beyond loopback only with the token.
+
+TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
+COOKIE = 'texture_token'
+MIN_TOKEN = 16
+
+
+@dataclass(frozen=True)
+class Access:
+    """What is asked of a request.
+
+    Parameters
+    ----------
+    host
+        Address the server is bound to.
+    token
+        Secret of the page; needed as soon as others can reach the server.
+    names
+        Names of this machine by which it may be called beside 'localhost' and addresses.
+
+    Raises
+    ------
+    InvalidParameter
+        If the server is bound beyond loopback without a token, or with a short one.
+    """
+
+    host: str
+    token: str = ''
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if (self.token and len(self.token) < MIN_TOKEN) or (not self.token and not is_loopback(self.host)):
+            raise InvalidParameter(
+                f"the token of the dashboard has {len(self.token)} characters; beyond loopback (host is '{self.host}') "
+                f'at least {MIN_TOKEN} are needed'
+            )
+
+    @classmethod
+    def to_this_machine(cls, host: str) -> Access:
+        """Return the access by all names of this machine, with the token of the environment, else one made now.
+
+        On loopback the page needs no token, and only 'localhost' is a right name.
+        """
+        token = os.environ.get(TOKEN_VARIABLE, '')
+        if is_loopback(host):
+            return cls(host, token)
+        name = socket.gethostname().lower()
+        return cls(host, token or secrets.token_urlsafe(24), (host.lower(), name, f'{name}.local'))
+
+    def url(self, port: int) -> str:
+        """Return the address of the page, with its token."""
+        host = socket.gethostname() if self.host in ('0.0.0.0', '::') else self.host
+        host = f'[{host}]' if ':' in host else host
+        return f'http://{host}:{port}/' + (f'?token={self.token}' if self.token else '')
+
+    def knows(self, given: str) -> bool:
+        """Return whether a request carries the token, compared in constant time; True if none is needed."""
+        return not self.token or hmac.compare_digest(given.encode(), self.token.encode())
+
+    def is_our_host(self, host: str) -> bool:
+        """Return whether a Host header names this machine: an address, or one of its names.
+
+        A page elsewhere that lets its name point here (DNS rebinding) comes with its own name.
+        """
+        name = _name(f'//{host}')
+        if name in ('localhost', *self.names):
+            return True
+        return is_loopback(name) if is_loopback(self.host) else _is_address(name)
+
+    def is_our_origin(self, headers: Mapping[str, str]) -> bool:
+        """Return whether a request that changes something comes from this page, or from no page at all."""
+        origin = headers.get('Origin')
+        return origin is None or urlsplit(origin).netloc == headers.get('Host', '')
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether an address or name can be reached from this machine alone."""
+    return host == 'localhost' or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _name(url: str) -> str:
+    try:
+        return (urlsplit(url).hostname or '').lower()
+    except ValueError:
+        return ''
+
+
+# --------------------
+# Past explorations, each with the frames that were shown during it, for replay.
+
+MAX_EXPLORATIONS = 12
+MAX_FRAMES = 300  # of one exploration; a longer one is thinned to every second frame, again and again
+
+
+@dataclass
+class Past:
+    """One exploration: its summary, and the texts of its frames, compressed: a page in memory for each is too much."""
+
+    summary: dict[str, Any]
+    frames: list[bytes] = field(default_factory=list)
+    stride: int = 1
+    seen: int = 0
+
+    def add(self, frame: str) -> None:
+        """Keep every `stride`-th frame."""
+        if self.seen % self.stride == 0:
+            self.frames.append(zlib.compress(frame.encode(), 1))
+        self.seen += 1
+        if len(self.frames) > MAX_FRAMES:
+            self.frames, self.stride = self.frames[::2], self.stride * 2
+
+
+class History:
+    """Keep the newest explorations."""
+
+    def __init__(self) -> None:
+        self._past: OrderedDict[str, Past] = OrderedDict()
+
+    def add(self, exploration_id: str, summary: dict[str, Any], frame: str = '') -> None:
+        """Note what is now known of an exploration, and the frame shown now if it is going on.
+
+        Parameters
+        ----------
+        exploration_id
+            Id of the exploration.
+        summary
+            Plain values for the page.
+        frame
+            Frame of the page, as JSON; '' if it is over.
+        """
+        past = self._past.setdefault(exploration_id, Past({}))
+        past.summary = {**past.summary, **summary, 'id': exploration_id}
+        if frame:
+            past.add(frame)
+        while len(self._past) > MAX_EXPLORATIONS:
+            self._past.popitem(last=False)
+
+    def __contains__(self, exploration_id: str) -> bool:
+        return exploration_id in self._past
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Return the summaries, newest first."""
+        return [past.summary for past in reversed(self._past.values())]
+
+    def replay(self, exploration_id: str) -> str | None:
+        """Return the frames of an exploration as a JSON list with the time between them; None if it is not kept."""
+        past = self._past.get(exploration_id)
+        if past is None:
+            return None
+        frames = ', '.join(zlib.decompress(frame).decode() for frame in past.frames)
+        return f'{{"stride": {past.stride}, "frames": [{frames}]}}'
+
+
+# --------------------
+# Which numbers each motion takes, with default and range: what the buttons of the page offer.
+
+DEFAULTS: Mapping[str, Mapping[str, float]] = {
+    'linear_slide': motions.LINEAR_SLIDE_DEFAULTS,
+    'circular': motions.CIRCULAR_DEFAULTS,
+    'cross_slide': motions.CROSS_SLIDE_DEFAULTS,
+    'in_hand_sliding': motions.IN_HAND_SLIDING_DEFAULTS,
+    'in_hand_random': motions.IN_HAND_SLIDING_DEFAULTS,
+}
+
+
+def offered(limits: SafetyLimits) -> dict[str, list[dict[str, Any]]]:
+    """Return the numbers of each motion: name, default, lowest, highest and unit."""
+    return {
+        motion: [{'name': name, 'default': value, **_range(limits, name)} for name, value in defaults.items()]
+        for motion, defaults in DEFAULTS.items()
+    }
+
+
+def _range(limits: SafetyLimits, name: str) -> dict[str, Any]:
+    low, high, unit = RANGES[name]
+    return {'low': getattr(limits, low), 'high': getattr(limits, high), 'unit': unit}
+
+
+# --------------------
+# One light per node: green, yellow or red; a node that has fallen silent is red, one that has ended is grey.
+
+SILENT_S = 5.0  # nodes report once a second
+MAX_LIGHTS = 64
+MAX_CHARACTERS = 300
+ENDED_COLOURS = {'OK': 'grey', 'WARN': 'yellow', 'ERROR': 'red'}
+COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
+
+
+@dataclass(frozen=True)
+class NodeStatus:
+    """What a node said last, when (monotonic clock, s), and whether it ended with that."""
+
+    level: str
+    message: str
+    time_s: float
+    ended: bool = False
+
+
+class NodeStatuses:
+    """Keep what each node said last."""
+
+    def __init__(self) -> None:
+        self._lights: dict[str, NodeStatus] = {}
+
+    def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
+        """Take note of a report; when there are too many names, the one silent for longest is forgotten.
+
+        Parameters
+        ----------
+        name
+            Name of the status.
+        level
+            'OK', 'WARN', 'ERROR' or 'STALE'.
+        message
+            One sentence.
+        time_s
+            When it came, of a clock that only rises.
+        ended
+            Whether the node has ended.
+        """
+        self._lights.pop(name, None)
+        self._lights[name[:MAX_CHARACTERS]] = NodeStatus(level, message[:MAX_CHARACTERS], time_s, ended)
+        if len(self._lights) > MAX_LIGHTS:
+            del self._lights[next(iter(self._lights))]
+
+    def newest(self, name: str) -> NodeStatus | None:
+        """Return what a node said last; None if it never did."""
+        return self._lights.get(name)
+
+    def shown(self, time_s: float) -> list[dict[str, str]]:
+        """Return name, colour and sentence of each light, by name."""
+        return [{'name': name, **_look(light, time_s - light.time_s)} for name, light in sorted(self._lights.items())]
+
+
+def _look(light: NodeStatus, age_s: float) -> dict[str, str]:
+    if light.ended:
+        return {'colour': ENDED_COLOURS.get(light.level, 'red'), 'message': f'ended: {light.message}'}
+    if age_s > SILENT_S:
+        return {'colour': 'red', 'message': f'silent for {age_s:.0f} s; it said last: {light.message}'}
+    return {'colour': COLOURS.get(light.level, 'red'), 'message': light.message}
+
+
+# --------------------
+# The recordings that the page asks for: each a process of its own, one at a time.
+
+
+class Recorder:
+    """Begins and ends recordings.
+
+    Parameters
+    ----------
+    folder
+        Where the bags go; made if missing.
+    namespace
+        Of what is recorded.
+    """
+
+    def __init__(self, folder: Path, namespace: str) -> None:
+        self.bag = ''  # that is being recorded
+        self.fault = ''  # with which the last recording ended
+        self._folder = folder
+        self._namespace = namespace.strip('/')
+        self._child: ChildLauncher | None = None
+
+    def begin(self, name: str) -> str:
+        """Begin a recording of this name; return what is to be said.
+
+        Raises
+        ------
+        InvalidParameter
+            If one is going on already, or the folder cannot be written.
+        """
+        if self._child is not None:
+            raise InvalidParameter(f"'{self.bag}' is being recorded already; end that first")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            arguments = {'out': self._folder / name, 'namespace': self._namespace}
+            self._child = ChildLauncher('record', arguments, os.environ, self._folder / f'{name}.log').__enter__()
+        except OSError as error:
+            raise InvalidParameter(f"nothing can be recorded in '{self._folder}': {error.strerror}") from error
+        self.fault = ''
+        self.bag = str(self._folder / name)
+        return f"recording to '{self.bag}'"
+
+    def end(self) -> str:
+        """Complete the recording, if there is one; return what is to be said."""
+        child, self._child = self._child, None
+        if child is None:
+            return 'nothing is being recorded'
+        child.stop()
+        bag, self.bag = self.bag, ''
+        return f"'{bag}' is complete"
+
+    def watch(self) -> None:
+        """Take note of a recording that ended by itself."""
+        child = self._child
+        if child is None:
+            return
+        try:
+            child.check()
+        except LaunchFailed as error:
+            self._child, self.bag, self.fault = None, '', str(error)
+
+
+# --------------------
+# The newest samples of one stream, and how they are drawn with few numbers.
+
+MAX_SAMPLES = 100_000
+
+
+class Ring:
+    """Keep the newest samples of the first channel of a stream.
+
+    Parameters
+    ----------
+    length_s
+        So much is kept; never more than `MOST_SAMPLES`.
+    """
+
+    def __init__(self, length_s: float) -> None:
+        self._length_s = length_s
+        self._samples: NDArray[np.float64] = np.zeros(0)
+        self._at = 0
+        self._next: int | None = None
+        self.rate_hz = 0.0
+        self.sensor = ''
+        self.channel = ''
+        self.unit = ''
+        self.lost = 0
+
+    def update(self, signal: TactileSignal) -> None:
+        """Append a batch; a stream of another sensor or rate starts again, lost samples leave a gap of NaN."""
+        if (signal.sensor, signal.sampling_rate_hz) != (self.sensor, self.rate_hz):
+            self._begin(signal)
+        gap = 0 if self._next is None else max(0, signal.first_sample - self._next)
+        self._next = signal.next_sample
+        self.lost += gap
+        fresh = signal.samples[:, 0].astype(np.float64)
+        if gap:
+            fresh = np.concatenate([np.full(min(gap, len(self._samples)), np.nan), fresh])
+        self._append(fresh[-len(self._samples) :])
+
+    def newest(self, length_s: float) -> NDArray[np.float64]:
+        """Return the newest samples, (n_samples,), oldest first; NaN where none came yet.
+
+        Parameters
+        ----------
+        length_s
+            Length of the stretch.
+
+        Returns
+        -------
+        (n_samples,)
+            In the unit of the signal.
+        """
+        count = min(len(self._samples), round(length_s * self.rate_hz))
+        return np.roll(self._samples, -self._at)[len(self._samples) - count :]
+
+    def _begin(self, signal: TactileSignal) -> None:
+        size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MAX_SAMPLES))
+        self._samples = np.full(size, np.nan)
+        self._at, self._next = 0, None
+        self.rate_hz, self.sensor = signal.sampling_rate_hz, signal.sensor
+        self.channel, self.unit = signal.channels[0], signal.common_unit
+
+    def _append(self, fresh: NDArray[np.float64]) -> None:
+        places = (self._at + np.arange(len(fresh))) % len(self._samples)
+        self._samples[places] = fresh
+        self._at = (self._at + len(fresh)) % len(self._samples)
+
+
+def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and the greatest sample of `points` stretches: no peak is lost, however few are drawn.
+
+    Parameters
+    ----------
+    samples : (n_samples,)
+
+    Returns
+    -------
+    low, high : (points,), or as many as there are samples; NaN where there is none
+    """
+    points = min(points, len(samples))
+    if points == 0:
+        return np.zeros(0), np.zeros(0)
+    edges = np.linspace(0, len(samples), points, endpoint=False).astype(int)
+    low = np.fmin.reduceat(samples, edges)
+    high = np.fmax.reduceat(samples, edges)
+    return low, high
+
+
+def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
+    """Return the amplitude from 0 Hz to half the rate in dB of one unit, the greatest of each bin; empty if gaps.
+
+    A sine of amplitude 1 reads 0 dB (Hann window, its gain taken out).
+
+    Parameters
+    ----------
+    samples : (n_samples,)
+
+    Returns
+    -------
+    (bins,), or fewer if there are few samples
+    """
+    if len(samples) < 16 or not np.isfinite(samples).all():
+        return np.zeros(0)
+    window = np.hanning(len(samples))
+    amplitude = 2.0 * np.abs(np.fft.rfft(window * (samples - samples.mean()))) / window.sum()
+    bins = min(bins, len(amplitude))
+    edges = np.linspace(0, len(amplitude), bins, endpoint=False).astype(int)
+    levels: NDArray[np.float64] = 20.0 * np.log10(np.maximum(np.maximum.reduceat(amplitude, edges), 1e-6))
+    return levels
+
+
+# --------------------
+# The web server of the dashboard: static page, a WebSocket of frames, a few commands. Knows no ROS.
+
+MAX_BODY_BYTES = 4096
+MAX_MESSAGE_BYTES = 1024
+MAX_VIEWERS = 16
+HEARTBEAT_S = 10.0
+SERVER_CLOSING_S = 1.0
+PAGE: Mapping[str, tuple[str, str]] = {
+    '/': ('index.html', 'text/html'),
+    '/dashboard.js': ('dashboard.js', 'text/javascript'),
+    '/dashboard.css': ('dashboard.css', 'text/css'),
+}
+HEADERS = {
+    'Content-Security-Policy': "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src data:; form-action 'none'; base-uri 'none'; frame-ancestors 'none'",
+    'X-Content-Type-Options': 'nosniff',
+    'Referrer-Policy': 'no-referrer',
+    'Cache-Control': 'no-store',
+}
+Answer = Mapping[str, Any]
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Commands(Protocol):
+    """What the page can ask for; a TextureError is shown to the user."""
+
+    async def explore(self, asked: Mapping[str, Any]) -> Answer:
+        """Explore until it is over."""
+
+    async def stop(self, asked: Mapping[str, Any]) -> Answer:
+        """Stop what moves."""
+
+    async def add(self, asked: Mapping[str, Any]) -> Answer:
+        """Add an exploration, or undo it."""
+
+    async def record(self, asked: Mapping[str, Any]) -> Answer:
+        """Begin or end a recording."""
+
+    async def offered(self) -> Answer:
+        """Return the motions with their numbers."""
+
+    def replay(self, exploration_id: str) -> str | None:
+        """Return the kept frames of an exploration as JSON; None if it is not kept."""
+
+
+class Viewers:
+    """The newest frame for everybody who looks; who is slow misses frames and keeps nobody waiting."""
+
+    def __init__(self) -> None:
+        self._frame = ''
+        self.number = 0
+        self._news = asyncio.Event()
+        self.sockets: set[web.WebSocketResponse] = set()
+
+    def show(self, frame: str) -> None:
+        """Replace the frame; called in the loop of the server."""
+        self._frame, self.number = frame, self.number + 1
+        self._news.set()
+        self._news = asyncio.Event()
+
+    async def send_to(self, socket: web.WebSocketResponse, sent: int) -> None:
+        """Send the newest frame after number `sent`, again and again, until the socket closes."""
+        while not socket.closed:
+            if sent == self.number:
+                await self._news.wait()
+            sent = self.number
+            await socket.send_str(self._frame)
+
+
+VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
+
+
+def make_app(commands: Commands, access: Access, page: Path) -> web.Application:
+    """Return the application; `page` is the folder of the static files.
+
+    Parameters
+    ----------
+    commands
+        Carries out what the page asks for.
+    access
+        Who may ask for what.
+    page
+        Folder of the static files.
+
+    Returns
+    -------
+    web.Application
+        Not started yet.
+    """
+    app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
+    viewers = app[VIEWERS] = Viewers()
+    app.router.add_get('/ws', _watch(viewers))
+    app.router.add_get('/api/motions', _motions(commands))
+    app.router.add_get('/api/past/{id}', _past(commands))
+    for name in ('explore', 'stop', 'add', 'record'):
+        app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
+    for path, (file, kind) in PAGE.items():
+        app.router.add_get(path, _static(page / file, kind))
+    app.on_shutdown.append(_close_sockets)
+    return app
+
+
+def _guard(access: Access) -> Any:
+    """Return what every request passes first."""
+
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        try:
+            refusal = _refusal(access, request)
+            # Not `or`: to Ubuntu's aiohttp, 3.9, a response in which nothing was stored is false.
+            response = await handler(request) if refusal is None else refusal
+        except web.HTTPException as error:
+            error.headers.update(HEADERS)
+            raise
+        if not response.prepared:
+            response.headers.update(HEADERS)
+        return response
+
+    return guard
+
+
+def _token_of(request: web.Request) -> str:
+    return request.cookies.get(COOKIE, '') or request.headers.get('Authorization', '').removeprefix('Bearer ')
+
+
+def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
+    """Return why a request is refused, or the answer that turns a token in the address into a cookie."""
+    if not access.is_our_host(request.headers.get('Host', '')):
+        return _said(403, 'this page is reached by another name; use the address that the dashboard printed')
+    changes = request.method != 'GET' or request.path == '/ws'
+    if changes and not access.is_our_origin(request.headers):
+        return _said(403, 'the request comes from another page; use the page of the dashboard')
+    given = request.query.get('token', '')
+    if request.path == '/' and given and access.token and access.knows(given):
+        answer = web.Response(status=303, headers={'Location': '/'})
+        answer.set_cookie(COOKIE, given, httponly=True, samesite='Strict')
+        return answer
+    if not access.knows(_token_of(request)):
+        return _said(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
+    return None
+
+
+def _watch(viewers: Viewers) -> Handler:
+    async def watch(request: web.Request) -> web.StreamResponse:
+        if len(viewers.sockets) >= MAX_VIEWERS:
+            return _said(503, f'{MAX_VIEWERS} pages are open already; close one')
+        before = viewers.number  # old by now, as no frames are made while nobody looks
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MAX_MESSAGE_BYTES, timeout=SERVER_CLOSING_S)
+        await socket.prepare(request)
+        viewers.sockets.add(socket)
+        sending = asyncio.create_task(viewers.send_to(socket, before))
+        try:
+            async for _ in socket:  # a page says nothing; this notices when it goes
+                pass
+        finally:
+            viewers.sockets.discard(socket)
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+        return socket
+
+    return watch
+
+
+def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handler:
+    async def act(request: web.Request) -> web.StreamResponse:
+        # Another page could send a form without asking; it cannot send JSON.
+        if request.content_type != 'application/json':
+            return _said(415, f'the request is {request.content_type}; application/json is needed')
+        try:
+            asked = parse_json(await request.text())
+        except ValueError:
+            return _said(400, 'the request is no JSON')
+        if not isinstance(asked, dict):
+            return _said(400, 'the request is no JSON object')
+        try:
+            return web.json_response(await command(asked))
+        except TextureError as error:
+            return _said(409, str(error))
+
+    return act
+
+
+def _motions(commands: Commands) -> Handler:
+    async def motions(_request: web.Request) -> web.StreamResponse:
+        return web.json_response(await commands.offered())
+
+    return motions
+
+
+def _past(commands: Commands) -> Handler:
+    async def past(request: web.Request) -> web.StreamResponse:
+        replay = commands.replay(request.match_info['id'])
+        if replay is None:
+            return _said(404, 'this exploration is no longer kept')
+        return web.Response(text=replay, content_type='application/json')
+
+    return past
+
+
+def _static(file: Path, kind: str) -> Handler:
+    async def static(_request: web.Request) -> web.StreamResponse:
+        return web.Response(text=file.read_text(encoding='utf-8'), content_type=kind, charset='utf-8')
+
+    return static
+
+
+def _said(status: int, message: str) -> web.Response:
+    return web.json_response({'success': False, 'message': message}, status=status)
+
+
+async def _close_sockets(app: web.Application) -> None:
+    for viewer in tuple(app[VIEWERS].sockets):
+        await viewer.close(code=WSCloseCode.GOING_AWAY)
+
+
+# --------------------
+# The web server in a thread of its own, beside whatever else the process does.
+
+SERVING_CLOSING_S = 5.0
+
+
+class Serving:
+    """Serve an application until closed.
+
+    Raises
+    ------
+    LaunchFailed
+        If the port cannot be had.
+    """
+
+    def __init__(self, app: web.Application, host: str, port: int) -> None:
+        self._app = app
+        self._loop = asyncio.new_event_loop()
+        self._runner = web.AppRunner(app, shutdown_timeout=1.0, access_log=None)
+        self._started: concurrent.futures.Future[int] = concurrent.futures.Future()
+        self._thread = threading.Thread(target=self._serve, args=(host, port), name='web server')
+        self._thread.start()
+        try:
+            self.port = self._started.result()
+        except OSError as error:
+            self._thread.join()
+            raise LaunchFailed(
+                f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; choose another port"
+            ) from error
+
+    @property
+    def watched(self) -> bool:
+        """Whether a page is open."""
+        return bool(self._app[VIEWERS].sockets)
+
+    def show(self, frame: str) -> None:
+        """Give a frame to all viewers; never waits for them."""
+        self._loop.call_soon_threadsafe(self._app[VIEWERS].show, frame)
+
+    def close(self) -> None:
+        """Close all connections, and join the thread."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(SERVING_CLOSING_S)
+
+    def _serve(self, host: str, port: int) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._started.set_result(self._loop.run_until_complete(self._start(host, port)))
+        except OSError as error:
+            self._loop.run_until_complete(self._runner.cleanup())
+            self._loop.close()
+            self._started.set_exception(error)
+            return
+        self._loop.run_forever()
+        self._loop.run_until_complete(self._runner.cleanup())
+        self._loop.close()
+
+    async def _start(self, host: str, port: int) -> int:
+        await self._runner.setup()
+        site = web.TCPSite(self._runner, host, port)
+        await site.start()
+        return int(self._runner.addresses[0][1])
+
+
+# --------------------
+# The image of the slow channels: how far each is from where it rested, and where it lies.
+
+PLACE = re.compile(r'.*_(\d+)_(\d+)')  # 'taxel_6_3': row and column
+MAX_CHANNELS = 1024
+RESTING_SHARE = 0.05  # of a batch in the resting value: follows a drift of seconds, not a touch
+LEAST_NOISES = 10.0  # range of the colours in standard deviations of the noisiest channel, so that noise stays pale
+
+
+class Taxels:
+    """Keep the newest image and the resting one."""
+
+    def __init__(self) -> None:
+        self.channels: tuple[str, ...] = ()
+        self.places: list[tuple[int, int]] = []
+        self.unit = ''
+        self._resting: NDArray[np.float64] = np.zeros(0)
+        self._newest: NDArray[np.float64] = np.zeros(0)
+        self._power: NDArray[np.float64] = np.zeros(0)  # of the noise of each channel
+
+    def update(self, signal: TactileSignal, touching: bool) -> None:
+        """Take the newest sample; while nothing is touched it moves the resting image."""
+        newest = signal.samples[-1:, :MAX_CHANNELS].astype(np.float64)
+        if not len(newest):
+            return
+        if signal.channels[:MAX_CHANNELS] != self.channels:
+            self.channels, self.unit = signal.channels[:MAX_CHANNELS], signal.common_unit
+            self.places = places_of(self.channels)
+            self._resting, self._power = newest[0], np.zeros(newest.shape[1])
+        self._newest = newest[0]
+        if not touching:
+            known = np.where(np.isfinite(self._resting), self._resting, self._newest)
+            step = np.nan_to_num(self._newest - known, posinf=0.0, neginf=0.0)
+            self._resting = known + RESTING_SHARE * step
+            self._power += RESTING_SHARE * np.where(np.isfinite(self._newest), step**2 - self._power, 0.0)
+
+    @property
+    def image(self) -> NDArray[np.float64]:
+        """How far each channel is from its resting value, (n_channels,)."""
+        return self._newest - self._resting
+
+    @property
+    def least_range(self) -> float:
+        """Smallest value that has the full colour, in the unit of the channels; 0 while no noise was measured."""
+        return LEAST_NOISES * float(np.sqrt(self._power.max(initial=0.0)))
+
+
+def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Return row and column of each channel: as its name tells, else line by line in a square."""
+    named = [PLACE.fullmatch(channel) for channel in channels]
+    if named and all(named):
+        return [(int(match[1]), int(match[2])) for match in named if match]
+    columns = int(np.ceil(np.sqrt(len(channels)))) or 1
+    return [divmod(number, columns) for number in range(len(channels))]
+
+
+# --------------------
+# What the page shows: the newest of everything, in bounded memory, as one JSON text a frame.
+
+FRAME_PERIOD_S = 0.1
+SIGNAL_S, SPECTRUM_S = 2.0, 0.5
+POINTS, BINS = 240, 128
+MAX_LABELS = 200
+DIGITS = 4
+IDLE = ExplorationState(0, '', '', Phase.IDLE)
+
+
+class Feed:
+    """Take what the nodes publish; give frames. Used from one thread at a time."""
+
+    def __init__(self) -> None:
+        self.history = History()
+        self.node_statuses = NodeStatuses()
+        self._ring = Ring(SIGNAL_S)
+        self._taxels = Taxels()
+        self._state = IDLE
+        self._texture = TextureEstimate(0, '')
+        self._roughness = RoughnessEstimate(0, '')
+        self.recording = ''  # folder that is being recorded to
+
+    def on_signal(self, signal: TactileSignal) -> None:
+        """Take a batch of the fast stream."""
+        self._ring.update(signal)
+
+    def on_static(self, signal: TactileSignal) -> None:
+        """Take a batch of the slow stream."""
+        self._taxels.update(signal, touching=self._state.phase not in ENDED)
+
+    def on_state(self, state: ExplorationState) -> None:
+        """Take what the finger is doing; a new exploration begins without evidence."""
+        if state.exploration_id and state.exploration_id not in self.history:
+            self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
+            self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
+        self._state = state
+        if state.exploration_id:
+            seen = {'motion': state.motion, 'phase': state.phase.value, 'surface': state.surface}
+            self.history.add(state.exploration_id, {'stamp_ns': str(state.stamp_ns), **seen})
+
+    def on_texture(self, estimate: TextureEstimate) -> None:
+        """Take an estimate; one of an exploration before the present one only enters its summary."""
+        reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'known': estimate.known}
+        if estimate.exploration_id in self.history:
+            self.history.add(estimate.exploration_id, reported)
+        if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
+            self._texture = estimate
+
+    def on_roughness(self, estimate: RoughnessEstimate) -> None:
+        """Take an estimate; one of an exploration before the present one only enters its summary."""
+        if estimate.exploration_id in self.history:
+            self.history.add(estimate.exploration_id, {'grade': _number(estimate.grade)})
+        if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
+            self._roughness = estimate
+
+    @property
+    def exploring(self) -> bool:
+        """Whether an exploration is going on, whose frames are kept."""
+        return bool(self._state.exploration_id) and self._state.phase not in ENDED
+
+    def frame(self, time_s: float) -> str:
+        """Return everything the page shows at a time of the monotonic clock, s, and keep it for replay."""
+        frame = {
+            'signal': self._signal(),
+            'spectrum': self._spectrum(),
+            'taxels': self._image(),
+            'state': self._shown_state(),
+            'texture': self._evidence(),
+            'roughness': {name: _plain(value) for name, value in asdict(self._roughness).items()},
+        }
+        text = json.dumps(frame, allow_nan=False)
+        if self.exploring:
+            self.history.add(self._state.exploration_id, {}, text)
+        rest = {'lights': self.node_statuses.shown(time_s), 'past': self.history.listed(), 'recording': self.recording}
+        return f'{text[:-1]}, {json.dumps(rest)[1:]}'
+
+    def _signal(self) -> dict[str, Any]:
+        ring = self._ring
+        low, high = envelope(ring.newest(SIGNAL_S), POINTS)
+        names = {'sensor': ring.sensor, 'channel': ring.channel, 'unit': ring.unit}
+        return {**names, 'low': _numbers(low), 'high': _numbers(high), 'length_s': SIGNAL_S, 'lost': ring.lost}
+
+    def _spectrum(self) -> dict[str, Any]:
+        levels = spectrum_db(self._ring.newest(SPECTRUM_S), BINS)
+        return {'db': _numbers(levels), 'high_hz': self._ring.rate_hz / 2}
+
+    def _image(self) -> dict[str, Any]:
+        taxels = self._taxels
+        least = {'least_range': _number(taxels.least_range)}
+        return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit, **least}
+
+    def _missing(self, what: str, name: str) -> str:
+        """Return that there is no estimate yet and what its node says, if that node is not well."""
+        status = self.node_statuses.newest(name)
+        if status is None:
+            return f'no {what} yet, and no {name} reports on /diagnostics'
+        return f'no {what} yet' + ('' if status.level == 'OK' else f': {status.message}')
+
+    def _shown_state(self) -> dict[str, Any]:
+        return {name: _plain(value) for name, value in asdict(self._state).items()}
+
+    def _evidence(self) -> dict[str, Any]:
+        """Return the estimate with the most probable labels first."""
+        estimate = self._texture
+        pairs = sorted(zip(estimate.probabilities, estimate.labels, strict=False), reverse=True)[:MAX_LABELS]
+        shown = {name: _plain(value) for name, value in asdict(estimate).items()}
+        shown['missing'] = '' if estimate.label or estimate.message else self._missing('estimate', 'classifier')
+        shown['labels'] = [label for _, label in pairs]
+        shown['probabilities'] = _numbers(probability for probability, _ in pairs)
+        return shown
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can carry it exactly: NaN as null, nanoseconds as text."""
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, Phase):
+        return value.value
+    return str(value) if isinstance(value, int) and abs(value) > 2**53 else value
+
+
+def _number(value: float) -> float | None:
+    return float(f'{value:.{DIGITS}g}') if math.isfinite(value) else None
+
+
+def _numbers(values: Iterable[float] | np.ndarray[Any, np.dtype[np.float64]]) -> list[float | None]:
+    return [_number(float(value)) for value in values]

@@ -1,0 +1,721 @@
+"""The demonstration: record, train and recognise on the emulated rig."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import socket
+import statistics
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from scipy.signal import welch
+
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.operator import ExplorationResult, Operator
+from texture_core.config import write_json
+from texture_core.errors import InvalidData, LaunchFailed, MotionAborted
+from texture_core.types import (
+    NANOSECONDS,
+    AnyArray,
+    Array,
+    ExplorationRequest,
+    ExplorationState,
+    FeatureVector,
+    Phase,
+    Samples,
+    TactileSignal,
+    TextureEstimate,
+)
+from texture_estimation.decisions import OUTSIDE
+from texture_estimation.evidence_rules import running_means
+from texture_estimation.model import TextureModel, load_model
+from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles
+from texture_evaluation.commands import train as training
+from texture_evaluation.evaluate import EvaluationReport, evaluate, percent
+from texture_evaluation.train import train_from_bags
+from texture_recordings.bags import read_bag
+
+# --------------------
+# Places of its own for a demonstration, so that it disturbs nothing that runs already.
+
+# Domains whose ports lie below the ephemeral ports of Linux:
+# https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html The tests of the suite have those above 60.
+DOMAINS = range(1, 61)
+# Ports of the first participant of domain d (DDSI-RTPS 2.2, 9.6.1.1): 7400 + 250·d + 10 and + 11.
+FIRST_PORT, PORTS_PER_DOMAIN, FIRST_UNICAST = 7400, 250, 10
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """A ROS domain, a UDP port for the finger and a path for the device that nobody else uses."""
+
+    domain_id: int
+    finger_port: int
+    device: Path
+
+    def environment(self, base: Mapping[str, str]) -> dict[str, str]:
+        """Return the environment for processes in this isolation."""
+        return {**base, 'ROS_DOMAIN_ID': str(self.domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+
+
+def isolate(folder: Path) -> Isolation:
+    """Return places that are free now; the device will appear in `folder`.
+
+    Raises
+    ------
+    LaunchFailed
+        If every domain is in use.
+    """
+    # Programs that start at the same moment look at different domains first.
+    first = os.getpid() % len(DOMAINS)
+    for domain_id in (*DOMAINS[first:], *DOMAINS[:first]):
+        if all(_is_free(FIRST_PORT + PORTS_PER_DOMAIN * domain_id + FIRST_UNICAST + offset) for offset in (0, 1)):
+            return Isolation(domain_id, free_port(), folder / 'tsf85')
+    raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop something first')
+
+
+def free_port() -> int:
+    """Return a UDP port on loopback that is free now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(('', port))
+        except OSError:
+            return False
+    return True
+
+
+# --------------------
+# What the demonstration explores, and how.
+
+
+@dataclass(frozen=True)
+class DemoPlan:
+    """Surfaces of the scene `twelve_textures`, slides over each, and the slide itself.
+
+    The finger touches each time at another place; every second slide goes the other way. A last slide at
+    `untrained_speed_m_s` shows what is said outside the conditions of the training.
+    """
+
+    surfaces: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
+    shown: str = 'ridge_2mm_deep'  # in the picture: its ridges make a line in the spectrum, at speed / pitch
+    learning_slides: int = 3
+    recognition_slides: int = 2
+    speed_m_s: float = 0.05
+    force_n: float = 1.0
+    distance_m: float = 0.06
+    untrained_speed_m_s: float = 0.02
+
+    def requests(self, surface: str, slides: int, early_stopping: bool = False) -> Iterator[ExplorationRequest]:
+        """Yield the explorations of one surface.
+
+        Parameters
+        ----------
+        surface
+            Label of the surface.
+        slides
+            Number of explorations.
+        early_stopping
+            Whether a slide may end when it is certain.
+
+        Yields
+        ------
+        ExplorationRequest
+        """
+        for number in range(slides):
+            yield ExplorationRequest(
+                'linear_slide',
+                speed_m_s=self.speed_m_s,
+                force_n=self.force_n,
+                distance_m=self.distance_m,
+                direction_rad=math.pi * (number % 2),
+                surface=surface,
+                early_stopping=early_stopping,
+            )
+
+    def untrained_request(self) -> ExplorationRequest:
+        """Return a slide over the shown surface, as in the training but for its speed, and as long in time."""
+        [usual] = self.requests(self.shown, 1, early_stopping=True)
+        share = self.untrained_speed_m_s / self.speed_m_s
+        return replace(usual, speed_m_s=self.untrained_speed_m_s, distance_m=share * self.distance_m)
+
+
+# --------------------
+# What the demonstration says while it runs, for a reader who sees the suite for the first time.
+
+PROGRESS_LOG_MARGIN = ' ' * 8
+
+
+class ProgressLog:
+    """Tell what happens, each chapter with the time since the start; in a `with` block no line is left open.
+
+    Parameters
+    ----------
+    clock
+        Seconds, from any start.
+    out
+        Where to.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, out: TextIO = sys.stdout) -> None:
+        self._clock = clock
+        self._out = out
+        self._start_s = clock()
+        self._line_is_open = False
+
+    def __enter__(self) -> ProgressLog:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._line_is_open:
+            self._write('\n')
+
+    def section(self, text: str) -> None:
+        """Begin something new."""
+        self._write(f'\n[{self._clock() - self._start_s:3.0f} s]  {text}\n')
+
+    def line(self, text: str) -> None:
+        """Say something within the chapter."""
+        self._write(f'{PROGRESS_LOG_MARGIN}{text}\n')
+
+    def part(self, text: str, *, first: bool = False, last: bool = False) -> None:
+        """Say a part of a line, for what takes its time.
+
+        Parameters
+        ----------
+        text
+            What is printed.
+        first, last
+            Whether it begins a line, and whether it ends one.
+        """
+        self._write(f'{PROGRESS_LOG_MARGIN * first}{text}{chr(10) * last}')
+
+    def _write(self, text: str) -> None:
+        print(text, end='', file=self._out, flush=True)
+        self._line_is_open = not text.endswith('\n')
+
+
+# --------------------
+# What came out of the recognising slides, as a table.
+
+
+@dataclass(frozen=True)
+class RecognisedSlide:
+    """One slide: what lay under the finger, and what was said of it."""
+
+    surface: str
+    estimate: TextureEstimate
+
+    @property
+    def right(self) -> bool:
+        """Whether the surface was recognised."""
+        return self.estimate.known and self.estimate.label == self.surface
+
+
+def is_refused(estimate: TextureEstimate) -> bool:
+    """Return whether an estimate says that its exploration is outside what was trained, and claims nothing."""
+    return estimate.message.startswith(OUTSIDE) and not estimate.known and not estimate.decided
+
+
+def untrained_figures(estimate: TextureEstimate, speed_m_s: float) -> dict[str, Any]:
+    """Return what is written of the slide at a speed that was not trained."""
+    return {
+        'speed_m_s': speed_m_s,
+        'label': estimate.label,
+        'known': estimate.known,
+        'decided': estimate.decided,
+        'message': estimate.message,
+    }
+
+
+def latencies_s(bag: Path) -> Mapping[str, float]:
+    """Return for each exploration in a bag the median time from the end of a window to the arrival of its estimate."""
+    found: defaultdict[str, list[float]] = defaultdict(list)
+    for _, log_ns, estimate in read_bag(bag, ('texture',)):
+        if estimate.windows and not estimate.final:
+            found[estimate.exploration_id].append((log_ns - estimate.stamp_ns) / NANOSECONDS)
+    return {name: statistics.median(values) for name, values in found.items()}
+
+
+def table(rows: Sequence[RecognisedSlide], latencies: Mapping[str, float]) -> list[str]:
+    """Return the lines of the table of results; latencies in s by exploration."""
+    width = max(13, *(len(row.surface) for row in rows))
+    lines = [f'{"surface":<{width}}  {"recognised as":<{width}}    confidence  sliding used  latency']
+    for row in rows:
+        latency_s = latencies.get(row.estimate.exploration_id)
+        lines.append(
+            f'{row.surface:<{width}}  {row.estimate.label or "nothing":<{width}}  {"✓" if row.right else "✗"} '
+            f'{row.estimate.confidence:10.3f}  {row.estimate.evidence_s:10.1f} s  '
+            + (f'{1000 * latency_s:4.0f} ms' if latency_s is not None else '   –')
+        )
+    return lines
+
+
+# --------------------
+# The emulator of the demonstration: its processes, and what the operator does with it.
+
+RECORDED = ('signal', 'exploration')  # each is listened to by the feature extractor, too
+START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first time
+
+
+class DemoRig:
+    """Run the bench in a ROS domain of its own; use it in a `with` block.
+
+    Parameters
+    ----------
+    folder
+        For the device and the logs of ROS; it must outlive the block.
+    log
+        File for what the nodes say.
+    recipe, seed
+        Of the features, and of the bench's randomness.
+    """
+
+    def __init__(self, folder: Path, log: Path, recipe: str, seed: int) -> None:
+        self._isolation = isolate(folder)
+        self._environment = self._isolation.environment({**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
+        arguments = {
+            'device': self._isolation.device,
+            'finger_port': self._isolation.finger_port,
+            'recipe': recipe,
+            'seed': seed,
+        }
+        self._folder = folder
+        self._launcher = ChildLauncher('emulator', arguments, self._environment, log)
+        self._operator = Operator(domain_id=self._isolation.domain_id, guard=self._launcher.check)
+        self._open = ExitStack()
+
+    def __enter__(self) -> DemoRig:
+        with ExitStack() as opening:
+            opening.enter_context(self._launcher)
+            opening.enter_context(self._operator)
+            self._operator.wait_for_explorer(START_DEADLINE_S)
+            self._operator.wait_for_signal(START_DEADLINE_S)
+            self._open = opening.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    @contextmanager
+    def recording(self, bag: Path) -> Iterator[None]:
+        """Record the topics into a new bag for the length of a `with` block."""
+        recorder = ChildLauncher('record', {'out': bag}, self._environment, self._folder / f'{bag.name}.log')
+        # The explorer may listen to the signal, too: each topic has a number of its own.
+        wanted = {topic: self._operator.listeners(topic) + 1 for topic in RECORDED}
+        with recorder:
+            for topic, number in wanted.items():
+                self._operator.wait_for_listeners((topic,), number, recorder.check)
+            yield
+            recorder.check()
+
+    def explore(self, surface: str, requests: Iterator[ExplorationRequest]) -> Iterator[ExplorationResult]:
+        """Lay a surface under the finger and explore it.
+
+        Raises
+        ------
+        MotionAborted
+            If an exploration does not end as asked.
+        """
+        self._operator.set_parameters('emulator', {'surface': surface})
+        for request in requests:
+            explored = self._operator.explore(request)
+            if not explored.success:
+                raise MotionAborted(f'the exploration of {surface} failed: {explored.message}')
+            yield explored
+
+    def use_model(self, model: Path) -> None:
+        """Let the running classifier load a model."""
+        self._operator.set_parameters('classifier', {'model': str(model)})
+
+
+# --------------------
+# One slide in one picture: signal, spectrum, evidence, and how often such decisions are right.
+
+SHOWN_LABELS = 3
+SHOWN_S = 0.5
+CHART_MARGIN = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingEvidence:
+    """How the evidence for one label grows while the finger slides.
+
+    Parameters
+    ----------
+    label
+        The label at the end.
+    seconds : (n_windows,)
+        Sliding time used at the end of each window, s.
+    labels
+        All labels of the model.
+    log_odds : (n_windows, n_labels)
+        Natural logarithm of how much more probable `label` is than each label; 0 for itself.
+    confidence
+        Of the label at the end, as it was reported.
+    """
+
+    label: str
+    seconds: Array
+    labels: Sequence[str]
+    log_odds: Array
+    confidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class SlideOverview:
+    """One slide from the first sample to the decision, and how often such decisions are right.
+
+    Parameters
+    ----------
+    source
+        Where the signal comes from, in words, such as 'simulated TSF-85'.
+    surface
+        What the finger slid over.
+    samples : (n_samples,)
+        One channel of the slide.
+    rate_hz, unit
+        Of the samples.
+    evidence
+        After each window.
+    labels, table
+        Confusion of test windows, as `metrics.confusion` counts it.
+    others
+        Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
+    note
+        Lines below the panels; '' for none.
+    """
+
+    source: str
+    surface: str
+    samples: Array
+    rate_hz: float
+    unit: str
+    evidence: GrowingEvidence
+    labels: Sequence[str]
+    table: AnyArray
+    others: Mapping[str, Array] = field(default_factory=dict)
+    note: str = ''
+
+
+def picture(overview: SlideOverview, path: str | Path) -> Path:
+    """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
+    with chart(path, (11.0, 8.0), f'How a slide over {overview.surface} is recognised ({overview.source})') as figure:
+        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
+        _signal(signal, overview)
+        _spectrum(spectrum, overview)
+        _evidence(evidence, overview)
+        draw_confusion(table, overview.labels, overview.table)
+        table.set_title('4. Single windows of all test slides')
+        if overview.note:
+            figure.supxlabel(overview.note, fontsize='medium')
+    return Path(path)
+
+
+def _signal(axes: Any, overview: SlideOverview) -> None:
+    shown = overview.samples[: round(SHOWN_S * overview.rate_hz)]
+    axes.plot(np.arange(len(shown)) / overview.rate_hz, shown, color=COLOURS[0], linewidth=0.8)
+    axes.set(xlabel='time since the slide began (s)', ylabel=f'signal ({overview.unit or "no unit"})')
+    axes.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
+
+
+def _spectrum(axes: Any, overview: SlideOverview) -> None:
+    slides = {overview.surface: overview.samples, **overview.others}
+    for (name, slide), colour in zip(slides.items(), COLOURS, strict=False):
+        samples: Samples = np.asarray(slide, dtype=float)
+        n_segment = min(len(samples), round(overview.rate_hz / 2))
+        hertz, power = welch(samples, fs=overview.rate_hz, nperseg=n_segment)
+        own = name == overview.surface
+        axes.semilogy(hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=name, zorder=2 + own)
+    unit = f'{overview.unit}²/Hz' if overview.unit else '1/Hz'
+    axes.set(xlabel='frequency (Hz)', ylabel=f'power density ({unit})')
+    axes.set_title('2. Its spectrum is the mark of the surface')
+    if overview.others:
+        axes.legend(loc='upper right')
+
+
+def _evidence(axes: Any, overview: SlideOverview) -> None:
+    evidence = overview.evidence
+    others = [column for column in np.argsort(evidence.log_odds[-1]) if evidence.labels[column] != evidence.label]
+    for column, style in zip(others[:SHOWN_LABELS], line_styles(), strict=False):
+        axes.plot(evidence.seconds, evidence.log_odds[:, column], marker='.', label=evidence.labels[column], **style)
+    axes.axhline(0, color='grey', linewidth=0.8)
+    axes.set(xlabel='sliding time used (s)', ylabel=f'log odds of {evidence.label}', ylim=_with_zero(evidence.log_odds))
+    axes.set_xlim(left=0)
+    axes.set_title(f'3. Each window adds evidence; reported confidence {evidence.confidence:.2f}')
+    axes.legend(loc='lower right', title='compared with')
+
+
+def _with_zero(values: Array) -> tuple[float, float]:
+    """Return limits that hold all values and 0, with a margin."""
+    low, high = min(0.0, float(values.min())), max(1.0, float(values.max()))
+    margin = CHART_MARGIN * (high - low)
+    return low - margin, high + margin
+
+
+# --------------------
+# The picture of the demonstration: one recognised slide from touch to decision.
+
+SOURCE = 'simulated Robotiq TSF-85'
+
+
+def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> Path:
+    """Draw an exploration of a surface, and the confusion of all explorations in the bag.
+
+    Parameters
+    ----------
+    bag
+        With the signal, the states, the features and the live estimates.
+    surface
+        Of which surface: the exploration in which the evidence was weakest at first.
+    model
+        That recognised the slides.
+    report
+        Of the model on this bag.
+    path
+        File that is written.
+    note
+        Lines below the panels.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    found = _gather(bag)
+    evidence = {name: _growing(model, found, name) for name in found.estimates}
+    candidates = [name for name in evidence if found.states[name][0].surface == surface]
+    name = min(candidates, key=lambda each: np.sort(evidence[each].log_odds[0])[1])
+    samples, rate_hz, unit = _sliding_part(found.states[name], found.batches)
+    others = {
+        found.states[each][0].surface: _sliding_part(found.states[each], found.batches)[0] for each in found.estimates
+    }
+    del others[surface]
+    overview = SlideOverview(
+        SOURCE, surface, samples, rate_hz, unit, evidence[name], report.labels, report.confusion, others, note
+    )
+    return picture(overview, path)
+
+
+@dataclass(frozen=True, eq=False)
+class _Recorded:
+    """What a bag holds: slide states, windows and the newest estimate of each exploration, all vibration batches."""
+
+    states: defaultdict[str, list[ExplorationState]] = field(default_factory=lambda: defaultdict(list))
+    windows: defaultdict[str, list[FeatureVector]] = field(default_factory=lambda: defaultdict(list))
+    estimates: dict[str, TextureEstimate] = field(default_factory=dict)
+    batches: list[TactileSignal] = field(default_factory=list)
+
+
+def _growing(model: TextureModel, found: _Recorded, name: str) -> GrowingEvidence:
+    """Return the evidence of one exploration after each of its windows, as the classifier has it."""
+    windows, final, rule = found.windows[name], found.estimates[name], model.recipe.evidence
+    scores = rule.window_evidence(model.predict_log_proba(np.array([window.values for window in windows])))
+    length_s = windows[0].window_s
+    seconds = length_s + np.array([window.start_ns - windows[0].start_ns for window in windows]) / NANOSECONDS
+    effective = seconds / length_s
+    means = running_means(rule, scores, effective)
+    posterior = rule.log_posterior(means, effective[:, None], model.tempering_exponent)
+    best = model.labels.index(final.label)
+    return GrowingEvidence(final.label, seconds, model.labels, posterior[:, [best]] - posterior, final.confidence)
+
+
+def _gather(bag: Path) -> _Recorded:
+    """Return what the bag holds."""
+    found = _Recorded()
+    for _, _, value in read_bag(bag, ('exploration', 'signal', 'features', 'texture')):
+        if isinstance(value, TactileSignal):
+            found.batches.append(value)
+        elif isinstance(value, FeatureVector) and not value.last:
+            found.windows[value.exploration_id].append(value)
+        elif isinstance(value, TextureEstimate) and value.probabilities:
+            found.estimates[value.exploration_id] = value
+        elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
+            found.states[value.exploration_id].append(value)
+    return found
+
+
+def _sliding_part(states: Sequence[ExplorationState], batches: Sequence[TactileSignal]) -> tuple[Array, float, str]:
+    """Return the samples while the finger slid, (n_samples,), with their rate and unit."""
+    start_ns, end_ns = states[0].stamp_ns, states[-1].stamp_ns
+    inside = [batch for batch in batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
+    samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
+    return samples, inside[0].sampling_rate_hz, inside[0].common_unit
+
+
+# --------------------
+# The demonstration from beginning to end.
+
+
+@dataclass(frozen=True)
+class Places:
+    """What the demonstration leaves behind, in one folder."""
+
+    folder: Path
+
+    @property
+    def learning_bag(self) -> Path:
+        """Recording of the training slides."""
+        return self.folder / 'learning_bag'
+
+    @property
+    def recognition_bag(self) -> Path:
+        """Recording of the slides recognised, with the estimates made then."""
+        return self.folder / 'recognition_bag'
+
+    @property
+    def model(self) -> Path:
+        """The trained model, without its endings."""
+        return self.folder / 'model'
+
+    @property
+    def picture(self) -> Path:
+        """The picture."""
+        return self.folder / 'demo.png'
+
+    @property
+    def figures(self) -> Path:
+        """What `texture evaluate --json` writes."""
+        return self.folder / 'evaluation.json'
+
+    @property
+    def log(self) -> Path:
+        """What the nodes said."""
+        return self.folder / 'nodes.log'
+
+    def clear(self) -> None:
+        """Make the folder; remove what an earlier demonstration has left there, and nothing else.
+
+        Raises
+        ------
+        InvalidData
+            If the folder cannot be written.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            for bag in (self.learning_bag, self.recognition_bag):
+                shutil.rmtree(bag, ignore_errors=True)
+            for file in (self.picture, self.figures, self.log):
+                file.unlink(missing_ok=True)
+            for ending in ('.skops', '.json'):
+                self.model.with_suffix(ending).unlink(missing_ok=True)
+        except OSError as error:
+            raise InvalidData(f"'{self.folder}' cannot be used: {error.strerror}; name another with --out") from error
+
+
+def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
+    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained.
+
+    Parameters
+    ----------
+    out
+        Folder of recordings, model, figures and picture.
+    recipe
+        Name of the recipe.
+    seed
+        Of the surfaces and places.
+    plan
+        Surfaces, slides and numbers.
+    progress
+        Takes what is printed.
+
+    Returns
+    -------
+    bool
+    """
+    places = Places(out)
+    places.clear()
+    progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
+    with (
+        tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
+        DemoRig(Path(folder), places.log, recipe, seed) as rig,
+    ):
+        progress.line('5 nodes run, and the sensor delivers 1000 samples a second')
+        _learn(rig, places, plan, progress)
+        _train(places, recipe, progress)
+        rig.use_model(places.model.resolve())
+        progress.line('the running classifier has taken the model over')
+        rows = _recognise(rig, places, plan, progress)
+        untrained = _explore_untrained(rig, plan, progress)
+    report = _report(rows, untrained, places, plan, progress)
+    return all(row.right for row in rows) and len(report.known) == len(rows) and is_refused(untrained)
+
+
+def _learn(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> None:
+    progress.section(f'Learning: {plan.learning_slides} slides over each of {len(plan.surfaces)} simulated surfaces')
+    with rig.recording(places.learning_bag):
+        for surface in plan.surfaces:
+            progress.part(f'{surface:<18}', first=True)
+            for number, _ in enumerate(rig.explore(surface, plan.requests(surface, plan.learning_slides)), start=1):
+                progress.part(f'{", " * (number > 1)}slide {number}')
+            progress.part(' recorded', last=True)
+
+
+def _train(places: Places, recipe: str, progress: ProgressLog) -> None:
+    progress.section('Training on that recording (the same as `texture train`)')
+    model = train_from_bags(recipe, [places.learning_bag], out=places.model)
+    for line in training.summary(model, places.model):
+        progress.line(line)
+
+
+def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> list[RecognisedSlide]:
+    progress.section('Recognising: new slides at other places; each may end as soon as the classifier is certain')
+    rows = []
+    with rig.recording(places.recognition_bag):
+        for surface in plan.surfaces:
+            progress.part(f'{surface:<18}', first=True)
+            measured = rig.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
+            for number, explored in enumerate(measured):
+                rows.append(RecognisedSlide(surface, explored.texture))
+                progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
+            progress.part('', last=True)
+    return rows
+
+
+def _explore_untrained(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> TextureEstimate:
+    speed, usual = plan.untrained_speed_m_s, plan.speed_m_s
+    progress.section(f'Outside the training: {plan.shown} again, at {speed:g} m/s instead of {usual:g} m/s')
+    [explored] = rig.explore(plan.shown, iter([plan.untrained_request()]))
+    estimate: TextureEstimate = explored.texture
+    progress.line(f'the estimate says: {estimate.message or "nothing"}')
+    progress.line('the surface counts as unknown, and the slide is not ended early')
+    return estimate
+
+
+def _report(
+    rows: list[RecognisedSlide], untrained: TextureEstimate, places: Places, plan: DemoPlan, progress: ProgressLog
+) -> EvaluationReport:
+    progress.section('Result')
+    latencies: Mapping[str, float] = latencies_s(places.recognition_bag)
+    for line in table(rows, latencies):
+        progress.line(line)
+    right = sum(row.right for row in rows)
+    progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
+    progress.line('latency: from the last sample of a window to its estimate at another process')
+    model = load_model(places.model)
+    report = evaluate(model, [places.recognition_bag])
+    figures = {**report.as_json(), 'untrained_speed': untrained_figures(untrained, plan.untrained_speed_m_s)}
+    write_json(figures, places.figures)
+    windows = percent(report.as_json()['window_accuracy'])
+    progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
+    refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
+    note = '\n'.join(filter(None, [model.error_bound.reason, refusal]))
+    draw(places.recognition_bag, plan.shown, model, report, places.picture, note=note)
+    progress.section(f'Done. Look at {places.picture}')
+    progress.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
+    return report

@@ -1,1 +1,0 @@
-"""The demonstration: the whole suite on an emulator, from touch to report."""

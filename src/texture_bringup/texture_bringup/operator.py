@@ -1,0 +1,538 @@
+"""A client of the suite's nodes: explore, call services, set parameters."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from rcl_interfaces.msg import ParameterType
+from rclpy.action import ActionClient
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+from texture_msgs import action, msg, srv
+
+from texture_core.config import unknown_name
+from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
+from texture_core.ros import FEATURE_QOS, SENSOR_QOS, from_msg, request_to_msg
+from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
+
+# --------------------
+# Wait in a coroutine for what ROS answers in its own thread.
+
+FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
+
+
+async def ready(is_ready: Callable[[], bool], node: str) -> None:
+    """Wait until a node can be asked: one that has just started is found a moment later.
+
+    Raises
+    ------
+    LaunchFailed
+        If it is not there in time.
+    """
+    deadline_s = time.monotonic() + FOUND_DEADLINE_S
+    while not is_ready():
+        if time.monotonic() > deadline_s:
+            raise LaunchFailed(f'no {node} answers; is it running?')
+        await asyncio.sleep(FOUND_STEP_S)
+
+
+async def answer_of(future: Future, deadline_s: float) -> Any:
+    """Return the result of a future of ROS, which the executor's thread completes.
+
+    Raises
+    ------
+    LaunchFailed
+        If it does not come in time.
+    """
+    loop = asyncio.get_running_loop()
+    answered: asyncio.Event = asyncio.Event()
+    future.add_done_callback(lambda _future: loop.call_soon_threadsafe(answered.set))
+    try:
+        await asyncio.wait_for(answered.wait(), deadline_s)
+    except asyncio.TimeoutError as error:
+        raise LaunchFailed(f'no answer within {deadline_s:.0f} s') from error
+    return future.result()
+
+
+# --------------------
+# Parameters of a node from texts, by the types that the node has declared.
+
+BOOLEANS = {'true': True, 'false': False}
+# What reads a text, and what is allowed, by the type of the parameter.
+READERS: dict[int, tuple[Callable[[str], Any], str]] = {
+    ParameterType.PARAMETER_BOOL: (lambda text: BOOLEANS[text.lower()], 'true or false'),
+    ParameterType.PARAMETER_INTEGER: (int, 'a whole number'),
+    ParameterType.PARAMETER_DOUBLE: (float, 'a number'),
+    ParameterType.PARAMETER_STRING: (str, 'any text'),
+}
+
+
+def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
+    """Return a parameter of a declared type.
+
+    Parameters
+    ----------
+    name
+        Name of the parameter.
+    text
+        Its value, as an operator writes it.
+    kind
+        Type of `rcl_interfaces.msg.ParameterType`.
+
+    Returns
+    -------
+    Parameter
+
+    Raises
+    ------
+    InvalidParameter
+        If its type cannot be read from a text, or the text is no such value.
+    """
+    if kind not in READERS:
+        raise InvalidParameter(f"parameter '{name}' is a list, which cannot be set from a text; give it at the start")
+    read, allowed = READERS[kind]
+    try:
+        return Parameter(name, value=read(text))
+    except (ValueError, KeyError):
+        raise InvalidParameter(f"parameter '{name}' is '{text}'; allowed is {allowed}") from None
+
+
+# --------------------
+# What an operator does with the running nodes: explore, stop, set parameters.
+
+STEP_S = 0.1
+CANCEL_DEADLINE_S = 10.0
+LISTENERS_DEADLINE_S = 60.0
+FEATURES_DEADLINE_S = 30.0
+# So long the explorer may be away; meanwhile `guard` can tell why.
+GONE_S = 10.0
+# So long it may say nothing although it is there; it waits for the last estimates for a minute at most.
+SILENT_S = 75.0
+# So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
+ACCEPT_S = 15.0
+# So long a service is looked for, and so long its answer may take: an arm needs seconds to recover.
+OFFERED_S, ANSWER_S = 10.0, 60.0
+# After so much silence the explorer is asked again: one that was started again says that it knows of nothing.
+RETRY_PERIOD_S = 5.0
+# What this process sees, the other processes see soon after.
+DISCOVERY_S = 1.0
+VANISHED = (
+    'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
+    'the output of the explorer'
+)
+Progress = Callable[[ExplorationState, TextureEstimate], None]
+
+
+@dataclass(frozen=True)
+class ExplorationResult:
+    """The answer to an exploration."""
+
+    success: bool
+    message: str
+    exploration_id: str
+    texture: TextureEstimate
+    roughness: RoughnessEstimate
+
+
+class Operator:
+    """A client of the nodes of one namespace; use it in a `with` block, from one thread.
+
+    Parameters
+    ----------
+    namespace
+        Where the nodes live; '' for the root.
+    domain_id
+        ROS domain; None for that of the environment.
+    guard
+        Called while waiting; it raises if waiting has become senseless.
+    """
+
+    def __init__(
+        self, namespace: str = '', domain_id: int | None = None, guard: Callable[[], None] = lambda: None
+    ) -> None:
+        self._guard = guard
+        self._context = Context()
+        self._context.init(args=[], domain_id=domain_id)  # not those of the command: NAME:=VALUE would remap
+        self._node = Node('operator', namespace=namespace or None, context=self._context, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._explore = ActionClient(self._node, action.Explore, 'explore')
+        self._stop = self._node.create_client(Trigger, 'stop')
+        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
+        self._received_s = 0.0
+        self._vectors: list[FeatureVector] | None = None  # nobody listens yet
+
+    def __enter__(self) -> Operator:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._explore.destroy()
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def wait_for_explorer(self, deadline_s: float) -> None:
+        """Wait until explorations can be asked for.
+
+        Raises
+        ------
+        LaunchFailed
+            If the explorer does not appear in time.
+        """
+        self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulator '
+                    'with `texture launch emulator`')  # fmt: skip
+
+    def wait_for_signal(self, deadline_s: float) -> None:
+        """Wait until the sensor delivers samples."""
+        batches: list[msg.TactileSignal] = []
+        subscription = self._node.create_subscription(msg.TactileSignal, 'signal', batches.append, SENSOR_QOS)
+        try:
+            self._until(lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?")
+        finally:
+            self._node.destroy_subscription(subscription)
+
+    def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
+        """Wait until each topic has so many subscriptions, and they had time to be found; `guard` is called meanwhile.
+
+        Parameters
+        ----------
+        topics
+            Names of the topics.
+        number
+            Number of subscriptions that each needs.
+        guard
+            Called while waiting; what it raises ends the waiting.
+
+        Raises
+        ------
+        LaunchFailed
+            If they do not appear in time.
+        """
+
+        def all_listen() -> bool:
+            guard()
+            return all(self.listeners(topic) >= number for topic in topics)
+
+        self._until(all_listen, LISTENERS_DEADLINE_S, f'nobody listens to {", ".join(topics)}')
+        self._settle()
+
+    def listeners(self, topic: str) -> int:
+        """Return how many subscriptions a topic has."""
+        return int(self._node.count_subscribers(topic))
+
+    def explore(
+        self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
+    ) -> ExplorationResult:
+        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on.
+
+        Raises
+        ------
+        MotionAborted
+            If the explorer vanishes meanwhile, or says nothing any more.
+        KeyboardInterrupt
+            After Ctrl-C; its sentence is how the exploration ended.
+        """
+
+        def on_feedback(message: Any) -> None:
+            self._received_s = time.monotonic()
+            on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
+
+        accepted = self._explore.send_goal_async(request_to_msg(request), on_feedback)
+        self._wait(accepted.done, ACCEPT_S)
+        goal = accepted.result()
+        endings = [goal.get_result_async()]
+        deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
+        try:
+            self._wait(
+                lambda: any(ending.done() for ending in endings) or time.monotonic() > deadline_s,
+                SILENT_S,
+                lambda: endings.append(goal.get_result_async()),
+            )
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(self._cancel(goal, endings[0])) from None
+        answer = next((ending.result() for ending in endings if ending.done()), None)
+        if answer is None:
+            goal.cancel_goal_async()
+            raise MotionAborted(
+                f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
+            )
+        if answer.status == GoalStatus.STATUS_UNKNOWN:
+            raise MotionAborted('the explorer was started again and knows of no such exploration; it was broken off')
+        result = answer.result
+        return ExplorationResult(
+            result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)
+        )
+
+    def explore_with_features(
+        self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
+    ) -> tuple[ExplorationResult, list[FeatureVector]]:
+        """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration.
+
+        Raises
+        ------
+        LaunchFailed
+            If nobody publishes features.
+        """
+        vectors = self._listen_to_features()
+        vectors.clear()
+        explored = self.explore(request, on_progress)
+        if not explored.success:
+            return explored, []
+
+        def over() -> bool:
+            return any(vector.last and vector.exploration_id == explored.exploration_id for vector in vectors)
+
+        self._until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
+        return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
+
+    def stop(self, deadline_s: float = 5.0) -> str:
+        """Stop whatever moves; return what the explorer says."""
+        self._until(self._stop.service_is_ready, deadline_s, 'no explorer answers')
+        future = self._stop.call_async(Trigger.Request())
+        self._until(future.done, deadline_s, 'the explorer does not answer')
+        return str(future.result().message)
+
+    def call(self, service: str, advice: str) -> tuple[bool, str]:
+        """Call a service without values, and return whether it succeeded and its sentence.
+
+        Parameters
+        ----------
+        service
+            Name of the service, a `std_srvs/Trigger`.
+        advice
+            What to do when no node offers it.
+
+        Returns
+        -------
+        (bool, str)
+            `success` and `message` of the answer.
+
+        Raises
+        ------
+        LaunchFailed
+            If no node offers the service within `OFFERED_S`, or the answer takes longer than `ANSWER_S`.
+        """
+        name = f"the service '{self._node.resolve_service_name(service)}'"
+        missing = f'no node offers {name}; {advice}'
+        silent = f'{name} does not answer; look at the robot, and at the output of its node'
+        answer = self._ask(Trigger, service, Trigger.Request(), (OFFERED_S, missing), (ANSWER_S, silent))
+        return bool(answer.success), str(answer.message)
+
+    def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
+        """Add an exploration, the last one if '', to a texture; return its number of windows and a message.
+
+        Parameters
+        ----------
+        label
+            Label of the texture.
+        exploration_id
+            Id of the exploration; '' for the last one.
+        deadline_s
+            Longest time to wait for the answer.
+
+        Returns
+        -------
+        (int, str)
+            Number of windows of the texture, of the training and added, and a sentence.
+
+        Raises
+        ------
+        LaunchFailed
+            If no classifier answers.
+        InvalidData
+            If it could not be added, with the reason.
+        """
+        request = srv.AddTexture.Request(label=label, exploration_id=exploration_id)
+        answer = self._ask_classifier(srv.AddTexture, 'add_texture', request, deadline_s)
+        return int(answer.examples), str(answer.message)
+
+    def remove(self, label: str, deadline_s: float = 30.0) -> str:
+        """Remove all slides that were added as a texture; return what happened in a sentence.
+
+        Raises
+        ------
+        LaunchFailed
+            If no classifier answers.
+        InvalidData
+            If none could be removed, with the reason.
+        """
+        request = srv.RemoveTexture.Request(label=label)
+        return str(self._ask_classifier(srv.RemoveTexture, 'remove_texture', request, deadline_s).message)
+
+    def remove_last_added(self, deadline_s: float = 30.0) -> str:
+        """Let the classifier remove the slide that was added last; return what happened. Raises as `add` does."""
+        return str(self._ask_classifier(Trigger, 'remove_last_added', Trigger.Request(), deadline_s).message)
+
+    def _listen_to_features(self) -> list[FeatureVector]:
+        """Return the list to which feature vectors are added as they come, once they would come."""
+        if self._vectors is not None:
+            return self._vectors
+        vectors: list[FeatureVector] = []
+        self._vectors = vectors
+        self._node.create_subscription(
+            msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
+        )
+        self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S,
+                    'nobody describes what is measured; is the feature_extractor running?')  # fmt: skip
+        self._settle()
+        return vectors
+
+    def _settle(self) -> None:
+        """Wait until what this process sees is seen by the others."""
+        settled_s = time.monotonic() + DISCOVERY_S
+        self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
+
+    def _ask_classifier(self, kind: Any, name: str, request: Any, deadline_s: float) -> Any:
+        """Return the answer of a service of the classifier that succeeded."""
+        missing, silent = 'no classifier answers; is it running?', 'the classifier does not answer; look at its output'
+        answer = self._ask(kind, name, request, (deadline_s, missing), (deadline_s, silent))
+        if not answer.success:
+            raise InvalidData(answer.message)
+        return answer
+
+    def _ask(self, kind: Any, name: str, request: Any, offered: tuple[float, str], answered: tuple[float, str]) -> Any:
+        """Return the answer of a service; each step has the longest time, s, and what to say when it is over."""
+        client = self._node.create_client(kind, name)
+        try:
+            self._until(client.service_is_ready, *offered)
+            future = client.call_async(request)
+            self._until(future.done, *answered)
+        finally:
+            self._node.destroy_client(client)
+        return future.result()
+
+    def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
+        """Set parameters of a node.
+
+        Parameters
+        ----------
+        node
+            Name of the node.
+        values
+            Values by the names of the parameters.
+        deadline_s
+            Longest time to wait for the answer.
+
+        Raises
+        ------
+        LaunchFailed
+            If the node does not answer.
+        InvalidParameter
+            If it refuses one, with its reason.
+        """
+        client = self._parameters_of(node, deadline_s)
+        self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
+
+    def set_from_texts(self, node: str, texts: Mapping[str, str], deadline_s: float = 10.0) -> None:
+        """Set parameters of a node from texts, which are read as the types that the node has declared.
+
+        Parameters
+        ----------
+        node
+            Name of the node.
+        texts
+            Values by the names of the parameters.
+        deadline_s
+            Longest time to wait for the node.
+
+        Raises
+        ------
+        LaunchFailed
+            If the node does not answer.
+        UnknownName
+            If it has no such parameter, with the nearest name.
+        InvalidParameter
+            If a text is no value of the type, or the node refuses it, with its reason.
+        """
+        client = self._parameters_of(node, deadline_s)
+        known = self._answer(node, client.list_parameters([], 10)).result.names
+        for name in texts:
+            if name not in known:
+                raise unknown_name(name, known, f'parameter of {node}')
+        values = self._answer(node, client.get_parameters(list(texts))).values
+        self._set(
+            node,
+            client,
+            [parameter_from_text(*pair, one.type) for pair, one in zip(texts.items(), values, strict=True)],
+        )
+
+    def _parameters_of(self, node: str, deadline_s: float) -> AsyncParameterClient:
+        if node not in self._settings:
+            self._settings[node] = AsyncParameterClient(self._node, node)
+        client = self._settings[node]
+        self._until(client.services_are_ready, deadline_s, f"node '{node}' does not answer; is it running?")
+        return client
+
+    def _answer(self, node: str, future: Future) -> Any:
+        """Return the answer of a node that may run without an explorer."""
+        self._until(future.done, SILENT_S, f"node '{node}' does not answer")
+        return future.result()
+
+    def _set(self, node: str, client: AsyncParameterClient, parameters: Sequence[Parameter]) -> None:
+        answer = self._answer(node, client.set_parameters(list(parameters)))
+        for name, outcome in zip((one.name for one in parameters), answer.results, strict=True):
+            if not outcome.successful:
+                raise InvalidParameter(f"node '{node}' refused parameter '{name}': {outcome.reason}")
+
+    def _result(self, future: Future) -> Any:
+        """Return the result of a future that the explorer or another node answers."""
+        self._wait(future.done, SILENT_S)
+        return future.result()
+
+    def _wait(
+        self, condition: Callable[[], bool], silent_s: float, ask_again: Callable[[], None] = lambda: None
+    ) -> None:
+        """Wait while there is an explorer; `ask_again` is called after each `RETRY_PERIOD_S` of its silence."""
+        seen_s = requested_s = self._received_s = time.monotonic()
+        while not condition():
+            self._step()
+            now_s = time.monotonic()
+            if self._explore.server_is_ready():
+                seen_s = now_s
+            elif now_s - seen_s > GONE_S:
+                raise MotionAborted(VANISHED)
+            if now_s - self._received_s > silent_s:
+                raise MotionAborted(
+                    f'no answer for {silent_s:g} s, though there is an explorer; stop it, and see that it is alone'
+                )
+            if now_s - max(requested_s, self._received_s) > RETRY_PERIOD_S:
+                requested_s = now_s
+                ask_again()
+
+    def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:
+        deadline = time.monotonic() + deadline_s
+        while not condition():
+            if time.monotonic() > deadline:
+                raise LaunchFailed(f'{complaint} (waited {deadline_s:.0f} s)')
+            self._step()
+
+    def _step(self) -> None:
+        self._guard()
+        self._executor.spin_once(timeout_sec=STEP_S)
+
+    def _cancel(self, goal: Any, ending: Future) -> str:
+        """Ask for the end, wait until the finger is lifted, and return in a sentence how it ended."""
+        goal.cancel_goal_async()
+        deadline = time.monotonic() + CANCEL_DEADLINE_S
+        while not ending.done() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=STEP_S)
+        if not ending.done():
+            return (
+                f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at '
+                'the robot, and use its own stop if it moves'
+            )
+        return f'the exploration has ended: {ending.result().result.message}'

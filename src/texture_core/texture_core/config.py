@@ -1,0 +1,988 @@
+"""Names, parameters, YAML and JSON: how a choice is looked up, a value checked and a file read within limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import errno
+import importlib
+import json
+import math
+import os
+import re
+import stat
+import sys
+import tokenize
+import typing
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, BinaryIO, Protocol, TypeVar, cast
+
+import numpy as np
+import yaml
+
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.types import AnyArray
+
+# --------------------
+# Look a choice up by name: in a table of the suite, or as 'module:Class' of the user's own.
+
+T = TypeVar('T')
+
+
+def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
+    """Return the entry called `name`; `kind` is the noun for the error sentence, such as 'feature'.
+
+    A name with a colon is imported: 'my_package.my_module:MyFeature'.
+
+    Parameters
+    ----------
+    catalogue
+        Names and what they mean.
+    name
+        Name that the user gave, or 'module:Class'.
+    kind
+        Noun for the error sentence, such as 'feature'.
+
+    Returns
+    -------
+    object
+        The entry, or the imported class.
+
+    Raises
+    ------
+    UnknownName
+        With the nearest known name.
+    """
+    if ':' in name:
+        return cast(T, _import(name, kind))
+    if name not in catalogue:
+        raise unknown_name(name, catalogue, kind)
+    return catalogue[name]
+
+
+def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
+    """Return the error for a name that is not among the known ones, with the nearest of them.
+
+    Parameters
+    ----------
+    name
+        Name that the user gave.
+    known
+        All names that are allowed.
+    kind
+        Noun for the error sentence, such as 'feature'.
+
+    Returns
+    -------
+    UnknownName
+        To be raised.
+    """
+    names = sorted(known)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else '.'
+    return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names) or 'none'}")
+
+
+def _import(name: str, kind: str) -> Any:
+    module, _, attribute = name.partition(':')
+    parts = module.split('.')
+    # Names come from files and over the network, too: modules that do something when imported are none of ours.
+    if parts[0] in sys.stdlib_module_names or '__main__' in parts:
+        raise UnknownName(f"no {kind} '{name}': '{module}' is a part or a program of Python; name a module of your own")
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise UnknownName(
+            f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported"
+        ) from error
+
+
+# --------------------
+# Find a file that a package of the suite ships, in the source tree or in an installation, without ROS.
+
+SOURCE_TREE = Path(__file__).resolve().parents[2]
+
+
+def folder(package: str, name: str) -> Path:
+    """Return the folder `name` ('config/recipes') of a package; the first of the places that has it."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    places = [SOURCE_TREE / package, *(Path(prefix) / 'share' / package for prefix in prefixes if prefix)]
+    for place in places:
+        if (place / name).is_dir():
+            return place / name
+    return places[0] / name
+
+
+def shipped(package: str, subfolder: str, suffix: str = '.yaml') -> dict[str, Path]:
+    """Return what all packages of this machine ship in a folder of this name, by stem.
+
+    Any installed package may add recipes, scenes or presets by having such a folder in its share; where two have a file
+    of the same name, that of `package` counts.
+    """
+    prefixes = [
+        Path(prefix) / 'share' for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if prefix
+    ]
+    others = [manifest.parent.name for place in (SOURCE_TREE, *prefixes) for manifest in place.glob('*/package.xml')]
+    names = dict.fromkeys([*sorted(others, reverse=True), package])  # the last one counts
+    names[package] = names.pop(package)
+    return {
+        item.stem: item
+        for name in names
+        for item in sorted(folder(name, subfolder).glob(f'*{suffix}'))
+        if item.is_file()
+    }
+
+
+def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix: str = '.yaml') -> Path:
+    """Return the file a user means: a path, or the name of a file that a package ships in `subfolder`.
+
+    Parameters
+    ----------
+    name_or_path
+        Path of a file, or name of a shipped one without its suffix.
+    package
+        Package whose files come first; any other that is installed may ship more (see `shipped`).
+    subfolder
+        Folder in the package, such as 'config/recipes'.
+    kind
+        Noun for the error sentence, such as 'feature'.
+    suffix
+        Ending of the shipped files.
+
+    Returns
+    -------
+    Path
+        Of an existing file.
+
+    Raises
+    ------
+    UnknownName
+        If there is neither, with the nearest name; `kind` is the noun for the sentence, such as 'recipe'.
+    """
+    path = Path(name_or_path).expanduser()
+    if path.is_file():
+        return path
+    known = shipped(package, subfolder, suffix)
+    if name_or_path not in known and (path.suffix == suffix or len(path.parts) > 1):
+        raise UnknownName(f"there is no file '{name_or_path}' in '{Path.cwd()}'; give the path of a {kind} that exists")
+    if name_or_path not in known:
+        raise unknown_name(name_or_path, known, kind)
+    return known[name_or_path]
+
+
+# --------------------
+# Open and read files of any origin: regular files only, and never more of them than a limit.
+#
+# What a header or a directory says of a size is not believed: bytes are counted while they are read.
+
+MB = 1_000_000
+# What compressed content may unpack to: 16 MB, and ten times the size of the file. Models and data sets reach 4 times.
+UNPACKED_BYTES = 16 * MB
+UNPACKED_TIMES = 10
+MAX_MEMBERS = 20_000
+BLOCK_BYTES = 1 << 18
+KINDS: Mapping[str, Callable[[int], bool]] = {
+    'a folder': stat.S_ISDIR,
+    'a named pipe': stat.S_ISFIFO,
+    'a socket': stat.S_ISSOCK,
+    'a device': lambda mode: stat.S_ISCHR(mode) or stat.S_ISBLK(mode),
+}
+HEADERS: Mapping[tuple[int, int], Callable[..., tuple[tuple[int, ...], bool, np.dtype[Any]]]] = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
+MAX_HEADER_CHARACTERS = 10_000
+LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
+# What NumPy raises at a header that is no literal, is cut off or is nested without end.
+BROKEN_HEADER = (
+    ValueError, TypeError, SyntaxError, tokenize.TokenError, EOFError, RecursionError, MemoryError, OverflowError,
+)  # fmt: skip
+BROKEN_ARCHIVE = (
+    zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OverflowError, LookupError,
+)  # fmt: skip
+
+
+class Readable(Protocol):
+    """What bytes come from."""
+
+    def read(self, size: int, /) -> bytes:
+        """Return at most so many bytes, b'' at the end."""
+
+
+class FileRefused(ValueError):
+    """A file that is not read: of a kind or size that is not allowed. The sentence begins with 'it'."""
+
+
+class Budget:
+    """How many bytes may still come out of one file."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most, self._left = most_bytes, most_bytes
+
+    def spend(self, count: int) -> None:
+        """Subtract bytes; FileRefused if fewer are left.
+
+        Raises
+        ------
+        FileRefused
+            If fewer are left.
+        """
+        self._left -= count
+        if self._left < 0:
+            raise FileRefused(
+                f'it unpacks to more than {self._most / MB:.3g} MB, which is the limit for a file of its size'
+            )
+
+    @property
+    def left(self) -> int:
+        """Bytes that may still come."""
+        return self._left
+
+
+def unpacked_limit(file_bytes: int) -> int:
+    """Return how many bytes a compressed file may unpack to."""
+    return UNPACKED_BYTES + UNPACKED_TIMES * file_bytes
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """Open a regular file for reading, without waiting.
+
+    A device is not even opened: opening a serial line may reset what is connected to it. Since the path may lead to
+    another file a moment later, what was opened is examined as well.
+
+    Raises
+    ------
+    OSError
+        If there is no such file, or it may not be read.
+    FileRefused
+        If it is a folder, a device, a named pipe or a socket, also behind a symbolic link.
+    """
+    _check_regular(os.stat(path).st_mode)  # noqa: PTH116  # the same call as below, on a path
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    try:
+        _check_regular(os.fstat(number).st_mode)
+        return os.fdopen(number, 'rb')
+    except BaseException:
+        os.close(number)
+        raise
+
+
+def read_bounded(path: str | Path, most_bytes: int) -> bytes:
+    """Return the bytes of a regular file.
+
+    Raises
+    ------
+    OSError, FileRefused
+        If it cannot be opened, see `open_regular`, or is larger than `most_bytes`.
+    """
+    with open_regular(path) as file:
+        return take_all(file, most_bytes)
+
+
+def read_text(path: str | Path, most_bytes: int, encoding: str = 'utf-8') -> str:
+    """Return the text in a regular file; see `read_bounded`, UnicodeDecodeError (a ValueError) if it is no text.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+    most_bytes
+        Largest allowed size in bytes.
+    encoding
+        Encoding of the text.
+
+    Returns
+    -------
+    str
+        The whole text.
+    """
+    return read_bounded(path, most_bytes).decode(encoding)
+
+
+@contextmanager
+def writing(path: str | Path, other: str = 'file') -> Iterator[None]:
+    """Say in one sentence, within a `with` block, that a file or folder cannot be written.
+
+    Parameters
+    ----------
+    path
+        What the block writes.
+    other
+        What to name instead, such as 'folder'.
+
+    Raises
+    ------
+    InvalidParameter
+        If the block raises OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another {other}") from error
+
+
+def take_all(file: Readable, most_bytes: int) -> bytes:
+    """Return what a stream still holds; FileRefused if that is more than `most_bytes`.
+
+    Raises
+    ------
+    FileRefused
+        If it holds more than is allowed.
+    """
+    parts, count = [], 0
+    while part := file.read(BLOCK_BYTES):
+        count += len(part)
+        if count > most_bytes:
+            raise FileRefused(f'it has more than {most_bytes / MB:.3g} MB, which is the limit for such a file')
+        parts.append(part)
+    return b''.join(parts)
+
+
+def read_array(file: Readable, budget: Budget, *, records: bool = False) -> AnyArray:
+    """Return the array in a stream of NumPy's format (.npy); nothing in it is run.
+
+    Memory is taken as the values come, and not as the header claims. Each value counts as 8 bytes at least, since
+    it will be computed with as such. With `records`, records of plain numbers are read, too.
+
+    Parameters
+    ----------
+    file
+        Stream at the beginning of the array.
+    budget
+        Bytes that may still be taken; what is read is subtracted.
+    records
+        Whether records are allowed.
+
+    Returns
+    -------
+    (...)
+        Array of the shape that the file states.
+
+    Raises
+    ------
+    FileRefused
+        If it is no such array, its values do not follow, or they are more than the budget allows.
+    """
+    shape, fortran, dtype = _array_header(file, records)
+    n_bytes = math.prod(shape) * dtype.itemsize
+    budget.spend(max(n_bytes, math.prod(shape) * 8))
+    content = bytearray()
+    while len(content) < n_bytes:
+        part = file.read(min(BLOCK_BYTES, n_bytes - len(content)))
+        if not part:
+            raise FileRefused(f'it promises an array of shape {shape}, whose values are cut off')
+        content += part
+    characters = np.frombuffer(content, np.dtype(np.uint32).newbyteorder(dtype.byteorder)) if dtype.kind == 'U' else ()
+    if np.max(characters, initial=0) > LAST_CHARACTER:
+        raise FileRefused('it promises texts, and holds what are no characters')
+    return np.frombuffer(content, dtype).reshape(shape, order='F' if fortran else 'C')
+
+
+class Archive:
+    """The members of a zip file, such as .npz or .skops, read within a limit that all share.
+
+    The limit is that of `unpacked_limit`, and it is the bytes that come out which count, however often and under
+    whatever names the same ones are stored.
+
+    Parameters
+    ----------
+    file
+        Open file; stays with the caller.
+
+    Raises
+    ------
+    FileRefused
+        If it is no zip file, or has more members than any file of this suite.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        size = file.seek(0, os.SEEK_END)
+        self.budget = Budget(unpacked_limit(size))
+        try:
+            self._zip = zipfile.ZipFile(file)
+        except (*BROKEN_ARCHIVE, ValueError) as error:
+            raise FileRefused(f'it is no archive that can be read: {error}') from error
+        members = self._zip.infolist()
+        if len(members) > MAX_MEMBERS:
+            raise FileRefused(f'it has {len(members)} members; {MAX_MEMBERS} are allowed')
+        self.names = tuple(dict.fromkeys(member.filename for member in members))
+
+    def __enter__(self) -> Archive:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._zip.close()
+
+    def read(self, name: str, most_bytes: int | None = None) -> bytes:
+        """Return a member; FileRefused if it is damaged or larger than the limit allows, KeyError if there is none."""
+        most = self.budget.left if most_bytes is None else min(most_bytes, self.budget.left)
+        return self._of_member(name, lambda member: self._whole(member, most))
+
+    def array(self, name: str, *, records: bool = False) -> AnyArray:
+        """Return the array in a member, see `read_array`; KeyError if there is no such member.
+
+        Returns
+        -------
+        (...)
+            Array of the shape that the member states.
+        """
+        return self._of_member(name, lambda member: read_array(member, self.budget, records=records))
+
+    def _whole(self, member: _Counted, most_bytes: int) -> bytes:
+        content = take_all(member, most_bytes)
+        self.budget.spend(len(content))
+        return content
+
+    def _of_member(self, name: str, use: Callable[[_Counted], T]) -> T:
+        info = self._zip.getinfo(name)
+        _check_compression(info)
+        try:
+            with self._zip.open(info) as opened:
+                member = _Counted(opened)
+                result = use(member)
+                rest = member.read(1)  # the checksum is compared at the end
+        except BROKEN_ARCHIVE as error:
+            raise FileRefused(f"its member '{name}' is damaged: {error}") from error
+        if rest or member.count != info.file_size:
+            raise FileRefused(f"its member '{name}' has not the {info.file_size} bytes that its directory states")
+        return result
+
+
+def _check_compression(info: zipfile.ZipInfo) -> None:
+    # Other methods take gigabytes for a few bytes, and no file of this suite has them.
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise FileRefused(f"its member '{info.filename}' is compressed by method {info.compress_type}; use 'deflate'")
+
+
+class _Counted:
+    """What comes out of a member of an archive, counted."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self.count = 0
+
+    def read(self, size: int) -> bytes:
+        """Return at most so many bytes, b'' at the end."""
+        part = self._file.read(size)
+        self.count += len(part)
+        return part
+
+
+class Arrays:
+    """The arrays of an .npz file by name, read one at a time within one limit; see `Archive`."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._archive = Archive(file)
+        self._members = {name.removesuffix('.npy'): name for name in self._archive.names if name.endswith('.npy')}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the arrays."""
+        return tuple(self._members)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._members
+
+    def __getitem__(self, name: str) -> AnyArray:
+        """Return an array; KeyError if there is none of this name, FileRefused if it is damaged or too large."""
+        return self._archive.array(self._members[name])
+
+
+def _check_regular(mode: int) -> None:
+    if stat.S_ISREG(mode):
+        return
+    kind = next((name for name, holds in KINDS.items() if holds(mode)), 'something else')
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    raise FileRefused(f'it is {kind}; a regular file is needed')
+
+
+def _array_header(file: Readable, records: bool) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    try:
+        version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
+        if version not in HEADERS:
+            raise FileRefused(f'it is an array of format {version}; {", ".join(map(str, HEADERS))} are known')
+        shape, fortran, dtype = HEADERS[version](file, max_header_size=MAX_HEADER_CHARACTERS)
+    except FileRefused:
+        raise
+    except BROKEN_HEADER as error:
+        raise FileRefused(f'it has no array header that can be read: {type(error).__name__}: {error}') from error
+    if dtype.hasobject:
+        raise FileRefused('it is an array of Python objects, which would run code; plain numbers or texts are needed')
+    if dtype.kind not in 'biufcUS' and not (records and _is_record(dtype)):
+        raise FileRefused(f'it is an array of {dtype}; plain numbers or texts are needed')
+    if not dtype.itemsize or any(type(length) is not int or length < 0 for length in shape):
+        raise FileRefused(f'it promises an array of shape {shape} of {dtype}, which there is not')
+    return shape, fortran, dtype
+
+
+def _is_record(dtype: np.dtype[Any]) -> bool:
+    """Return whether a type is a record of plain numbers."""
+    return bool(dtype.names) and all(dtype[name].kind in 'biuf' for name in dtype.names or ())
+
+
+# --------------------
+# Check where a command is to write, before anything is computed.
+
+
+def refuse_inputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | Path]) -> None:
+    """Refuse to write over a file that is read.
+
+    Parameters
+    ----------
+    outputs
+        Files to be written; None for one that is not wanted.
+    inputs
+        Files and folders that are read, such as recipes, bags and both files of a model.
+
+    Raises
+    ------
+    InvalidParameter
+        With the file that would be lost.
+    """
+    read = {_real(given) for given in inputs}
+    for output in outputs:
+        if output and _real(output) in read:
+            raise InvalidParameter(f"'{output}' would overwrite a file that is read; name another file")
+
+
+def _real(path: str | Path) -> Path:
+    return Path(path).expanduser().resolve()
+
+
+# --------------------
+# Read YAML and JSON as plain values, whoever wrote them: nothing is run, and little text never becomes much data.
+#
+# Figures are written as JSON here, too.
+
+MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst; the longest settings in use have a tenth
+MAX_VALUES = 200_000  # with every alias written out
+MAX_DEPTH = 50  # of lists and mappings within each other, in YAML and JSON
+MAX_CARD_BYTES = 5 * MB
+MAX_JSON_VALUES = 5_000_000
+JSON_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
+# What the parsers raise, depending on what is wrong; a value such as 2024-99-99 or !!bool x is no YAMLError.
+PARSE_ERRORS = (
+    yaml.YAMLError, OSError, ValueError, LookupError, AttributeError, TypeError, OverflowError, RecursionError,
+)  # fmt: skip
+
+
+def write_json(content: Any, path: str | Path) -> None:
+    """Write figures as JSON; InvalidParameter if the file cannot be written."""
+    with writing(path):
+        Path(path).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
+
+
+def load_yaml(path: Path, what: str) -> Any:
+    """Return the plain values in a YAML file; `what` is the noun for the error sentence, such as 'scene'.
+
+    Raises
+    ------
+    InvalidParameter
+        If it cannot be read, is no YAML, or holds more than a file of settings does.
+    """
+    try:
+        return parse_yaml(read_text(path, 4 * MAX_CHARACTERS))
+    except PARSE_ERRORS as error:
+        raise InvalidParameter(f"{what} '{path}' is no YAML that can be read: {error}") from error
+
+
+def load_card(path: Path) -> Any:
+    """Return what stands under `recipe` in a model's card (JSON).
+
+    Raises
+    ------
+    InvalidParameter
+        If it cannot be read as such.
+    """
+    try:
+        return load_json(path, MAX_CARD_BYTES).get('recipe')
+    except PARSE_ERRORS as error:
+        raise InvalidParameter(f"model card '{path}' cannot be read: {error}") from error
+
+
+def parse_yaml(text: str) -> Any:
+    """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it.
+
+    Raises
+    ------
+    ValueError
+        If the text is too long or its aliases stand for too many values.
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
+    loader = _BoundedLoader(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        if _count_values(node, {}) > MAX_VALUES:
+            raise ValueError(f'its aliases stand for more than {MAX_VALUES} values; write less')
+        return loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def load_json(path: Path, most_bytes: int) -> Any:
+    """Return the plain values in a JSON file.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it cannot be read, is no JSON, or larger than `most_bytes`.
+    """
+    return parse_json(read_text(path, most_bytes))
+
+
+def parse_json(text: str) -> Any:
+    """Return the plain values in a text; ValueError if it is no JSON, or one with too many or too deep values.
+
+    Raises
+    ------
+    ValueError
+        If it is no JSON.
+    FileRefused
+        If it has too many values or is nested too deeply.
+    """
+    marks = np.frombuffer(JSON_STRING.sub('', text).encode('utf-8', 'replace'), np.uint8)
+    depth = int(_among(marks, b'[{').sum(initial=0)) and int(np.cumsum(_steps(marks)).max(initial=0))
+    if depth > MAX_DEPTH:
+        raise FileRefused(f'it is nested {depth} deep; {MAX_DEPTH} is allowed')
+    n_values = int(_among(marks, b'[{,:').sum())
+    if n_values > MAX_JSON_VALUES:
+        raise FileRefused(f'it has {n_values} values; {MAX_JSON_VALUES} are allowed')
+    try:
+        return json.loads(text, parse_int=_whole_number)
+    except RecursionError as error:
+        raise ValueError('it is nested too deeply') from error
+
+
+def safe_repr(value: Any) -> str:
+    """Return a value as a sentence shows it, however it is nested and however many digits it has."""
+    try:
+        return repr(value)
+    except RecursionError:
+        return 'something nested too deeply'
+    except ValueError:
+        return 'a number of thousands of digits'
+
+
+def _whole_number(text: str) -> int:
+    """Return a whole number that a float can hold: nothing here is counted beyond."""
+    number = int(text)
+    if abs(number) > sys.float_info.max:
+        raise ValueError(f'it has a whole number of {len(text)} digits; 308 are allowed')
+    return number
+
+
+class _BoundedLoader(yaml.SafeLoader):
+    """Build a tree of nodes that is neither deep nor large, without whole numbers that no float can hold."""
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        return _whole_number(str(super().construct_yaml_int(node)))
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise FileRefused(f'it is nested more than {MAX_DEPTH} deep')
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+_BoundedLoader.add_constructor('tag:yaml.org,2002:int', _BoundedLoader.construct_yaml_int)
+
+
+def _among(marks: AnyArray, wanted: bytes) -> AnyArray:
+    return np.isin(marks, np.frombuffer(wanted, np.uint8))
+
+
+def _steps(marks: AnyArray) -> AnyArray:
+    """Return +1 where a list or an object begins and -1 where one ends."""
+    return _among(marks, b'[{').astype(np.int32) - _among(marks, b']}')
+
+
+def _count_values(node: yaml.Node, known: dict[int, float]) -> float:
+    """Return how many values a node stands for, each alias counted; infinite if it contains itself."""
+    if id(node) not in known:
+        known[id(node)] = math.inf
+        parts = node.value if isinstance(node, yaml.CollectionNode) else ()
+        children = [child for part in parts for child in (part if isinstance(part, tuple) else (part,))]
+        known[id(node)] = 1 + sum(_count_values(child, known) for child in children)
+    return known[id(node)]
+
+
+# --------------------
+# A parameter exists once: as a field of a frozen dataclass with default, unit, range and description.
+#
+# ROS declaration (`texture_core.ros`), reading from YAML, validation and the README tables all come from
+# it.
+
+NOUNS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
+
+
+def param(
+    default: Any,
+    description: str,
+    *,
+    unit: str = '',
+    low: float | None = None,
+    high: float | None = None,
+    choices: Sequence[str] = (),
+) -> Any:
+    """Return a dataclass field that knows its unit, range, choices and description.
+
+    Parameters
+    ----------
+    default
+        Default value; a list is copied for each instance.
+    description
+        Whole sentence: what it sets and what changes when it grows.
+    unit
+        Unit such as 'm/s'; '' if it has none.
+    low
+        Lowest allowed value; None for no limit.
+    high
+        Highest allowed value; None for no limit.
+    choices
+        Allowed texts; () for any.
+
+    Returns
+    -------
+    dataclasses.Field
+        With these facts in its metadata.
+    """
+    metadata = {'description': description, 'unit': unit, 'low': low, 'high': high, 'choices': tuple(choices)}
+    if isinstance(default, list):
+        return dataclasses.field(default_factory=lambda: list(default), metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """One parameter of a dataclass, as `parameters_of` lists it."""
+
+    name: str
+    type: type
+    default: Any
+    description: str
+    unit: str
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+
+    @property
+    def range_text(self) -> str:
+        """The allowed values in words, '' if all are."""
+        if self.choices:
+            return 'one of ' + ', '.join(self.choices)
+        unit = f' {self.unit}' if self.unit else ''
+        bounds = {
+            (True, True): f'{self.low} to {self.high}{unit}',
+            (True, False): f'at least {self.low}{unit}',
+            (False, True): f'at most {self.high}{unit}',
+            (False, False): '',
+        }
+        return bounds[self.low is not None, self.high is not None]
+
+    def check(self, value: Any) -> Any:
+        """Return the value in the parameter's type.
+
+        Raises
+        ------
+        InvalidParameter
+            If its type or range is wrong.
+        """
+        if typing.get_origin(self.type) is list:
+            return self._check_list(value)
+        if self.type is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value) if abs(value) <= sys.float_info.max else math.inf
+        if not isinstance(value, self.type) or (self.type is not bool and isinstance(value, bool)):
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; {NOUNS[self.type]} is needed")
+        self._check_range(value)
+        return value
+
+    def _check_list(self, values: Any) -> list[Any]:
+        [kind] = typing.get_args(self.type)
+        if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(values)}; a list is needed")
+        each = dataclasses.replace(self, type=kind)
+        return [each.check(value) for value in values]
+
+    def _check_range(self, value: Any) -> None:
+        below = self.low is not None and not value >= self.low
+        above = self.high is not None and not value <= self.high
+        unlisted = bool(self.choices) and value not in self.choices
+        if below or above or unlisted or (isinstance(value, float) and not math.isfinite(value)):
+            allowed = self.range_text or 'a finite number'
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; allowed is {allowed}")
+
+
+def parameters_of(cls: type) -> list[Parameter]:
+    """Return the parameters of a dataclass in their order."""
+    types = typing.get_type_hints(cls)
+    listed = []
+    for item in dataclasses.fields(cls):
+        default = item.default_factory() if item.default_factory is not dataclasses.MISSING else item.default
+        meta = {'description': '', 'unit': '', 'low': None, 'high': None, 'choices': (), **item.metadata}
+        listed.append(Parameter(item.name, types[item.name], default, **meta))
+    return listed
+
+
+def check_option(cls: type, name: str, value: Any) -> None:
+    """Check the option `--NAME` of a command, which sets a parameter.
+
+    Parameters
+    ----------
+    cls
+        Parameter dataclass.
+    name
+        Name of the parameter and of the option.
+    value
+        What the user gave.
+
+    Raises
+    ------
+    InvalidParameter
+        If its type or range is wrong; the sentence names the option.
+    """
+    parameter = next(one for one in parameters_of(cls) if one.name == name)
+    try:
+        parameter.check(value)
+    except InvalidParameter as error:
+        raise InvalidParameter(str(error).replace(f"parameter '{name}'", f'--{name}', 1)) from None
+
+
+def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
+    """Build a parameter dataclass from a mapping (a YAML section); what is not named keeps its default.
+
+    Parameters
+    ----------
+    cls
+        Parameter dataclass.
+    values
+        Values by the names of the fields.
+    where
+        Where the values stand, for the sentence of an error.
+
+    Returns
+    -------
+    instance of `cls`
+        Checked.
+
+    Raises
+    ------
+    InvalidParameter
+        If a value has the wrong type or range, or a name is unknown (with the nearest known one).
+    """
+    if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
+        raise InvalidParameter(f'{where}: {cls!r} is no class with parameters; name a dataclass')
+    known = {parameter.name: parameter for parameter in parameters_of(cls)}
+    place = f'{where}: ' if where else ''
+    if not isinstance(values, Mapping):
+        raise InvalidParameter(f'{place}came {safe_repr(values)}; a mapping of parameter names to values is needed')
+    return cls(**{name: _checked(known, name, value, place) for name, value in values.items()})
+
+
+def _checked(known: Mapping[str, Parameter], name: str, value: Any, place: str) -> Any:
+    """Return the value that a parameter takes; InvalidParameter, with the place, if there is no such parameter."""
+    if name not in known:
+        raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
+    try:
+        return known[name].check(value)
+    except (InvalidParameter, UnknownName) as error:
+        raise InvalidParameter(f'{place}{error}') from error
+
+
+def markdown_table(cls: type) -> str:
+    """Return the parameters of a dataclass as a Markdown table for a README."""
+    rows = ['| parameter | default | range | meaning |', '|---|---|---|---|']
+    for item in parameters_of(cls):
+        unit = f' {item.unit}' if item.unit else ''
+        default = f'`{item.default!r}`{unit}'
+        rows.append(f'| `{item.name}` | {default} | {item.range_text or "any"} | {item.description} |')
+    return '\n'.join(rows) + '\n'
+
+
+# --------------------
+# Read a tree of parameter dataclasses from a mapping (a YAML file): fields that are dataclasses are its sections.
+
+
+def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
+    """Build a dataclass whose fields are parameters, dataclasses of their own, or mappings of names to these.
+
+    A number that stands where a text is needed is taken as text: YAML reads a column named 3 as a number.
+
+    Parameters
+    ----------
+    cls
+        Frozen dataclass; what is not named keeps its default.
+    values
+        Mapping of names to values; None is an empty one.
+    where
+        Place for the error sentence, such as "mapping 'my.yaml'".
+
+    Returns
+    -------
+    cls
+        With every value checked.
+
+    Raises
+    ------
+    InvalidParameter
+        If a name is unknown (with the nearest known one), or a value has the wrong type or range.
+    """
+    values = {} if values is None else values
+    if not isinstance(values, Mapping):
+        raise InvalidParameter(f'{where}: came {safe_repr(values)}; a mapping of parameter names to values is needed')
+    known = {parameter.name: parameter for parameter in parameters_of(cls)}
+    read = {}
+    for name, value in values.items():
+        if name not in known:
+            raise InvalidParameter(f'{where}: {unknown_name(str(name), known, "parameter")}')
+        read[name] = _value(known[name], value, where)
+    try:
+        return cls(**read)
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{where}: {error}') from error
+
+
+def _value(parameter: Parameter, value: Any, where: str) -> Any:
+    kind: Any = parameter.type
+    if dataclasses.is_dataclass(kind):
+        return tree_from_mapping(kind, value, f'{where}, {parameter.name}')  # type: ignore[arg-type]
+    if typing.get_origin(kind) in (Mapping, dict):
+        return _values_by_name(parameter, value, where)
+    try:
+        return parameter.check(_as_text(kind, value))
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{where}: {error}') from error
+
+
+def _values_by_name(parameter: Parameter, value: Any, where: str) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InvalidParameter(f"{where}: '{parameter.name}' is {safe_repr(value)}; a mapping of names is needed")
+    _, kind = typing.get_args(parameter.type)
+    return {
+        str(name): _value(dataclasses.replace(parameter, name=f'{parameter.name}, {name}', type=kind), part, where)
+        for name, part in value.items()
+    }
+
+
+def _as_text(kind: Any, value: Any) -> Any:
+    if kind is str and type(value) in (int, float):
+        return str(value)
+    if kind == list[str] and isinstance(value, list):
+        return [_as_text(str, part) for part in value]
+    return value

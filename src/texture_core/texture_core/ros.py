@@ -1,0 +1,574 @@
+"""The suite's types as messages, its parameters in ROS, quality of service, diagnostics, and how a node runs."""
+
+from __future__ import annotations
+
+import array
+import contextlib
+import json
+import signal
+import socket
+import sys
+import threading
+import time
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, partial
+from typing import Any, TypeVar
+
+import numpy as np
+import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+    TimeoutException,
+)
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Header
+from texture_msgs import msg
+from texture_msgs.action import Explore
+
+from texture_core.config import Parameter, from_mapping, parameters_of, unknown_name
+from texture_core.errors import InvalidData, InvalidParameter, TextureError
+from texture_core.types import (
+    NANOSECONDS,
+    Array,
+    ExplorationRequest,
+    ExplorationState,
+    FeatureVector,
+    Phase,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
+
+# --------------------
+# A node's health on /diagnostics: one status, its level and its numbers.
+
+LEVELS = {'OK': DiagnosticStatus.OK, 'WARN': DiagnosticStatus.WARN, 'ERROR': DiagnosticStatus.ERROR}
+ENDED = 'ended'  # the value that the last report of a node carries
+ACKNOWLEDGED_S = 1.0  # the longest that a node waits at its end for the readers of that report
+DiagnosticReport = tuple[str, str, Mapping[str, Any]]
+
+
+class Diagnostics:
+    """Publish a status once a second, and whenever asked.
+
+    Parameters
+    ----------
+    node
+        The node that reports.
+    report
+        Returns (level, message, numbers): 'OK', 'WARN' or 'ERROR', one sentence, and what to show beside it.
+    hardware_id
+        Serial number or device path; '' for a node that owns no device.
+    """
+
+    def __init__(
+        self, node: Any, report: Callable[[], DiagnosticReport], hardware_id: str = '', period_s: float = 1.0
+    ) -> None:
+        self._node = node
+        self._report = report
+        self.hardware_id = hardware_id
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._timer = node.create_timer(period_s, self.publish)
+
+    def publish(self) -> None:
+        """Publish the status now."""
+        self._publish(*self._report())
+
+    def end(self) -> None:
+        """Publish the status for the last time, and say so: a node that ends as asked is not one that fell silent."""
+        level, message, numbers = self._report()
+        self._publish(level, message, {**numbers, ENDED: True})
+        self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S))
+
+    def _publish(self, level: str, message: str, numbers: Mapping[str, Any]) -> None:
+        status = DiagnosticStatus(
+            level=LEVELS[level],
+            name=self._node.get_fully_qualified_name(),
+            message=message,
+            hardware_id=self.hardware_id,
+            values=[KeyValue(key=str(key), value=_text(value)) for key, value in numbers.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(array)
+
+
+def has_ended(status: DiagnosticStatus) -> bool:
+    """Return whether a status is the last one of a node that ended as asked."""
+    return any(value.key == ENDED for value in status.values)
+
+
+def _text(value: Any) -> str:
+    return f'{value:.6g}' if isinstance(value, float) else str(value)
+
+
+# --------------------
+# Names of frames on tf, which know no namespaces of their own.
+
+
+def frame_name(namespace: str, name: str) -> str:
+    """Return what a frame is called on tf that a node in a namespace calls `name`: 'left/fingertip'.
+
+    Parameters
+    ----------
+    namespace
+        Of the node, and of the finger below it, such as '/left/finger0'; '/' is the root.
+    name
+        A name with a '/' in it is that of tf already.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> frame_name('/left', 'fingertip'), frame_name('/', 'fingertip'), frame_name('/left', 'right/fingertip')
+    ('left/fingertip', 'fingertip', 'right/fingertip')
+    """
+    if '/' in name or not name:
+        return name
+    return f'{namespace.strip("/")}/{name}'.lstrip('/')
+
+
+# --------------------
+# A lifecycle node that outlives a request which its state does not allow.
+
+
+class PatientLifecycleNode(LifecycleNode):
+    """Refuse an unknown or untimely transition; rclpy raises it as an error, which would end the process.
+
+    rclpy offers no place to refuse it but its own private method: the service handler asks that one.
+    """
+
+    def _LifecycleNodeMixin__change_state(self, transition_id: int) -> TransitionCallbackReturn:  # noqa: N802
+        try:
+            return super()._LifecycleNodeMixin__change_state(transition_id)  # type: ignore[misc]
+        except RCLError as error:
+            self.get_logger().warning(f'the transition {transition_id} was refused: {error}')
+            return TransitionCallbackReturn.FAILURE
+
+
+# --------------------
+# Declare the fields of a parameter dataclass as ROS parameters and read them back, checked.
+
+T = TypeVar('T')
+TYPES = {
+    bool: RosParameter.Type.BOOL,
+    int: RosParameter.Type.INTEGER,
+    float: RosParameter.Type.DOUBLE,
+    str: RosParameter.Type.STRING,
+    list[str]: RosParameter.Type.STRING_ARRAY,
+    list[float]: RosParameter.Type.DOUBLE_ARRAY,
+}
+UNBOUNDED = 1e300
+
+
+def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
+    """Declare every field of `cls` with its description, unit and range; return the values the node was given.
+
+    Parameters
+    ----------
+    node
+        The rclpy node that gets the parameters.
+    cls
+        Parameter dataclass.
+    changeable
+        Whether a running node follows changes (see `on_change`). If not, the parameters are read-only after the start:
+        a change that had no effect would look as if it had one.
+
+    Returns
+    -------
+    instance of `cls`
+        Checked.
+
+    Raises
+    ------
+    InvalidParameter
+        If a given value has the wrong type or range.
+    """
+    for item in parameters_of(cls):
+        if node.has_parameter(item.name):
+            continue
+        try:
+            node.declare_parameter(item.name, item.default, _descriptor(item, read_only=not changeable))
+        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            raise InvalidParameter(
+                f"parameter '{item.name}' of node '{node.get_name()}' was refused: {error}; {_needed(item)}"
+            ) from error
+    return read(node, cls)
+
+
+def read(node: Any, cls: type[T]) -> T:
+    """Return the declared parameters of `cls` with their present values."""
+    return from_mapping(cls, {item.name: node.get_parameter(item.name).value for item in parameters_of(cls)})
+
+
+def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
+    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set.
+
+    Parameters
+    ----------
+    node
+        The rclpy node whose parameters were declared.
+    cls
+        Parameter dataclass, as it was declared.
+    apply
+        Takes all values; it refuses them by raising a TextureError.
+    """
+    known = {item.name for item in parameters_of(cls)}
+
+    def check(changes: list[RosParameter]) -> SetParametersResult:
+        changed = {change.name: change.value for change in changes if change.name in known}
+        if not changed:
+            return SetParametersResult(successful=True)
+        present = {name: node.get_parameter(name).value for name in known}
+        try:
+            apply(from_mapping(cls, {**present, **changed}))
+        except InvalidParameter as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(check)
+
+
+def warn_of_unknown(node: Any) -> None:
+    """Log a warning for each parameter that was given and is unknown: a mistyped limit limits nothing."""
+    declared = set(node._parameters)
+    for name in sorted(set(node._parameter_overrides) - declared):
+        if not name.startswith('qos_overrides.'):
+            node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
+
+
+def _needed(item: Parameter) -> str:
+    return f'{TYPES[item.type].name.lower()} {item.range_text}'.strip() + ' is needed'
+
+
+def _descriptor(item: Parameter, *, read_only: bool) -> ParameterDescriptor:
+    unit = f' [{item.unit}]' if item.unit else ''
+    descriptor = ParameterDescriptor(
+        name=item.name,
+        type=TYPES[item.type].value,
+        description=f'{item.description}{unit}',
+        additional_constraints=item.range_text if item.choices else '',
+        # A YAML file may give 1 where 1.0 is meant; check() makes it a number of the right type.
+        dynamic_typing=False,
+        read_only=read_only,
+    )
+    if item.low is None and item.high is None:
+        return descriptor
+    low = item.low if item.low is not None else -UNBOUNDED
+    high = item.high if item.high is not None else UNBOUNDED
+    if item.type is int:
+        limits = IntegerRange(from_value=int(max(low, -(2**62))), to_value=int(min(high, 2**62)))
+        descriptor.integer_range = [limits]
+    elif item.type is float or typing.get_origin(item.type) is None:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+    return descriptor
+
+
+# --------------------
+# Quality of service of every topic of the suite, in one place.
+
+# One second of 5 ms batches: a stalled subscriber loses samples, never holds the driver up.
+SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Few and small, none may be missing: the end of an exploration travels in them.
+FEATURE_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
+# Who joins late gets the newest estimates, and so the verdict on the last exploration.
+ESTIMATE_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# A node that starts late learns at once what is going on.
+STATE_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+# --------------------
+# Run a node until a signal stops it, and release all its resources.
+
+try:  # from rclpy 7.1.4 on; half the computing time per message
+    from rclpy.experimental import EventsExecutor as OneThread
+except ImportError:
+    OneThread = SingleThreadedExecutor
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+ANSWERING_S = 2.0  # the longest that callbacks may take to answer once the node is shut down
+
+
+def run(
+    make_node: Callable[[], Any], args: Sequence[str] | None = None, make_executor: Callable[[], Executor] = OneThread
+) -> None:
+    """Make the node, spin it until a signal ends it, destroy it; exit with 2 and one sentence on a user's error.
+
+    The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
+    threads and closes devices.
+
+    Parameters
+    ----------
+    make_node
+        Makes the node when ROS is initialised.
+    args
+        Arguments of the command line; None for those of the process.
+    make_executor
+        Makes the executor that spins it.
+    """
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    stopped = threading.Event()
+    for number in STOP_SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN or number != signal.SIGHUP:  # as nohup wants it
+            signal.signal(number, lambda _number, _frame: stopped.set())
+    node = executor = None
+    try:
+        node = make_node()
+        warn_of_unknown(node)
+        executor = make_executor()
+        executor.add_node(node)
+        _wake_on_signals(executor)
+        while rclpy.ok() and not stopped.is_set():
+            executor.spin_once(timeout_sec=1.0)
+    except ExternalShutdownException:
+        pass
+    except TextureError as error:
+        print(f'{getattr(make_node, "__name__", "node")}: {error}', file=sys.stderr)
+        sys.exit(2)
+    finally:
+        if node is not None:
+            getattr(node, 'shutdown', lambda: None)()
+            if executor is not None:
+                executor.shutdown(ANSWERING_S)  # who waited for an answer still gets it
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _wake_on_signals(executor: Executor) -> None:
+    """Let a signal end the executor's wait at once: Python's own handlers run only after it."""
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+
+    def wait() -> None:
+        while reader.recv(1):
+            executor.wake()
+
+    # Both ends live as long as the process; the thread keeps no node alive.
+    threading.Thread(target=wait, daemon=True, name='signals').start()
+    _KEPT.append(writer)
+
+
+_KEPT: list[socket.socket] = []
+
+
+# --------------------
+# Run a node inside a command, as if it had been started by itself.
+
+
+def run_node(make_node: Callable[[], Any], parameters: Mapping[str, Any], namespace: str = '') -> None:
+    """Run a node with parameters until it ends or is told to stop.
+
+    A user's error ends the program with exit code 2 and one sentence, as for any node.
+
+    Parameters
+    ----------
+    make_node
+        Makes the node when ROS is initialised.
+    parameters
+        Values of parameters by name.
+    namespace
+        Namespace of the node; '' for the root.
+    """
+    rules = [f'{name}:={json.dumps(value)}' for name, value in parameters.items()]  # JSON is YAML, strings quoted
+    options = [part for rule in rules for part in ('-p', rule)]
+    if namespace:
+        options += ['-r', f'__ns:=/{namespace.strip("/")}']
+    run(make_node, ['--ros-args', *options])
+
+
+# --------------------
+# ROS times as whole nanoseconds.
+
+
+def to_ns(stamp: Time) -> int:
+    """Return a message stamp as nanoseconds."""
+    return stamp.sec * NANOSECONDS + stamp.nanosec
+
+
+def to_stamp(time_ns: int) -> Time:
+    """Return nanoseconds as a message stamp."""
+    seconds, nanoseconds = divmod(int(time_ns), NANOSECONDS)
+    return Time(sec=seconds, nanosec=nanoseconds)
+
+
+# --------------------
+# Data classes of texture_core to messages and back: field by field of the same name, the time in the header.
+
+MESSAGES: Mapping[type, type] = {
+    ExplorationState: msg.ExplorationState,
+    FeatureVector: msg.FeatureVector,
+    TextureEstimate: msg.TextureEstimate,
+    RoughnessEstimate: msg.RoughnessEstimate,
+}
+DATA_CLASSES = {message: cls for cls, message in MESSAGES.items()}
+STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
+Convert = Callable[[Any], Any] | None  # None: the same on both sides
+
+
+def to_msg(value: Any) -> Any:
+    """Return the message of a data class of texture_core."""
+    if isinstance(value, TactileSignal):
+        return _signal_to_msg(value)
+    stamp, fields = _plan(type(value))
+    values = {name: wire(getattr(value, name)) if wire else getattr(value, name) for name, wire, _ in fields}
+    if isinstance(value, ExplorationState):
+        values['phase_name'] = value.phase.value
+    header = Header(stamp=to_stamp(getattr(value, stamp)), frame_id=value.frame_id)
+    return MESSAGES[type(value)](header=header, **values)
+
+
+def from_msg(message: Any) -> Any:
+    """Return the data class of a message of texture_msgs.
+
+    Raises
+    ------
+    InvalidData
+        If the message contradicts itself.
+    """
+    if isinstance(message, msg.TactileSignal):
+        return _signal_from_msg(message)
+    cls = DATA_CLASSES[type(message)]
+    stamp, fields = _plan(cls)
+    values = {name: unwire(getattr(message, name)) if unwire else getattr(message, name) for name, _, unwire in fields}
+    values[stamp] = to_ns(message.header.stamp)
+    values['frame_id'] = message.header.frame_id
+    return cls(**values)
+
+
+def _signal_to_msg(signal: TactileSignal) -> msg.TactileSignal:
+    message = msg.TactileSignal(
+        header=Header(stamp=to_stamp(signal.stamp_ns), frame_id=signal.frame_id),
+        sensor=signal.sensor,
+        channels=list(signal.channels),
+        units=list(signal.units),
+        sampling_rate_hz=float(signal.sampling_rate_hz),
+        first_sample=signal.first_sample,
+    )
+    # An array.array is taken as it is; a list would be checked element by element.
+    message.samples = array.array('f', np.ascontiguousarray(signal.samples, dtype=np.float32).tobytes())
+    return message
+
+
+def _signal_from_msg(message: msg.TactileSignal) -> TactileSignal:
+    channels = tuple(message.channels)
+    flat = np.array(message.samples, dtype=np.float32)
+    if not channels or len(flat) % len(channels):
+        raise InvalidData(
+            f"signal message of '{message.sensor}' has {len(flat)} samples for {len(channels)} channels; "
+            'a multiple of the number of channels is needed'
+        )
+    return TactileSignal(
+        stamp_ns=to_ns(message.header.stamp),
+        sensor=message.sensor,
+        channels=channels,
+        units=tuple(message.units),
+        sampling_rate_hz=message.sampling_rate_hz,
+        first_sample=message.first_sample,
+        samples=flat.reshape(-1, len(channels)),
+        frame_id=message.header.frame_id,
+    )
+
+
+def _phase(code: int) -> Phase:
+    phases = tuple(Phase)
+    if code >= len(phases):
+        allowed = ', '.join(f'{phase.code} ({phase.value})' for phase in phases)
+        raise InvalidData(f'exploration state has the phase {code}; allowed are {allowed}')
+    return phases[code]
+
+
+def _doubles(values: Array) -> array.array[float]:
+    return array.array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
+
+
+# By the type of a field: to the message, and back.
+CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
+    float: (float, None),
+    tuple[str, ...]: (list, tuple),
+    tuple[float, ...]: (partial(array.array, 'd'), tuple),
+    Array: (_doubles, partial(np.array, dtype=np.float64)),
+    Phase: (lambda phase: phase.code, _phase),
+}
+
+
+@cache
+def _plan(cls: type) -> tuple[str, tuple[tuple[str, Convert, Convert], ...]]:
+    """Return which field is the time, and each other one with what it becomes."""
+    types = typing.get_type_hints(cls)
+    [stamp] = [name for name in STAMPS if types.pop(name, None)]
+    types.pop('frame_id')  # stands in the header, too
+    return stamp, tuple((name, *CONVERT.get(kind, (None, None))) for name, kind in types.items())
+
+
+def request_from_msg(goal: Any) -> ExplorationRequest:
+    """Return the request in a goal of the action or a request of the service: both have the same fields."""
+    return ExplorationRequest(**{name: getattr(goal, name) for name in ExplorationRequest.__dataclass_fields__})
+
+
+def request_to_msg(request: ExplorationRequest, kind: Any = Explore.Goal) -> Any:
+    """Return a goal of the action, or of another `kind` with the same fields."""
+    return kind(**{name: getattr(request, name) for name in ExplorationRequest.__dataclass_fields__})
+
+
+# --------------------
+# An executor for nodes some of whose callbacks wait long, as a service that answers only when the motion is over.
+
+ANSWER_POLL_S = 0.02
+
+
+class WaitingExecutor(SingleThreadedExecutor):
+    """Run callbacks one after the other, but those of a ReentrantCallbackGroup each in a thread of its own.
+
+    Goals of action servers run in threads of their own, too. rclpy's MultiThreadedExecutor would do, but in Jazzy it
+    does not sleep while a callback waits for a thread (ros2/rclpy #1547): with 100 messages of a sensor a second it
+    takes 80 % of a core and starves the other threads of the process, such as the one that moves the arm.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._aside: list[Any] = []  # tasks in threads of their own
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Send the answers of what has waited, for `timeout_sec` at most, and run no callback any more.
+
+        The result of an action is sent by a callback that follows the one of the goal; rclpy's executor drops it.
+        """
+        deadline_s = time.monotonic() + (timeout_sec or 0.0)
+        while self._unanswered() and time.monotonic() < deadline_s:
+            self.spin_once(timeout_sec=ANSWER_POLL_S)
+        return super().shutdown(timeout_sec)
+
+    def _unanswered(self) -> bool:
+        with self._tasks_lock:
+            return self._context.ok() and any(not task.done() for task, _entity, _node in self._tasks)
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Let one callback begin; raise what a callback has raised."""
+        with contextlib.suppress(TimeoutException, ShutdownException, ExternalShutdownException):
+            task, entity, _node = self.wait_for_ready_callbacks(timeout_sec)
+            if entity is not None and not isinstance(entity.callback_group, ReentrantCallbackGroup):
+                task()
+                task.result()
+            elif task not in self._aside:
+                self._aside.append(task)
+                threading.Thread(target=task, name='waiting callback').start()
+        for task in [task for task in self._aside if task.done()]:
+            self._aside.remove(task)
+            task.result()

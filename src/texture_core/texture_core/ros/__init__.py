@@ -1,1 +1,0 @@
-"""The only part of texture_core that imports ROS."""

@@ -1,0 +1,625 @@
+"""What flows between the packages: signals, windows, features, estimates, explorations; and small types of all."""
+
+from __future__ import annotations
+
+import cmath
+import contextlib
+import enum
+import math
+import socket
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
+from itertools import pairwise
+from statistics import median
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.errors import InvalidData
+
+# --------------------
+# Names for array types; the shape stands in the docstring of each function.
+
+Array = NDArray[np.float64]
+Samples = NDArray[np.float64]  # (..., n_samples, n_channels)
+AnyArray = NDArray[Any]
+
+
+# --------------------
+# What may be the label of a surface: it is shown, stored in file names and compared, so it is short and plain.
+
+MAX_CHARACTERS = 100
+# They separate folders, and the surface from the number of a slide.
+FORBIDDEN = frozenset('/\\')
+SHOWN_CHARACTERS = 40
+
+
+def checked_label(label: str) -> str:
+    """Return a label without the white space around it; '' stays ''.
+
+    Parameters
+    ----------
+    label
+        Name of a surface as a user gave it.
+
+    Raises
+    ------
+    InvalidData
+        If it is longer than 100 characters, or has a slash, a backslash or a character that cannot be printed.
+    """
+    label = label.strip()
+    if len(label) > MAX_CHARACTERS:
+        raise InvalidData(
+            f"the label '{_shown(label)}' has {len(label)} characters; at most {MAX_CHARACTERS} are allowed"
+        )
+    if not label.isprintable() or FORBIDDEN.intersection(label):
+        raise InvalidData(
+            f"the label '{_shown(label)}' has a slash, a backslash or a character that cannot be printed; "
+            'use letters, digits, spaces and punctuation'
+        )
+    return label
+
+
+def _shown(label: str) -> str:
+    """Return the beginning of a label, safe to print."""
+    start = label[:SHOWN_CHARACTERS].encode('unicode_escape').decode()
+    return start + '…' * (len(label) > SHOWN_CHARACTERS)
+
+
+# --------------------
+# A batch of consecutive samples of one sensor.
+
+NANOSECONDS = 1_000_000_000
+TARED = ' (tared)'  # ends the name of a sensor whose level without load has been subtracted
+MIN_HZ = 1e-3  # a sample in a quarter of an hour: below, stamps leave what 64 bits hold
+MAX_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
+
+
+@dataclass(frozen=True, eq=False)
+class TactileSignal:
+    """A batch of consecutive samples, as a driver delivers it and a message carries it.
+
+    Parameters
+    ----------
+    stamp_ns
+        Time of the first sample, ns since the epoch of the clock in use.
+    sensor, channels
+        Name of the sensor part, and of each column.
+    units
+        Unit of each channel, such as 'count' or 'Pa'; () if they are unknown.
+    sampling_rate_hz
+        Nominal rate, above 0 and at most 1 MHz.
+    first_sample
+        Running index of the first sample since the stream began; a jump between batches is a loss.
+    samples : (n_samples, n_channels) float32
+        NaN for a sample known to be bad.
+    frame_id
+        Frame of the fingertip.
+
+    Raises
+    ------
+    InvalidData
+        If the shape, the rate or the index makes no sense.
+    """
+
+    stamp_ns: int
+    sensor: str
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    sampling_rate_hz: float
+    first_sample: int
+    samples: NDArray[np.float32]
+    frame_id: str = ''
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim != 2 or self.samples.shape[1] != len(self.channels):
+            raise InvalidData(
+                f"signal of '{self.sensor}' has samples of shape {self.samples.shape}; "
+                f'(n_samples, {len(self.channels)}) is needed for its channels {list(self.channels)}'
+            )
+        if self.units and len(self.units) != len(self.channels):
+            raise InvalidData(
+                f"signal of '{self.sensor}' has {len(self.units)} units for {len(self.channels)} channels; "
+                'give one for each, or none'
+            )
+        if not MIN_HZ <= self.sampling_rate_hz <= MAX_HZ:
+            raise InvalidData(
+                f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; "
+                f'give one from {MIN_HZ:g} to {MAX_HZ:g}'
+            )
+        if self.first_sample < 0:
+            raise InvalidData(f"signal of '{self.sensor}' starts at sample {self.first_sample}; 0 is the first")
+
+    @property
+    def common_unit(self) -> str:
+        """The unit that all channels share; '' if they differ or are unknown."""
+        return self.units[0] if len(set(self.units)) == 1 else ''
+
+    @property
+    def next_sample(self) -> int:
+        """Running index of the sample after this batch."""
+        return self.first_sample + len(self.samples)
+
+    @property
+    def end_ns(self) -> int:
+        """Time of the sample after this batch, ns."""
+        return self.stamp_ns + round(len(self.samples) / self.sampling_rate_hz * NANOSECONDS)
+
+
+def lost_samples(batches: Sequence[TactileSignal]) -> int:
+    """Return how many samples are missing between consecutive batches of one stream."""
+    return sum(max(0, after.first_sample - before.next_sample) for before, after in pairwise(batches))
+
+
+# --------------------
+# One window of a signal, from which features are computed.
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Samples of one stream over one stretch of sliding.
+
+    Parameters
+    ----------
+    samples : (n_samples, n_channels) float64
+    rate_hz
+        Sampling rate, > 0.
+    channels
+        Name of each column; () if they do not matter.
+    start_ns
+        Time of the first sample.
+    speed_m_s, force_n
+        Mean speed and normal force in the window; NaN if unknown.
+    sensor
+        Name of the sensor part that measured; '' if unknown.
+    """
+
+    samples: Samples
+    rate_hz: float
+    channels: tuple[str, ...] = ()
+    start_ns: int = 0
+    speed_m_s: float = math.nan
+    force_n: float = math.nan
+    sensor: str = ''
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim != 2 or 0 in self.samples.shape:
+            raise InvalidData(f'a window has samples of shape {self.samples.shape}; (n_samples, n_channels) is needed')
+        if not self.rate_hz > 0:
+            raise InvalidData(f'a window has a sampling rate of {self.rate_hz} Hz; give one above 0')
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the window, s."""
+        return len(self.samples) / self.rate_hz
+
+
+# --------------------
+# The features of one window of sliding.
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureVector:
+    """Named features of one window; the last of an exploration is empty and has `last` set.
+
+    `feature_set` is the fingerprint of the windows, inputs and features that made the values: a model refuses
+    vectors of another fingerprint. `skipped` counts the windows left out so far for lost or non-finite samples.
+    `sequence` counts the vectors that its sender has sent before: a jump is what was lost on the way.
+    `motion`, `direction_rad` and `sensor` say how the window was measured, as `speed_m_s` and `force_n` do.
+    """
+
+    start_ns: int
+    exploration_id: str
+    window_s: float
+    hop_s: float
+    names: tuple[str, ...] = ()
+    values: Array = field(default_factory=lambda: np.empty(0))
+    speed_m_s: float = math.nan
+    force_n: float = math.nan
+    feature_set: str = ''
+    last: bool = False
+    skipped: int = 0
+    sequence: int = 0
+    frame_id: str = ''
+    motion: str = ''
+    direction_rad: float = math.nan
+    sensor: str = ''
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.names),):
+            raise InvalidData(f'a feature vector has {len(self.names)} names but values of shape {self.values.shape}')
+
+
+# --------------------
+# Estimates of texture and roughness.
+
+
+@dataclass(frozen=True)
+class TextureEstimate:
+    """Which surface is being touched; label '' and no probabilities while there is no evidence.
+
+    A label of '' with probabilities: the evidence speaks for several surfaces alike, it is unclassified.
+    """
+
+    stamp_ns: int
+    exploration_id: str
+    label: str = ''
+    known: bool = False
+    confidence: float = math.nan
+    labels: tuple[str, ...] = ()
+    probabilities: tuple[float, ...] = ()
+    decided: bool = False
+    prediction_set: tuple[str, ...] = ()
+    windows: int = 0
+    evidence_s: float = 0.0
+    final: bool = False
+    processing_s: float = 0.0
+    model: str = ''
+    message: str = ''
+    frame_id: str = ''
+
+
+@dataclass(frozen=True)
+class RoughnessEstimate:
+    """How rough the surface is, 1 (smooth) to 5 (rough); not valid while there is no grade."""
+
+    stamp_ns: int
+    exploration_id: str
+    valid: bool = False
+    grade: float = math.nan
+    grade_std: float = math.nan
+    windows: int = 0
+    evidence_s: float = 0.0
+    final: bool = False
+    processing_s: float = 0.0
+    model: str = ''
+    message: str = ''
+    frame_id: str = ''
+
+
+# --------------------
+# What the exploring finger is asked to do, and what it is doing.
+
+
+class Phase(str, enum.Enum):
+    """Phase of an exploration; windows are cut from SLIDE alone."""
+
+    IDLE = 'idle'
+    APPROACH = 'approach'
+    CONTACT = 'contact'
+    SLIDE = 'slide'
+    LIFT = 'lift'
+    DONE = 'done'
+    ABORTED = 'aborted'
+
+    @property
+    def code(self) -> int:
+        """Number of the phase in the message ExplorationState."""
+        return tuple(Phase).index(self)
+
+
+ENDED = frozenset({Phase.IDLE, Phase.DONE, Phase.ABORTED})
+
+
+@dataclass(frozen=True)
+class ExplorationState:
+    """What the finger is doing from `stamp_ns` on; unknown numbers are NaN, unknown names ''.
+
+    `steady_s` guarantees that phase, speed and force hold at least that long after the stamp. A window can be used as
+    soon as its last sample arrives, without waiting for the next state.
+    """
+
+    stamp_ns: int
+    exploration_id: str
+    motion: str
+    phase: Phase
+    steady_s: float = 0.0
+    speed_m_s: float = math.nan
+    force_n: float = math.nan
+    direction_rad: float = math.nan
+    progress: float = math.nan
+    surface: str = ''
+    x_m: float = math.nan
+    y_m: float = math.nan
+    z_m: float = math.nan
+    frame_id: str = ''
+    tangential_force_n: float = math.nan
+
+
+@dataclass(frozen=True)
+class ExplorationRequest:
+    """What an operator asks for; a number of 0 means the default of the motion, a `timeout_s` of 0 no timeout.
+
+    Raises
+    ------
+    InvalidData
+        If `surface` is no label (see `texture_core.types`), or `timeout_s` is negative or not finite.
+    """
+
+    motion: str
+    speed_m_s: float = 0.0
+    force_n: float = 0.0
+    distance_m: float = 0.0
+    radius_m: float = 0.0
+    turns: float = 0.0
+    duration_s: float = 0.0
+    direction_rad: float = 0.0
+    surface: str = ''
+    early_stopping: bool = False
+    timeout_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'surface', checked_label(self.surface))
+        if not 0.0 <= self.timeout_s < math.inf:
+            raise InvalidData(f'timeout_s is {self.timeout_s}; 0, for none, or a positive number of seconds is needed')
+
+
+# --------------------
+# How a finger slides, and which slides are of one kind.
+
+# Slides that differ by no more are of one kind: what an arm misses of the speed and force it was asked for.
+TURNED_RAD, SPEED_RATIO, FORCE_RATIO = 0.1, 1.15, 1.3
+
+
+@dataclass(frozen=True)
+class SlideMotion:
+    """One way to slide.
+
+    Parameters
+    ----------
+    motion
+        Name in the catalogue of motions.
+    direction_rad
+        From +x towards +y.
+    speed_m_s, force_n
+        Along the surface, and on it.
+    duration_s
+        What it costs: of two motions that tell as much, the shorter is made.
+    """
+
+    motion: str
+    direction_rad: float
+    speed_m_s: float
+    force_n: float
+    duration_s: float
+
+    def is_similar(self, other: SlideMotion) -> bool:
+        """Return whether both are of one kind; how long they last does not matter."""
+        return (
+            self.motion == other.motion
+            and abs(math.remainder(self.direction_rad - other.direction_rad, math.tau)) <= TURNED_RAD
+            and _within(self.speed_m_s, other.speed_m_s, SPEED_RATIO)
+            and _within(self.force_n, other.force_n, FORCE_RATIO)
+        )
+
+
+def group_similar(motions: Sequence[SlideMotion]) -> list[SlideMotion]:
+    """Return for each motion the median of its group; a motion joins the first group whose first motion is similar."""
+    founders: list[SlideMotion] = []
+    groups = []
+    for motion in motions:
+        group = next((k for k, founder in enumerate(founders) if motion.is_similar(founder)), len(founders))
+        if group == len(founders):
+            founders.append(motion)
+        groups.append(group)
+    medians = [
+        _median([motion for motion, own in zip(motions, groups, strict=True) if own == k]) for k in range(len(founders))
+    ]
+    return [medians[group] for group in groups]
+
+
+def _median(motions: Sequence[SlideMotion]) -> SlideMotion:
+    """Return the motion with the medians of all numbers, rounded to what people would ask for."""
+    heading = cmath.phase(sum(cmath.rect(1.0, motion.direction_rad) for motion in motions))
+    speed, force, duration = (
+        float(f'{median(getattr(motion, name) for motion in motions):.3g}')
+        for name in ('speed_m_s', 'force_n', 'duration_s')
+    )
+    return replace(motions[0], direction_rad=round(heading, 3), speed_m_s=speed, force_n=force, duration_s=duration)
+
+
+def _within(one: float, other: float, factor: float) -> bool:
+    return one <= other * factor and other <= one * factor
+
+
+# --------------------
+# State of a simulated finger: what emulated arms send to the emulator, over UDP on loopback.
+
+FORMAT = struct.Struct('<4sq7d')
+MAGIC = b'TTF1'
+LOOPBACK = '127.0.0.1'
+
+
+@dataclass(frozen=True)
+class FingerState:
+    """Position, velocity and normal force of a fingertip at one time, in the frame of the surface.
+
+    x and y lie in the surface, z points away from it; m, m/s and N. `time_ns` is of CLOCK_MONOTONIC, which all
+    processes of one machine share: the receiver extrapolates from it.
+    """
+
+    time_ns: int
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+    vx_m_s: float = 0.0
+    vy_m_s: float = 0.0
+    vz_m_s: float = 0.0
+    force_n: float = 0.0
+
+    def to_bytes(self) -> bytes:
+        """Return the datagram: magic, time, seven doubles, little endian."""
+        return FORMAT.pack(MAGIC, *astuple(self))
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> FingerState | None:
+        """Return the state in a datagram, or None if it is not one."""
+        if len(data) != FORMAT.size or not data.startswith(MAGIC):
+            return None
+        _, time_ns, *numbers = FORMAT.unpack(data)
+        return cls(time_ns, *numbers)
+
+
+class FingerSender:
+    """Sends finger states to the emulator on a UDP port of this machine, which need not listen; port 0: sends none."""
+
+    def __init__(self, port: int) -> None:
+        self._address = (LOOPBACK, port)
+        self._socket: socket.socket | None = None
+
+    def send(self, state: FingerState) -> None:
+        """Send one datagram."""
+        if not self._address[1]:
+            return
+        if self._socket is None:
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with contextlib.suppress(OSError):
+            self._socket.sendto(state.to_bytes(), self._address)
+
+    def close(self) -> None:
+        """Close the socket; the next datagram opens it again."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+
+# --------------------
+# Rotation vectors and quaternions, as robots use them.
+
+
+def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
+    """Return the matrix that turns by |r| about the axis r/|r| (Rodrigues' formula).
+
+    Parameters
+    ----------
+    rotation_vector_rad : (3,)
+
+    Returns
+    -------
+    (3, 3)
+        Its columns are the axes of the turned frame.
+    """
+    x, y, z = rotation_vector_rad
+    angle = float(np.sqrt(x * x + y * y + z * z))
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # sin(a)/a and (1 − cos a)/a² in a form that holds for a = 0; numpy's sinc(t) is sin(πt)/(πt).
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    matrix: Array = np.eye(3) + first * cross + second * cross @ cross
+    return matrix
+
+
+def quaternion(rotation_vector_rad: Sequence[float] | Array) -> tuple[float, float, float, float]:
+    """Return the quaternion x, y, z, w of ROS that turns by |r| about the axis r/|r|.
+
+    Parameters
+    ----------
+    rotation_vector_rad : (3,)
+
+    Returns
+    -------
+    (4,)
+        Of length 1.
+
+    Examples
+    --------
+    >>> [round(value, 3) for value in quaternion((0.0, 0.0, np.pi / 2))]
+    [0.0, 0.0, 0.707, 0.707]
+    """
+    vector = np.array(rotation_vector_rad, dtype=float)
+    half = 0.5 * float(np.linalg.norm(vector))
+    x, y, z = (0.5 * np.sinc(half / np.pi) * vector).tolist()  # sin(half)/|r| in a form that holds for 0
+    return x, y, z, float(np.cos(half))
+
+
+def quaternion_matrix(quaternion: Sequence[float]) -> Array:
+    """Return the matrix of a rotation that is given as the quaternion x, y, z, w of ROS.
+
+    Parameters
+    ----------
+    quaternion : (4,)
+        Of any length but 0; it is normalised.
+
+    Returns
+    -------
+    (3, 3)
+        Its columns are the axes of the turned frame; NaN for a quaternion of length 0, which is no rotation.
+    """
+    vector, w = np.array(quaternion[:3], dtype=float), float(quaternion[3])
+    length = float(np.sqrt(vector @ vector + w * w))
+    if length == 0.0:
+        return np.full((3, 3), np.nan)
+    vector, w = vector / length, w / length
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    return matrix
+
+
+def rotation_vector(matrix: Array) -> Array:
+    """Return the rotation vector of a rotation, the inverse of `rotation_matrix`.
+
+    Parameters
+    ----------
+    matrix : (3, 3)
+        Orthonormal, with determinant 1.
+
+    Returns
+    -------
+    (3,)
+        rad; its length is from 0 to π.
+    """
+    # The quaternion from its largest component is exact also at half a turn (Shepperd 1978).
+    trace = float(np.trace(matrix))
+    squares = np.array([*(1.0 + 2.0 * np.diag(matrix) - trace), 1.0 + trace])  # 4·x², 4·y², 4·z², 4·w²
+    largest = int(np.argmax(squares))
+    products = matrix + matrix.T  # 4·x·y and so on beside the diagonal
+    differences = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    if largest == 3:
+        quaternion = np.array([*differences, squares[3]])
+    else:
+        quaternion = np.array([*products[largest], differences[largest]])
+        quaternion[largest] = squares[largest]
+    quaternion = quaternion / np.linalg.norm(quaternion)
+    if quaternion[3] < 0.0:
+        quaternion = -quaternion
+    length = float(np.linalg.norm(quaternion[:3]))
+    if length == 0.0:
+        return np.zeros(3)
+    vector: Array = quaternion[:3] * (2.0 * np.arctan2(length, quaternion[3]) / length)
+    return vector
+
+
+# --------------------
+# What the parts of the suite expect of each other.
+
+
+class Sensor(Protocol):
+    """A tactile sensor: opened, read in batches, closed; any number of times.
+
+    `read` blocks for about one batch and returns what arrived, keyed by topic ('signal', 'signal_static');
+    it may return nothing. A device that is gone raises DeviceError from `open` or `read`; the caller closes and
+    opens again. `counts` are running totals of this sensor object, kept over reopening. A sensor may also have
+    `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics; `limits`: the
+    lowest and the highest sample by topic, of all channels or of each, to tell when one is saturated; and `set_bias()`:
+    makes the device take its present state for none, and returns the seconds that this takes.
+    """
+
+    def open(self) -> None:
+        """Open the device and start its stream; DeviceError if it cannot be reached."""
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches completed since the last call, by topic."""
+
+    def close(self) -> None:
+        """Stop the stream and close the device; never raises, may be called twice."""
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Running totals, such as 'samples', 'lost', 'bogus' and 'reopened'."""
+
+    @property
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic, for the diagnostics."""

@@ -1,1 +1,0 @@
-"""AnySkin and ReSkin, magnetic skins over magnetometers."""

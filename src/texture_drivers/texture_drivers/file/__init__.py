@@ -1,1 +1,0 @@
-"""Recordings played as a sensor: CSV, WAV, NumPy."""

@@ -1,1 +1,0 @@
-"""Contactile PapillArray: nine pillars of silicone that measure force and displacement."""

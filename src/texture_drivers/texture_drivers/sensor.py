@@ -1,0 +1,192 @@
+"""What every sensor shares: its parameters, and the thread that reads it."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from texture_core.config import PARSE_ERRORS, find_file, from_mapping, load_yaml, param, parse_yaml, safe_repr
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.types import Sensor, TactileSignal
+
+# --------------------
+# Parameters of every sensor.
+
+
+@dataclass(frozen=True)
+class SensorParams:
+    """Where the sensor is and how its samples are delivered."""
+
+    device: str = param(
+        '/dev/rq_tsf85_0',
+        "Sets the path of the device; a symbolic link is followed at each opening. 'auto' finds the only "
+        'TSF-85 on USB.',
+    )
+    config: str = param(
+        '',
+        "Sets the settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults.",
+    )
+    frame_id: str = param(
+        'fingertip',
+        'Sets the frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+    )
+    batch_s: float = param(
+        0.01,
+        'Sets the duration of one published batch; a longer batch costs less computing time and adds latency.',
+        unit='s',
+        low=0.001,
+        high=0.1,
+    )
+    finger: int = param(
+        0, 'Sets the index of the finger that is read; 0 is the first one of the device.', low=0, high=4
+    )
+    static_rate_hz: float = param(
+        0.0,
+        'Sets the rate at which taxel images are published; 0 takes the default of the sensor.',
+        unit='Hz',
+        low=0.0,
+        high=1000.0,
+    )
+
+
+# --------------------
+# Read a sensor in a thread, reopen it when it is gone, and report its faults.
+
+RETRY_S = 0.2
+# So often a sensor that was never there is tried without a warning, for 5 s: its device may appear after the node.
+QUIET_ATTEMPTS = 25
+Deliver = Callable[[str, TactileSignal], None]
+LogSentence = Callable[[str], None]
+Action = Callable[[], None]
+
+
+class SensorReader:
+    """A thread that reads a sensor, hands each batch on, and opens the sensor again when it is gone.
+
+    Parameters
+    ----------
+    sensor
+        What is read; used by this thread alone.
+    deliver
+        Called with topic and batch, in the thread.
+    warn, inform
+        Called with one sentence when the sensor goes, not at each retry, and when it comes back. A sensor that was
+        never there is warned of after `QUIET_ATTEMPTS`.
+    """
+
+    def __init__(
+        self, sensor: Sensor, deliver: Deliver, warn: LogSentence = lambda _: None, inform: LogSentence = lambda _: None
+    ) -> None:
+        self.sensor = sensor
+        self.fault = 'not opened yet'  # '' while all is well
+        self.published: dict[str, int] = dict.fromkeys(sensor.expected_rates_hz, 0)
+        self._quiet_attempts = QUIET_ATTEMPTS
+        self._warned = ''  # of this fault
+        self._deliver = deliver
+        self._warn = warn
+        self._inform = inform
+        self._actions: deque[Action] = deque()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='sensor reader', daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def between_reads(self, action: Action) -> None:
+        """Do something to the sensor in this thread, between two reads, once it is open; it may raise DeviceError."""
+        self._actions.append(action)
+
+    def stop(self) -> None:
+        """End the thread and close the sensor; returns when both are done."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self._read_until_gone()
+            self.sensor.close()
+            self._stop.wait(RETRY_S)
+
+    def _read_until_gone(self) -> None:
+        try:
+            self.sensor.open()
+            self._quiet_attempts = 0
+            while not self._stop.is_set():
+                for topic, batches in self.sensor.read().items():
+                    self._deliver_all(topic, batches)
+                while self._actions:
+                    self._actions.popleft()()
+        except DeviceError as error:
+            self.fault = str(error)
+            self._warn_once(self.fault)
+
+    def _warn_once(self, fault: str) -> None:
+        """Warn of a fault that was not warned of yet, except in the first attempts."""
+        if self._quiet_attempts:
+            self._quiet_attempts -= 1
+        elif self._warned != fault:
+            self._warned = fault
+            self._warn(f'{fault}. Trying again every {RETRY_S} s')
+
+    def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
+        if batches and self.fault:  # before the first batch is out: who has it may ask for a tare at once
+            self.fault = self._warned = ''
+            self._inform('the sensor delivers samples')
+        for batch in batches:
+            self._deliver(topic, batch)
+            self.published[topic] += len(batch.samples)
+
+
+# --------------------
+# Settings of one kind of sensor, beside those of every sensor: from a YAML file, or written in place.
+
+T = TypeVar('T')
+
+
+def load_settings(cls: type[T], config: str) -> T:
+    """Return the settings that `config` means; what they do not name keeps its default.
+
+    Parameters
+    ----------
+    cls
+        A dataclass of parameters.
+    config
+        Path of a YAML file, name of one in `config/sensors`, or a mapping in YAML such as '{loop: true}'; '' is none.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        If there is no such file, or it holds something unknown or impossible.
+    """
+    return from_mapping(cls, read_settings(config), f'settings {config}')
+
+
+def read_settings(config: str) -> dict[str, Any]:
+    """Return the mapping that `config` means; see `load_settings`.
+
+    Raises
+    ------
+    InvalidParameter
+        If it is no mapping in YAML.
+    """
+    if not config:
+        return {}
+    if config.lstrip().startswith('{'):
+        content = _in_place(config)
+    else:
+        content = load_yaml(find_file(config, 'texture_drivers', 'config/sensors', 'settings'), 'settings')
+    if not isinstance(content, dict):
+        raise InvalidParameter(f'settings {config} hold {safe_repr(content)}; a mapping of names to values is needed')
+    return content
+
+
+def _in_place(text: str) -> Any:
+    try:
+        return parse_yaml(text)
+    except PARSE_ERRORS as error:
+        raise InvalidParameter(f'settings {text} are no YAML: {error}') from error

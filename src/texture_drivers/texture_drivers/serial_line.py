@@ -1,0 +1,608 @@
+"""A sensor at a serial port: find the port, open it, decode its packets, count what is broken or missing."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import termios
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import serial
+from numpy.typing import NDArray
+from serial.tools import list_ports
+
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
+from texture_core.types import NANOSECONDS, Array, TactileSignal
+from texture_drivers.health import Limits
+from texture_drivers.sensor import SensorParams
+from texture_drivers.timing import PPM, SLOW_CLOCK, BlockCounter, StreamClock
+
+# --------------------
+# A stream of a framed protocol, as a sensor declares it.
+
+VERSION = 1
+SAMPLE = np.dtype('<i2')
+
+
+@dataclass(frozen=True, eq=False)
+class FramedStream:
+    """What one kind of frames holds, and under what name and in what units it is published.
+
+    Parameters
+    ----------
+    gains, offsets : (n_channels,)
+        Sample in its unit = gain · count + offset.
+    """
+
+    topic: str
+    kind: int
+    sensor: str
+    rate_hz: float
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    gains: Array
+    offsets: Array
+
+    def __post_init__(self) -> None:
+        if not len(self.channels) == len(self.units) == len(self.gains) == len(self.offsets) > 0:
+            raise InvalidParameter(
+                f"'{self.sensor}' has {len(self.channels)} channels, {len(self.units)} units, {len(self.gains)} gains "
+                f'and {len(self.offsets)} offsets; give one of each for every channel'
+            )
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Lowest and highest sample of each channel, (n_channels,) each."""
+        counts = np.iinfo(SAMPLE)
+        ends = np.array([self.gains * end + self.offsets for end in (counts.min, counts.max)], dtype=np.float32)
+        return ends.min(axis=0), ends.max(axis=0)
+
+    def check(self, frame: Frame) -> None:
+        """Raise DeviceError if a frame is of another version or another number of channels.
+
+        Raises
+        ------
+        DeviceError
+            If it is.
+        """
+        if frame.version != VERSION:
+            raise DeviceError(
+                f"'{self.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update the device "
+                'or this driver'
+            )
+        if frame.columns != len(self.channels):
+            raise DeviceError(
+                f"'{self.sensor}' sends {frame.columns} channels, and {len(self.channels)} are named "
+                f'{list(self.channels)}; correct the channels in the settings'
+            )
+
+
+# --------------------
+# A serial port that fails in one way: DeviceError, whatever pyserial, the kernel or termios raise.
+
+# An unplugged port raises termios.error from tcflush, which is no OSError.
+PORT_ERRORS = (serial.SerialException, OSError, termios.error)
+MAX_BYTES = 65536  # at once
+MODEM_SETTLE_S = 0.2  # the vendor's pause between raising DTR and the first command
+
+
+class SerialPort:
+    """An exclusively opened serial device in raw mode.
+
+    Raises
+    ------
+    DeviceError
+        From every method but `close`, once the device is gone.
+    """
+
+    def __init__(self, device: str, baud: int = 115200) -> None:
+        self._device = device
+        with self._faults():
+            self._serial = serial.Serial(baudrate=baud, exclusive=True, timeout=0, write_timeout=0.5)
+            self._serial.port = device
+            self._serial.rts = False  # as the vendor does; pyserial raises DTR and passes over ports without the lines
+            self._serial.open()
+            if self._has_modem_lines():
+                time.sleep(MODEM_SETTLE_S)
+            self._serial.reset_input_buffer()
+
+    def _has_modem_lines(self) -> bool:
+        try:
+            return self._serial.cts or True
+        except OSError:  # a pseudo-terminal: ENOTTY
+            return False
+
+    def read(self) -> bytes:
+        """Return what has arrived, without waiting."""
+        data = b''
+        with self._faults():
+            # The kernel hands over 4 kB at once and holds more behind them; what comes meanwhile is for the next time.
+            while (waiting := self._serial.in_waiting) and len(data) < MAX_BYTES:
+                data += self._serial.read(waiting)
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send."""
+        with self._faults():
+            self._serial.write(data)
+
+    def close(self) -> None:
+        """Close; never raises."""
+        with contextlib.suppress(*PORT_ERRORS):
+            self._serial.close()
+
+    @contextlib.contextmanager
+    def _faults(self) -> Iterator[None]:
+        try:
+            yield
+        except PORT_ERRORS as error:
+            raise DeviceError(
+                f"device '{self._device}' cannot be used ({reason_of(error)}); check that it is plugged in, "
+                'that you may open it, and that no other program has it open'
+            ) from error
+
+
+def reason_of(error: Exception) -> str:
+    """Return what the operating system says of a fault, without the path that pyserial repeats in its own text."""
+    code = error.args[0] if len(error.args) > 1 else None  # termios.error has no errno
+    return os.strerror(code) if isinstance(code, int) else str(error)
+
+
+# --------------------
+# A sensor that streams samples over a serial port, whatever its protocol: a decoder turns the bytes into batches.
+
+SILENCE_S = 1.0  # the device sends without being asked; opening the port again has woken many a one
+
+
+class Decoder(Protocol):
+    """Turns the bytes of one protocol into batches; knows no port and no clock of its own."""
+
+    @property
+    def valid_frames(self) -> int:
+        """How many valid frames have come in all."""
+        ...
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Running totals, 'samples', 'lost' and 'bogus' among them."""
+        ...
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """What the device's stream shows beside the samples, by name."""
+        ...
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic, where they are known."""
+        ...
+
+    def restart(self) -> None:
+        """Go on after an interruption."""
+
+    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches, by topic, in `data`, which has just arrived."""
+        ...
+
+
+class SerialSensor:
+    """Read the streams of one device. See `texture_core.types.Sensor`.
+
+    Parameters
+    ----------
+    params
+        Device, frame and batch length.
+    now_ns
+        Clock of the stamps.
+    decoder
+        What understands the device's bytes.
+    baud
+        Of a real UART; a USB device has none.
+    start_command, stop_command
+        What is sent when the port has been opened, and before it is closed; b'' sends nothing.
+    """
+
+    def __init__(
+        self,
+        params: SensorParams,
+        now_ns: Callable[[], int],
+        decoder: Decoder,
+        *,
+        baud: int = 115200,
+        start_command: bytes = b'',
+        stop_command: bytes = b'',
+    ) -> None:
+        self._params = params
+        self._now_ns = now_ns
+        self._decoder = decoder
+        self._baud = baud
+        self._start_command = start_command
+        self._stop_command = stop_command
+        self._port: SerialPort | None = None
+        self._opened = 0
+        self._silent_s = 0.0
+
+    def open(self) -> None:
+        """Open the device and start its stream; DeviceError if it cannot be reached."""
+        self.close()
+        self._port = SerialPort(self._params.device, self._baud)
+        self.send(self._start_command)
+        self._opened += 1
+        self._silent_s = 0.0
+        self._decoder.restart()
+
+    def send(self, command: bytes) -> None:
+        """Send a command; b'' sends nothing.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone.
+        """
+        port = self._opened_port()
+        if command:
+            port.write(command)
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        """Wait for the length of one batch and return what arrived.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone, or no valid frame has come for 1 s.
+        """
+        port = self._opened_port()
+        time.sleep(self._params.batch_s)
+        data = port.read()
+        arrival_ns = self._now_ns()
+        frames = self._decoder.valid_frames
+        batches = self._decoder.feed(data, arrival_ns)
+        self._watch_silence(alive=self._decoder.valid_frames > frames, any_bytes=bool(data))
+        return batches
+
+    def close(self) -> None:
+        """Stop the stream and close the device."""
+        if self._port is None:
+            return
+        with contextlib.suppress(DeviceError):  # if it is gone there is nothing to stop
+            self.send(self._stop_command)
+        self._port.close()
+        self._port = None
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals of the decoder, and how often the device was opened again."""
+        return {**self._decoder.counts, 'reopened': max(0, self._opened - 1)}
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """What the decoder knows beside the samples, such as how much the device's clock is slow."""
+        return self._decoder.details
+
+    @property
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return self._decoder.rates_hz
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic, where they are known."""
+        return self._decoder.limits
+
+    def _opened_port(self) -> SerialPort:
+        if self._port is None:
+            raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
+        return self._port
+
+    def _watch_silence(self, *, alive: bool, any_bytes: bool) -> None:
+        self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
+        if self._silent_s < SILENCE_S:
+            return
+        what = 'bytes but no valid frame' if any_bytes else 'nothing'
+        raise DeviceError(
+            f"device '{self._params.device}' is open and sends {what}; check that it is the right device"
+            + (f', and its baud rate ({self._baud} is set)' if any_bytes else ', and that its firmware runs')
+        )
+
+
+# --------------------
+# Place the blocks of a stream in time and note what is missing between them.
+
+MICROSECONDS = 1_000_000
+
+
+class StreamBlock(NamedTuple):
+    """The samples of one frame, with unwrapped time."""
+
+    time_us: int
+    rows: int
+    lost_frames: int
+    data: bytes
+
+
+class StreamTracker:
+    """Follow one stream: number its blocks and make batches of them."""
+
+    def __init__(self, stream: FramedStream, frame_id: str) -> None:
+        self.stream = stream
+        self.samples = 0  # published
+        self.lost = 0  # between the first one published and the last
+        self._frame_id = frame_id
+        self._counter = BlockCounter(stream.rate_hz, stream.sensor)
+        self._due_ns: int | None = None  # when the next sample would have come, had there been no interruption
+        self._published: int | None = None  # index after the last one
+
+    @property
+    def overrun(self) -> int:
+        """Samples that the device itself left out."""
+        return self._counter.overrun
+
+    def end_us(self, block: StreamBlock) -> int:
+        """Return the device's time of a block's last sample."""
+        return block.time_us + round((block.rows - 1) * MICROSECONDS / self.stream.rate_hz)
+
+    def interrupt(self, clock: StreamClock) -> None:
+        """Note by the old clock when the next sample is due."""
+        if self._counter.next_us is not None and clock.settled:
+            self._due_ns = clock.time_ns(self._counter.next_us)
+        self._counter.resume(0)
+
+    def batches(self, blocks: Sequence[StreamBlock], clock: StreamClock) -> list[TactileSignal]:
+        """Return the batches that consecutive blocks make: a new one wherever samples are missing."""
+        if self._due_ns is not None:
+            missing_ns = clock.time_ns(blocks[0].time_us) - self._due_ns
+            self._counter.resume(max(0, round(missing_ns * self.stream.rate_hz / NANOSECONDS)))
+            self._due_ns = None
+        runs: list[tuple[int, int, list[bytes]]] = []
+        for block in blocks:
+            expected = self._counter.next_index
+            index = self._counter.place(block.time_us, block.rows, block.lost_frames)
+            if not runs or index != expected:
+                runs.append((index, block.time_us, []))
+            runs[-1][2].append(block.data)
+        return [self._batch(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
+
+    def _account(self, index: int, samples: int) -> None:
+        """Count samples that are published, and those that are missing before them."""
+        self.lost += 0 if self._published is None else index - self._published
+        self._published = index + samples
+        self.samples += samples
+
+    def _batch(self, index: int, stamp_ns: int, data: bytes) -> TactileSignal:
+        counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(self.stream.channels))
+        self._account(index, len(counts))
+        return TactileSignal(
+            stamp_ns=stamp_ns,
+            sensor=self.stream.sensor,
+            channels=self.stream.channels,
+            units=self.stream.units,
+            sampling_rate_hz=self.stream.rate_hz,
+            first_sample=index,
+            samples=(counts * self.stream.gains + self.stream.offsets).astype(np.float32),
+            frame_id=self._frame_id,
+        )
+
+
+# --------------------
+# Streams of samples on a framed serial line: numbered, timed, in physical units. Knows no port.
+#
+# Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
+# endian, row after row; its kind tells the stream, its time is that of the first row.
+
+LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
+
+
+class StreamDecoder:
+    """Decode the bytes of a framed serial line into the batches of its streams, by topic.
+
+    Frames of other kinds are passed over, so that other traffic may share the line. All streams are timed by one clock.
+
+    Parameters
+    ----------
+    streams
+        What is expected.
+    frame_id
+        For the headers.
+    """
+
+    def __init__(self, streams: Sequence[FramedStream], frame_id: str = '') -> None:
+        self.malformed = 0  # frames that passed the checksum and hold another number of bytes than they say
+        self.other_frames = 0  # frames of other kinds
+        self.restarts = 0  # of the device's clock
+        self.deframer = FrameDecoder()
+        self.clock = StreamClock(MICROSECONDS)
+        self.trackers = {stream.kind: StreamTracker(stream, frame_id) for stream in streams}
+        self._time = CounterUnwrapper(TIME_BITS)
+        self._latest_us: dict[int, int] = {}  # time of the last block of each kind
+        self._newest_us = 0
+
+    @property
+    def valid_frames(self) -> int:
+        """Frames that passed the checksum, of any kind."""
+        return self.deframer.frames
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals: samples published and lost, frames refused or passed over, and new beginnings."""
+        trackers = self.trackers.values()
+        return {
+            'samples': sum(tracker.samples for tracker in trackers),
+            'lost': sum(tracker.lost for tracker in trackers),
+            'left out by the device': sum(tracker.overrun for tracker in trackers),
+            'bogus': self.deframer.bad_frames + self.malformed,
+            'repeated frames': self.deframer.repeated,
+            'other frames': self.other_frames,
+            'device restarts': self.restarts,
+            'clock_steps': self.clock.steps,
+        }
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """How much the device's clock is slow."""
+        return {SLOW_CLOCK: PPM * self.clock.drift}
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return {tracker.stream.topic: tracker.stream.rate_hz for tracker in self.trackers.values()}
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic: those of an int16."""
+        return {tracker.stream.topic: tracker.stream.limits for tracker in self.trackers.values()}
+
+    def restart(self) -> None:
+        """Go on after an interruption, with the index that the host's clock will tell."""
+        self.deframer.restart()
+        self._restart_streams()
+
+    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches in `data`, which has just arrived; none in the first 0.1 s of a stream.
+
+        Raises
+        ------
+        DeviceError
+            If the device sends another version, other channels or another rate than expected.
+        """
+        blocks = self._blocks(self.deframer.feed(data))
+        if not blocks:
+            return {}
+        newest_us = max(self.trackers[kind].end_us(found[-1]) for kind, found in blocks.items())
+        if newest_us >= self._newest_us:  # an older block of a slower stream tells nothing new
+            self.clock.observe(newest_us, arrival_ns)
+            self._newest_us = newest_us
+        if not self.clock.settled:
+            return {}
+        return {
+            self.trackers[kind].stream.topic: self.trackers[kind].batches(found, self.clock)
+            for kind, found in blocks.items()
+        }
+
+    def _restart_streams(self) -> None:
+        for tracker in self.trackers.values():
+            tracker.interrupt(self.clock)
+        self.clock.restart()
+        self._time = CounterUnwrapper(TIME_BITS)
+        self._latest_us = {}
+        self._newest_us = 0
+
+    def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[StreamBlock]]:
+        """Return the blocks of each stream; those before a restart of the device's clock are given up."""
+        blocks: dict[int, list[StreamBlock]] = {}
+        for frame in frames:
+            if not self._fits(frame):
+                continue
+            if self._has_restarted(frame):
+                self.restarts += 1
+                self._restart_streams()
+                blocks = {}
+            time_us = self._latest_us[frame.kind] = self._time.advance(frame.time_us)
+            blocks.setdefault(frame.kind, []).append(StreamBlock(time_us, frame.rows, frame.lost, frame.body))
+        return blocks
+
+    def _has_restarted(self, frame: Frame) -> bool:
+        """Return whether the device's clock went back, within one stream, or leapt."""
+        if self._time.value is None:
+            return False
+        step_us = self._time.step(frame.time_us)
+        moved_back = self._time.value + step_us < self._latest_us.get(frame.kind, self._time.value + step_us)
+        return moved_back or abs(step_us) > LONGEST_STEP_US
+
+    def _fits(self, frame: Frame) -> bool:
+        tracker = self.trackers.get(frame.kind)
+        if tracker is None:
+            self.other_frames += 1
+            return False
+        tracker.stream.check(frame)
+        if not frame.rows or frame.rows * frame.columns * SAMPLE.itemsize != len(frame.body):
+            self.malformed += 1
+            return False
+        return True
+
+
+# --------------------
+# Find a serial device by the numbers that its maker was given for USB.
+
+AUTO = 'auto'
+UsbId = tuple[int, int]  # vendor, product
+
+
+class Port(Protocol):
+    """What pyserial knows of a port; all but `device` may be None."""
+
+    device: str
+    vid: int | None
+    pid: int | None
+    serial_number: str | None
+
+
+ListPorts = Callable[[], Iterable[Port]]
+
+
+def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts = list_ports.comports) -> str:
+    """Return the path that is meant: `device` itself, or for 'auto' that of the only port with one of the numbers.
+
+    Parameters
+    ----------
+    device
+        Path of the device, or 'auto'.
+    usb_ids
+        Vendor and product numbers of the device.
+    kind
+        Name of the device for the error sentence, such as 'TSF-85'.
+    ports
+        Lists the ports of this machine.
+
+    Returns
+    -------
+    str
+        Path of a port.
+
+    Raises
+    ------
+    DeviceError
+        If for 'auto' there is none or more than one.
+    """
+    if device != AUTO:
+        return device
+    listed = list(ports())
+    found = sorted(port.device for port in listed if (port.vid, port.pid) in usb_ids)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise DeviceError(
+            f"device 'auto' may be any of {len(found)} {kind}s: {', '.join(found)}; set the parameter device to one"
+        )
+    seen = ', '.join(sorted(_description(port) for port in listed)) or 'none'
+    wanted = ' or '.join(_numbers(*usb_id) for usb_id in usb_ids)
+    raise DeviceError(
+        f"device 'auto' is no {kind} ({wanted}): the serial ports here are {seen}; plug it in, or set the parameter "
+        'device to its path'
+    )
+
+
+def serial_number(device: str, ports: ListPorts = list_ports.comports) -> str:
+    """Return the serial number of the USB device behind a path, '' if it tells none."""
+    path = str(Path(device).resolve())
+    return next((port.serial_number or '' for port in ports() if port.device == path), '')
+
+
+def _description(port: Port) -> str:
+    if port.vid is None or port.pid is None:
+        return port.device
+    return f'{port.device} ({_numbers(port.vid, port.pid)})'
+
+
+def _numbers(vendor: int, product: int) -> str:
+    return f'{vendor:04X}:{product:04X}'

@@ -1,0 +1,315 @@
+"""Sound card as a sensor: capture in blocks, and the sensor."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import param
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.types import NANOSECONDS, TactileSignal
+from texture_drivers.health import Limits
+from texture_drivers.sensor import SensorParams, load_settings
+from texture_drivers.timing import PPM, SLOW_CLOCK, ArrivalNumbering, Decimator
+
+# --------------------
+# Numbers of a sensor on a sound card.
+
+SIGNAL = 'signal'
+SENSOR = 'sound_card'
+RATES_HZ = (44_100, 48_000, 88_200, 96_000, 192_000)  # USB Audio Class devices have some of these
+RATE_HZ = 48_000
+BLOCK_FRAMES = 480  # in a call of PortAudio: 10 ms at 48 kHz
+QUEUED_S = 1.0  # blocks are kept so long for a busy reader
+FULL_SCALE = 'FS'  # unit of uncalibrated samples: 1 is the largest
+
+
+# --------------------
+# Blocks of samples from a sound card, through PortAudio: captured in its thread, handed over in order.
+
+CAPTURE_FULL_SCALE = 2.0**15
+LONGEST_LATENCY_S = 1.0  # a time of conversion that lies further off is none: some drivers tell 0
+
+
+class AudioBlock(NamedTuple):
+    """What PortAudio delivered at once.
+
+    Parameters
+    ----------
+    samples : (n_samples, n_channels) float32
+        1 is full scale.
+    end_ns
+        When the last sample was converted, by the host's clock.
+    overflowed
+        Whether samples before this block were lost.
+    """
+
+    samples: NDArray[np.float32]
+    end_ns: int
+    overflowed: bool
+
+
+class Capture:
+    """An opened input of a sound card.
+
+    Parameters
+    ----------
+    device
+        Its name or a part of it, or its number; '' is the default input.
+    rate_hz, channels
+        What is asked of it.
+    now_ns
+        The host's clock.
+
+    Raises
+    ------
+    DeviceError
+        If it cannot be opened.
+    """
+
+    def __init__(self, device: str, rate_hz: int, channels: int, now_ns: Callable[[], int]) -> None:
+        self._rate_hz = rate_hz
+        self._now_ns = now_ns
+        self._overflowed = False
+        self._blocks: deque[AudioBlock] = deque()
+        self._most_blocks = round(QUEUED_S * rate_hz / BLOCK_FRAMES)
+        with open_errors(device) as sounddevice:
+            self._stream = sounddevice.InputStream(
+                device=int(device) if device.isdecimal() else device or None,
+                samplerate=rate_hz,
+                channels=channels,
+                dtype='int16',  # what every card has; PortAudio rounds what a card of 24 bits delivers
+                blocksize=BLOCK_FRAMES,
+                callback=self._on_block,
+            )
+            self._stream.start()
+
+    def take(self) -> Sequence[AudioBlock]:
+        """Return the blocks that have come since the last call."""
+        return [self._blocks.popleft() for _ in range(len(self._blocks))]
+
+    def close(self) -> None:
+        """Stop and close; never raises."""
+        with contextlib.suppress(Exception):  # PortAudio raises an error of its own for each way a device can be gone
+            self._stream.abort()
+        with contextlib.suppress(Exception):
+            self._stream.close()
+
+    def _on_block(self, samples: NDArray[np.int16], frames: int, times: Any, status: Any) -> None:
+        """Keep a block; called in PortAudio's thread."""
+        self._overflowed = self._overflowed or bool(status.input_overflow)
+        if len(self._blocks) >= self._most_blocks:
+            self._overflowed = True  # the reader is too busy: this block is lost
+            return
+        latency_s = times.currentTime - times.inputBufferAdcTime - frames / self._rate_hz
+        believed_s = latency_s if 0 <= latency_s < LONGEST_LATENCY_S else 0.0
+        end_ns = self._now_ns() - round(believed_s * NANOSECONDS)
+        self._blocks.append(AudioBlock((samples / CAPTURE_FULL_SCALE).astype(np.float32), end_ns, self._overflowed))
+        self._overflowed = False
+
+
+@contextlib.contextmanager
+def open_errors(device: str) -> Iterator[Any]:
+    """Yield the module sounddevice with a fresh list of devices.
+
+    Raises
+    ------
+    DeviceError
+        If the module or PortAudio is missing, or for whatever goes wrong with the device meanwhile.
+    """
+    try:
+        import sounddevice  # noqa: PLC0415  # optional, and it fails without PortAudio
+    except (ImportError, OSError) as error:
+        raise DeviceError(
+            f"sound card '{device}' cannot be opened: {error}; install PortAudio (Debian: libportaudio2) and the "
+            'Python package sounddevice'
+        ) from error
+    try:
+        # PortAudio lists the devices once; a card that was plugged in later is found only after a new start.
+        sounddevice._terminate()
+        sounddevice._initialize()
+        yield sounddevice
+    except (sounddevice.PortAudioError, ValueError) as error:
+        raise DeviceError(
+            f"sound card '{device}' cannot be opened: {error}; check its plug, its rate and number of channels, and "
+            'that no other program has it open (`python -m sounddevice` lists the cards)'
+        ) from error
+
+
+# --------------------
+# A contact microphone or accelerometer on a sound card as a sensor of the suite: all its channels on 'signal'.
+
+SILENCE_S = 1.0
+
+
+@dataclass(frozen=True)
+class SoundCardSettings:
+    """Parameters of the sound card and of the sensor on its input."""
+
+    rate_hz: int = param(
+        RATE_HZ,
+        'Sets the sampling rate of the card, such as 44100 or 48000; it must be one that the card has.',
+        unit='Hz',
+        low=8000,
+        high=192_000,
+    )
+    channels: int = param(1, 'Sets the number of channels that are read, from the first on.', low=1, high=8)
+    decimation: int = param(
+        12,
+        'Sets by what factor the rate is lowered behind a low-pass; a larger factor costs less computing time and '
+        'keeps a smaller band, up to 0.34 of the lower rate.',
+        low=1,
+        high=64,
+    )
+    unit: str = param(FULL_SCALE, "Sets the unit of the published samples; 'FS' is the full scale of the card.")
+    gain: float = param(
+        1.0, 'Sets the value of the full scale in the unit, by which the samples are multiplied; it is signed.'
+    )
+
+    def __post_init__(self) -> None:
+        if self.rate_hz % self.decimation:
+            raise InvalidParameter(
+                f"setting 'decimation' is {self.decimation}, and {self.rate_hz} Hz cannot be divided by it; choose a "
+                'factor that gives whole hertz'
+            )
+
+
+class SoundCard:
+    """Read a sound card. See `texture_core.types.Sensor`.
+
+    Samples come without a number: their order and the host's clock number them, and where PortAudio reports an
+    overflow, the clock tells how many are missing. They are filtered and decimated in blocks.
+
+    Parameters
+    ----------
+    params
+        `device` is a card's name or a part of it, or its number; '' is the default input. `config` means
+        `SoundCardSettings`.
+    now_ns
+        The host's clock.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        If the settings are wrong.
+    """
+
+    def __init__(self, params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> None:
+        self._params = params
+        self._now_ns = now_ns
+        self._settings = settings = load_settings(SoundCardSettings, params.config)
+        block_s = max(params.batch_s, BLOCK_FRAMES / settings.rate_hz)
+        self._numbering = ArrivalNumbering(float(settings.rate_hz), block_s=block_s)
+        self._decimator = Decimator(settings.decimation)
+        self._rate_hz = settings.rate_hz / settings.decimation
+        self._channels = tuple(f'channel_{number + 1}' for number in range(settings.channels))
+        self._capture: Capture | None = None
+        self._opened = self._samples = self._lost = self._overflows = 0
+        self._next_published: int | None = None  # none yet
+        self._silent_s = 0.0
+
+    def open(self) -> None:
+        """Open the card; DeviceError if it cannot be."""
+        self.close()
+        self._capture = Capture(self._params.device, self._settings.rate_hz, self._settings.channels, self._now_ns)
+        self._opened += 1
+        self._silent_s = 0.0
+        self._numbering.interrupt()
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        """Wait for the length of one batch and return what arrived.
+
+        Raises
+        ------
+        DeviceError
+            If the card is not open, or has delivered nothing for 1 s.
+        """
+        if self._capture is None:
+            raise DeviceError(f"sound card '{self._params.device}' is not open; open it before reading")
+        time.sleep(self._params.batch_s)
+        blocks = self._capture.take()
+        self._watch_silence(alive=bool(blocks))
+        batches = [batch for block in blocks for batch in self._place(block)]
+        return {SIGNAL: batches} if batches else {}
+
+    def close(self) -> None:
+        """Close the card."""
+        if self._capture is not None:
+            self._capture.close()
+            self._capture = None
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals: samples published and lost (at the lower rate), overflows of the card or of a busy host."""
+        return {
+            'samples': self._samples,
+            'lost': self._lost,
+            'overflows': self._overflows,
+            'reopened': max(0, self._opened - 1),
+            'clock_steps': self._numbering.clock.steps,
+        }
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """How much the card's clock is slow."""
+        return {SLOW_CLOCK: PPM * self._numbering.clock.drift}
+
+    @property
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Rate at which samples are published: that of the card, divided by the decimation."""
+        return {SIGNAL: self._rate_hz}
+
+    @property
+    def limits(self) -> Limits:
+        """Full scale of the card, but for the last step of 16 bits."""
+        full = abs(self._settings.gain) * (1 - 2.0**-15)
+        return {SIGNAL: (-full, full)}
+
+    def _place(self, block: AudioBlock) -> list[TactileSignal]:
+        """Number, filter and decimate a block; nothing while the clock is not settled."""
+        self._overflows += block.overflowed
+        missing = self._missing(block) if block.overflowed else 0
+        indices = self._numbering.place([(missing, len(block.samples))], block.end_ns)
+        if not indices:
+            return []
+        first, samples = self._decimator.feed(indices[0], block.samples)
+        if not len(samples):
+            return []
+        self._lost += 0 if self._next_published is None else first - self._next_published
+        self._next_published = first + len(samples)
+        self._samples += len(samples)
+        stamp_ns = self._numbering.clock.time_ns(first * self._settings.decimation)
+        return [
+            TactileSignal(
+                stamp_ns=stamp_ns,
+                sensor=SENSOR,
+                channels=self._channels,
+                units=(self._settings.unit,) * len(self._channels),
+                sampling_rate_hz=self._rate_hz,
+                first_sample=first,
+                samples=samples * self._settings.gain,
+                frame_id=self._params.frame_id,
+            )
+        ]
+
+    def _missing(self, block: AudioBlock) -> int:
+        """Return how many samples an overflow has cost: those by which the block is late."""
+        if not self._numbering.clock.settled:
+            return 0
+        due_ns = self._numbering.clock.time_ns(self._numbering.next_index + len(block.samples) - 1)
+        return max(0, round((block.end_ns - due_ns) / NANOSECONDS * self._settings.rate_hz))
+
+    def _watch_silence(self, *, alive: bool) -> None:
+        self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
+        if self._silent_s >= SILENCE_S:
+            raise DeviceError(
+                f"sound card '{self._params.device}' is open and delivers nothing; check its plug, and that no other "
+                'program has it open'
+            )

@@ -1,1 +1,0 @@
-"""A contact microphone or accelerometer on a sound card."""

@@ -1,0 +1,761 @@
+"""The host time and the running index of each sample, whatever the device tells of either."""
+
+from __future__ import annotations
+
+import copy
+import enum
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from texture_core.errors import DeviceError
+from texture_core.types import NANOSECONDS, Array
+
+# --------------------
+# How long samples of a device were on the way, against its own clock.
+
+
+@dataclass
+class DelayModel:
+    """Delay of the stream's clock against the host's: offset + drift · elapsed, and a residual that is slewed to 0."""
+
+    start_ns: float = 0.0
+    offset_ns: float = 0.0
+    drift: float = 0.0
+    residual_ns: float = 0.0  # at since_ns
+
+    def trend_ns(self, elapsed_ns: float) -> float:
+        """Return the linear part of the delay, without the residual."""
+        return self.offset_ns + self.drift * elapsed_ns
+
+    def delay_ns_at(self, elapsed_ns: float, slew_rate: float) -> float:
+        """Return the delay with the remaining residual, which shrinks by `slew_rate` per time."""
+        remaining = max(0.0, abs(self.residual_ns) - slew_rate * max(0.0, elapsed_ns - self.start_ns))
+        return self.trend_ns(elapsed_ns) + math.copysign(remaining, self.residual_ns)
+
+
+# --------------------
+# Host time of the samples of a stream, free of the jitter with which they arrive and of the drift of its clock.
+
+PPM = 1e6
+SLOW_CLOCK = 'device clock slow by [ppm]'  # name of the drift among the details of a sensor
+BINS = 64
+FIRST_BIN_NS = 20e6
+
+
+class Arrival(NamedTuple):
+    """When a sample was taken by its index and the nominal rate, and how much later than that it was there, ns."""
+
+    elapsed_ns: float
+    delay_ns: float
+
+
+class StreamClock:
+    """Tie the running index of a stream of constant rate to the host's clock.
+
+    A sample arrives late by a varying delay but never early, so the truth is a line just below all arrivals. Of each
+    bin of time the least late arrival is kept; the line is that edge of their lower convex hull which lies below their
+    middle, the one with the least mean distance to them. Its slope is the drift of the device's clock against the
+    host's. The answers bend towards that line and never jump, unless the host's clock did: stamps are contiguous and
+    in order. An arrival costs constant time on average, and the memory is constant.
+
+    Parameters
+    ----------
+    rate_hz
+        Nominal rate of the stream.
+    settle_s
+        How long arrivals are watched before the clock is `settled` and may be read.
+    memory_s
+        How long arrivals count; over this time the drift is taken as constant.
+    drift_after_s
+        How long arrivals are observed before a drift is estimated.
+    max_drift
+        Largest drift accepted; the internal oscillator of a microcontroller on USB is right to 0.25 %.
+    slew_rate
+        Largest correction per time.
+    step_s
+        A deviation above this is a step of the host's clock.
+
+    Source: the line below the hull, Moon, Skelly & Towsley 1999, "Estimation and removal of clock skew".
+    """
+
+    def __init__(
+        self,
+        rate_hz: float,
+        *,
+        settle_s: float = 0.1,
+        memory_s: float = 60.0,
+        drift_after_s: float = 2.0,
+        max_drift: float = 5e-3,
+        slew_rate: float = 0.02,
+        step_s: float = 0.5,
+    ) -> None:
+        self.steps = 0
+        self._period_ns = NANOSECONDS / rate_hz
+        self._settle_ns = settle_s * NANOSECONDS
+        self._memory_ns = memory_s * NANOSECONDS
+        self._drift_after_ns = drift_after_s * NANOSECONDS
+        self._max_drift = max_drift
+        self._slew_rate = slew_rate
+        self._step_ns = step_s * NANOSECONDS
+        self._drift = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the stream: another one begins, with another index and another delay. Its drift is still believed."""
+        self.settled = False
+        self._origin: tuple[int, int] | None = None  # index and host time of the first arrival
+        self._bins: deque[Arrival] = deque()  # the least late of each bin; the last bin is still open
+        self._width_ns = FIRST_BIN_NS
+        self._last_index = 0
+        self._late_since_ns: int | None = None
+        self._before = self._now = DelayModel(drift=self._drift)
+
+    def skip(self, samples: int) -> None:
+        """Take the samples of this stream for later ones by so many: their times stay, their indices do not."""
+        if self._origin is not None:
+            first_index, first_ns = self._origin
+            self._origin = first_index + samples, first_ns
+            self._last_index += samples
+
+    @property
+    def drift(self) -> float:
+        """How much longer than nominal a sample takes: 50e-6 is a device whose clock is slow by 50 ppm."""
+        return self._drift
+
+    def observe(self, index: int, arrival_ns: int) -> None:
+        """Take note that sample `index` was there at `arrival_ns`."""
+        if self._origin is None:
+            self._origin = (index, arrival_ns)
+        arrival = self._arrival(index, arrival_ns)
+        if self._has_stepped(index, arrival, arrival_ns):
+            self._follow_step((index, arrival_ns))
+            arrival = Arrival(0.0, 0.0)
+        self._last_index = index
+        self._store(arrival)
+        # By both clocks: what was kept back arrives in one burst, and tells nothing of when it was taken.
+        watched_ns = min(arrival.elapsed_ns, arrival_ns - self._origin[1])
+        self.settled = self.settled or watched_ns >= self._settle_ns
+
+    def time_ns(self, index: float) -> int:
+        """Return the host time of a sample."""
+        first_index, first_ns = self._origin or (0, 0)
+        elapsed_ns = (index - first_index) * self._period_ns
+        line = self._now if elapsed_ns >= self._now.start_ns else self._before
+        return first_ns + round(elapsed_ns + line.delay_ns_at(elapsed_ns, self._slew_rate))
+
+    def index_at(self, time_ns: int) -> float:
+        """Return the (fractional) index of the sample taken at a host time, now or to come."""
+        first_index, first_ns = self._origin or (0, 0)
+        reached_ns = float(time_ns - first_ns)
+        elapsed_ns = (reached_ns - self._now.offset_ns) / (1 + self._now.drift)
+        remaining_ns = self._now.delay_ns_at(elapsed_ns, self._slew_rate) - self._now.trend_ns(elapsed_ns)
+        return first_index + (elapsed_ns - remaining_ns) / self._period_ns
+
+    def _follow_step(self, origin: tuple[int, int]) -> None:
+        """Begin anew where the host's clock was set to another time."""
+        self.steps += 1
+        self.restart()
+        self._origin = origin
+        self.settled = True
+
+    def _arrival(self, index: int, arrival_ns: int) -> Arrival:
+        first_index, first_ns = self._origin or (index, arrival_ns)
+        elapsed_ns = (index - first_index) * self._period_ns
+        return Arrival(elapsed_ns, arrival_ns - first_ns - elapsed_ns)
+
+    def _has_stepped(self, index: int, arrival: Arrival, arrival_ns: int) -> bool:
+        """Return whether the stream or the host's clock cannot be the one of before."""
+        if not self._bins:
+            return False
+        # No sample arrives before it was taken: times that say so are those of a stream at another rate.
+        if self._now.delay_ns_at(arrival.elapsed_ns, self._slew_rate) - arrival.delay_ns > self._step_ns:
+            return True
+        late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
+        if late_ns <= self._step_ns:
+            self._late_since_ns = None
+            return index < self._last_index or late_ns < -self._step_ns
+        if self._late_since_ns is None:  # one late arrival is a busy host
+            self._late_since_ns = arrival_ns
+        return index < self._last_index or arrival_ns - self._late_since_ns > NANOSECONDS
+
+    def _store(self, arrival: Arrival) -> None:
+        late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
+        if not self._bins or late_ns < 0:
+            self._switch_to(arrival.elapsed_ns, self._now.offset_ns + late_ns)
+        if not self._bins:
+            self._bins.append(arrival)
+        elif arrival.elapsed_ns // self._width_ns == self._bins[-1].elapsed_ns // self._width_ns:
+            self._bins[-1] = min(self._bins[-1], arrival, key=self._excess_delay_ns)
+        else:
+            self._fit(arrival.elapsed_ns)
+            self._bins.append(arrival)
+            self._prune(arrival.elapsed_ns)
+
+    def _excess_delay_ns(self, arrival: Arrival) -> float:
+        return arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
+
+    def _prune(self, elapsed_ns: float) -> None:
+        """Drop what is too old, but keep one from before a long gap; make the bins wider when there are too many."""
+        while len(self._bins) > 2 and elapsed_ns - self._bins[1].elapsed_ns > self._memory_ns:
+            self._bins.popleft()
+        if len(self._bins) <= BINS:
+            return
+        self._width_ns *= 2
+        wider: dict[float, Arrival] = {}
+        for arrival in self._bins:
+            number = arrival.elapsed_ns // self._width_ns
+            wider[number] = min(wider.get(number, arrival), arrival, key=self._excess_delay_ns)
+        self._bins = deque(wider.values())
+
+    def _fit(self, elapsed_ns: float) -> None:
+        """Lay the line again below the closed bins."""
+        if self._bins[-1].elapsed_ns - self._bins[0].elapsed_ns >= self._drift_after_ns:
+            slope = supporting_slope(self._bins)
+            self._drift = min(max(slope, -self._max_drift), self._max_drift)
+        offset_ns = min(arrival.delay_ns - self._drift * arrival.elapsed_ns for arrival in self._bins)
+        self._switch_to(elapsed_ns, offset_ns)
+
+    def _switch_to(self, elapsed_ns: float, offset_ns: float) -> None:
+        """Go over to another line from `elapsed_ns` on, without a jump once the clock has been read."""
+        line = DelayModel(elapsed_ns, offset_ns, self._drift)
+        if self.settled:
+            line.residual_ns = self._now.delay_ns_at(elapsed_ns, self._slew_rate) - line.trend_ns(elapsed_ns)
+            if elapsed_ns > self._now.start_ns:
+                self._before = self._now
+        else:
+            self._before = line
+        self._now = line
+
+
+def supporting_slope(points: Sequence[Arrival]) -> float:
+    """Return the slope of that edge of the lower convex hull which lies below the mean of the points.
+
+    Parameters
+    ----------
+    points
+        At least two, of rising elapsed time.
+    """
+    middle = sum(point.elapsed_ns for point in points) / len(points)
+    hull: list[Arrival] = []
+    for point in points:
+        while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
+            hull.pop()
+        hull.append(point)
+    right = next(i for i in range(1, len(hull)) if hull[i].elapsed_ns >= middle)
+    return _slope(hull[right - 1], hull[right])
+
+
+def _slope(remaining: Arrival, right: Arrival) -> float:
+    return (right.delay_ns - remaining.delay_ns) / (right.elapsed_ns - remaining.elapsed_ns)
+
+
+# --------------------
+# Give every sample its running index, so that a jump of the index is exactly what was lost.
+
+SHORT_COUNTER = 1 << 16
+
+
+class StampStatus(enum.Enum):
+    """Status of a stamp, assessed with its neighbours."""
+
+    GOOD = enum.auto()
+    DAMAGED = enum.auto()
+    RESTARTED = enum.auto()  # the device counts from another start value
+    PENDING = enum.auto()  # odd, and the next stamp is not known yet
+
+
+class SampleCounter:
+    """Count samples through the device's own stamps, one tick a sample.
+
+    A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
+    not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
+    trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
+
+    Parameters
+    ----------
+    longest_gap
+        A jump above this, or backwards, that the next stamp confirms is no loss: the device restarted.
+    """
+
+    def __init__(self, longest_gap: int = 2000) -> None:
+        self.next_index = 0
+        self.lost = 0
+        self.damaged_stamps = 0
+        self._longest_gap = longest_gap
+        self._last: int | None = None
+        self._early = 0
+
+    def interrupt(self) -> None:
+        """Number on, whatever the next stamp is."""
+        self._last = None
+        self._early = 0
+
+    def skip(self, samples: int) -> None:
+        """Number on behind samples that are known to be lost."""
+        self.lost += samples
+        self.next_index += samples
+
+    def place(self, stamps: Sequence[int | None]) -> tuple[list[int], bool]:
+        """Return the index of each stamp's sample as far as decided, and whether the device restarted after those.
+
+        Parameters
+        ----------
+        stamps : (n_samples,)
+            Ticks of the device, of 64 bits or wrapping at 16; None for a sample without.
+        """
+        indices: list[int] = []
+        for position, stamp in enumerate(stamps):
+            status = self._classify(stamp, stamps[position + 1 : position + 2])
+            if status in (StampStatus.RESTARTED, StampStatus.PENDING):
+                return indices, status is StampStatus.RESTARTED
+            self.damaged_stamps += status is StampStatus.DAMAGED
+            indices.append(self._take(stamp if status is StampStatus.GOOD else None))
+        return indices, False
+
+    def _classify(self, stamp: int | None, following: Sequence[int | None]) -> StampStatus:
+        step = _ticks(self._last, stamp)
+        if step in (0, 1):
+            return StampStatus.GOOD
+        if not following:
+            return StampStatus.PENDING
+        onward = _ticks(stamp, following[0])
+        if 1 < step <= self._longest_gap:
+            return StampStatus.GOOD if 1 <= onward <= self._longest_gap else StampStatus.DAMAGED
+        return StampStatus.RESTARTED if onward == 1 else StampStatus.DAMAGED
+
+    def _take(self, stamp: int | None) -> int:
+        """Return the index of the next sample; without a stamp it follows directly."""
+        step = _ticks(self._last, stamp)
+        if step == 0:
+            self._early = 1
+        skipped = max(0, step - 1)
+        compensated = min(self._early, skipped)
+        self._early -= compensated
+        self.lost += skipped - compensated
+        index = self.next_index + skipped - compensated
+        self.next_index = index + 1
+        self._last = stamp if stamp is not None or self._last is None else self._last + 1
+        return index
+
+
+def _ticks(last: int | None, stamp: int | None) -> int:
+    """Return how many ticks a stamp lies after another, 1 if either is unknown."""
+    if last is None or stamp is None:
+        return 1
+    ticks = stamp - last
+    wrapped = last < SHORT_COUNTER and ticks < -SHORT_COUNTER // 2
+    return ticks + SHORT_COUNTER if wrapped else ticks
+
+
+# --------------------
+# Give packets that carry their number its running index.
+
+
+class PacketNumbering:
+    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
+
+    Parameters
+    ----------
+    rate_hz
+        Nominal rate of the packets.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self.lost = 0
+        self._rate_hz = rate_hz
+        self._next_index = 0
+        self._next_ns: int | None = None  # when the next packet should start
+        self._next_number: int | None = None  # none after an interruption
+
+    def interrupt(self) -> None:
+        """Forget the device's numbers: they begin again."""
+        self._next_number = None
+
+    def place(self, number: int, count: int, start_ns: int) -> int:
+        """Return the index of the first of `count` packets that follow each other.
+
+        Parameters
+        ----------
+        number
+            The device's number of the first packet.
+        count
+            How many packets there are.
+        start_ns
+            When the first one began.
+
+        Returns
+        -------
+        int
+            Index of the first of them, from 0 on.
+        """
+        skipped = 0
+        if self._next_number is not None:
+            skipped = number - self._next_number
+        elif self._next_ns is not None:
+            skipped = max(0, round((start_ns - self._next_ns) / NANOSECONDS * self._rate_hz))
+        self.lost += skipped
+        index = self._next_index + skipped
+        self._next_index = index + count
+        self._next_number = number + count
+        self._next_ns = start_ns + round(count / self._rate_hz * NANOSECONDS)
+        return index
+
+
+# --------------------
+# Give blocks of samples their running index, so that a jump of the index is exactly what was lost.
+
+RATE_CHECK_S = 1.0
+MAX_FAILED_CHECKS = 3  # so many in a row are no hiccup
+RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
+
+
+class BlockCounter:
+    """Count samples by the device's time of each block, cross-checked with the numbers of the frames they came in.
+
+    The time says how many samples are missing, whoever lost them: frames lost on the line show in their numbers too,
+    what is missing beyond them was left out by the device itself and counts as `overrun`.
+
+    Parameters
+    ----------
+    rate_hz
+        Nominal rate, by the device's clock.
+    name
+        What the samples are of, for the error sentence.
+    """
+
+    def __init__(self, rate_hz: float, name: str) -> None:
+        self.next_index = 0
+        self.overrun = 0  # samples that the device itself left out
+        self._rate_hz = rate_hz
+        self._name = name
+        self._next_us: float | None = None
+        self._restart_check()
+
+    @property
+    def next_us(self) -> float | None:
+        """When the next sample is due by the device's clock; None before the first block."""
+        return self._next_us
+
+    def resume(self, missing: int) -> None:
+        """Go on after an interruption with another time; `missing` samples are lost."""
+        self.next_index += missing
+        self._next_us = None
+        self._restart_check()
+
+    def place(self, time_us: int, rows: int, lost_frames: int) -> int:
+        """Return the index of a block's first sample.
+
+        Parameters
+        ----------
+        time_us
+            Device's time of the first sample, unwrapped.
+        rows
+            Samples in the block.
+        lost_frames
+            Frames of this stream missing just before it.
+
+        Returns
+        -------
+        int
+            Running index, from 0.
+
+        Raises
+        ------
+        DeviceError
+            If device and settings do not mean the same rate.
+        """
+        skipped = 0
+        if self._next_us is not None:
+            skipped = max(0, round((time_us - self._next_us) * self._rate_hz / 1e6))
+        self.overrun += max(0, skipped - lost_frames * rows)
+        self._check_rate(time_us, rows, lost_frames)
+        index = self.next_index + skipped
+        self.next_index = index + rows
+        self._next_us = time_us + rows * 1e6 / self._rate_hz
+        return index
+
+    def _restart_check(self) -> None:
+        self._since_us: int | None = None
+        self._rows = 0
+        self._failed_checks = 0
+
+    def _check_rate(self, time_us: int, rows: int, lost_frames: int) -> None:
+        """Compare rows with time over stretches in which no frame was lost."""
+        if lost_frames or self._since_us is None:
+            self._since_us, self._rows = time_us, rows
+            return
+        elapsed_s = (time_us - self._since_us) / 1e6
+        if elapsed_s >= RATE_CHECK_S:
+            self._check_rate_deviation(self._rows / elapsed_s)
+            self._since_us, self._rows = time_us, 0
+        self._rows += rows
+
+    def _check_rate_deviation(self, rate_hz: float) -> None:
+        off = abs(rate_hz / self._rate_hz - 1) > RATE_TOLERANCE
+        self._failed_checks = self._failed_checks + 1 if off else 0
+        if self._failed_checks == MAX_FAILED_CHECKS:
+            raise DeviceError(
+                f"'{self._name}' delivers {rate_hz:.4g} samples in a second of the device's clock, and "
+                f'{self._rate_hz:.4g} are set; correct the rate in the settings, or lighten the load of the device'
+            )
+
+
+# --------------------
+# Losses in a stream that neither stamps nor counts its samples, known by how late they arrive.
+
+
+class UnseenLoss:
+    """Tell how many samples of a stream of constant rate were lost.
+
+    Whatever comes after a lost sample seems late by its time, and stays so. A busy host makes some arrivals late, but
+    not all of half a second: what was kept back arrives in one burst, whose last sample is in time. So what the least
+    late arrival of the end of such a stretch is late by has been lost.
+
+    Parameters
+    ----------
+    rate_hz
+        Nominal rate of the stream.
+    window_s
+        All arrivals must have been late for so long.
+    min_duration_s
+        Lateness below this is none; it is also what may be lost without being noticed.
+    """
+
+    def __init__(self, rate_hz: float, *, window_s: float = 0.5, min_duration_s: float = 0.01) -> None:
+        self._rate_hz = rate_hz
+        self._window_ns = window_s * NANOSECONDS
+        self._end_ns = 0.2 * self._window_ns
+        self._min_duration_ns = min_duration_s * NANOSECONDS
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what was late."""
+        self._since_ns: int | None = None
+        self._newest: deque[tuple[int, int]] = deque()  # arrival, lateness
+
+    def lost(self, late_ns: int, arrival_ns: int) -> int:
+        """Return how many samples are known to be lost now that one has arrived.
+
+        Parameters
+        ----------
+        late_ns
+            How much later than expected it was there.
+        arrival_ns
+            When.
+        """
+        if late_ns <= self._min_duration_ns:
+            self.restart()
+            return 0
+        if self._since_ns is None:
+            self._since_ns = arrival_ns
+        self._newest.append((arrival_ns, late_ns))
+        while arrival_ns - self._newest[0][0] > self._end_ns:
+            self._newest.popleft()
+        if arrival_ns - self._since_ns < self._window_ns:
+            return 0
+        least_late_ns = min(late for _, late in self._newest)
+        self.restart()
+        return round(least_late_ns / NANOSECONDS * self._rate_hz)
+
+
+# --------------------
+# Number and time the samples of a stream that neither counts nor stamps them, by when they arrive.
+
+BLOCKS_LATE = 1.5  # a block may come so late by the pace at which it is read, and nothing is lost
+
+
+class ArrivalNumbering:
+    """Give blocks of samples their running index: a jump is what was lost.
+
+    Losses that the protocol shows are given by the caller. Others are known half a second later, by all samples being
+    late from then on (see `UnseenLoss`); over an interruption the host's clock shows how much is missing.
+
+    Parameters
+    ----------
+    rate_hz
+        Rate of the stream.
+    block_s
+        How often arrivals are observed; what is late by less than 1.5 of it, and by less than 1.5 samples, is no loss.
+    max_drift
+        By what share the device's clock may be wrong.
+    """
+
+    def __init__(self, rate_hz: float, *, block_s: float, max_drift: float = 5e-3) -> None:
+        self.clock = StreamClock(rate_hz, max_drift=max_drift)
+        self.next_index = 0
+        self._losses = UnseenLoss(rate_hz, min_duration_s=BLOCKS_LATE * max(block_s, 1 / rate_hz))
+        self._interrupted = False
+        self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
+
+    def interrupt(self) -> None:
+        """Forget what belongs to the stream so far: another one begins."""
+        self._interrupted = True
+
+    def place(self, blocks: Sequence[tuple[int, int]], arrival_ns: int) -> list[int]:
+        """Return the index of the first sample of each block.
+
+        Parameters
+        ----------
+        blocks
+            Of each block that has just arrived: samples missing before it, and samples in it; at least one block.
+        arrival_ns
+            When they were there.
+
+        Returns
+        -------
+        list of int
+            Empty while the clock is not settled: then no time is known.
+        """
+        if self._interrupted:
+            self._resume()
+        indices = []
+        for missing, samples in blocks:
+            indices.append(self.next_index + missing)
+            self.next_index += missing + samples
+        unseen = self._unseen(self.next_index - 1, arrival_ns)
+        self.clock.observe(self.next_index - 1 + unseen, arrival_ns)
+        skipped = unseen + self._skipped(self.next_index - 1 + unseen)
+        self.next_index += skipped
+        return [index + skipped for index in indices] if self.clock.settled else []
+
+    def _resume(self) -> None:
+        """Number on after an interruption, and keep the clock of before for telling what was lost in it."""
+        self._interrupted = False
+        if self.clock.settled:
+            self._clock_before = copy.copy(self.clock)
+        self.clock.restart()
+        self._losses.restart()
+
+    def _unseen(self, index: int, arrival_ns: int) -> int:
+        """Return how many samples must have been lost before those that have just arrived."""
+        if not self.clock.settled or self._clock_before is not None:
+            return 0
+        return self._losses.lost(arrival_ns - self.clock.time_ns(index), arrival_ns)
+
+    def _skipped(self, index: int) -> int:
+        """Return how many samples an interruption has cost that is over now; known once the clock is settled again."""
+        if self._clock_before is None or not self.clock.settled:
+            return 0
+        skipped = max(0, round(self._clock_before.index_at(self.clock.time_ns(index))) - index)
+        self._clock_before = None
+        self.clock.skip(skipped)
+        return skipped
+
+
+# --------------------
+# Measure the rate of a stream that does not tell it, by when its samples arrive.
+
+MEASURED_S = 2.0  # with arrivals seen each 10 ms, the error of a rate of 100 Hz is some 0.1 Hz
+LEAST_ARRIVALS = 20
+
+
+class RateMeter:
+    """Count samples until their rate is certain.
+
+    A sample arrives late by a varying delay but never early, so the period is the slope of the line just below all
+    arrivals (see `clock.StreamClock`).
+    """
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what has arrived."""
+        self._samples = 0
+        self._arrivals: list[Arrival] = []  # samples so far, and when the last of them was there
+
+    def update(self, samples: int, arrival_ns: int) -> float:
+        """Take note of samples that have just arrived; return the rate, Hz, or 0.0 while it is not certain."""
+        self._samples += samples
+        self._arrivals.append(Arrival(float(self._samples), float(arrival_ns - self._first_ns(arrival_ns))))
+        elapsed_ns = self._arrivals[-1].delay_ns
+        if elapsed_ns < MEASURED_S * NANOSECONDS or len(self._arrivals) < LEAST_ARRIVALS:
+            return 0.0
+        return NANOSECONDS / supporting_slope(self._arrivals)
+
+    def _first_ns(self, arrival_ns: int) -> int:
+        if not self._arrivals:
+            self._start_ns = arrival_ns
+        return self._start_ns
+
+
+# --------------------
+# Lower the rate of a stream by a whole factor, without folding what lies above the new band into it.
+
+HALF_WIDTH = 12  # of the filter, in samples of the lower rate
+CUTOFF = 0.42  # of the lower rate: half of the amplitude is left there
+KAISER_BETA = 6.0  # up to 0.34 of the lower rate all passes, from 0.5 on everything is damped by 60 dB
+
+
+class Decimator:
+    """Filter blocks of samples that follow each other, and keep every `factor`-th sample.
+
+    Output `k` is the filtered value at input `k · factor`: the filter is symmetric, so nothing is delayed. An output
+    needs the inputs of 12 output periods around it, so those around a gap are left out.
+
+    Parameters
+    ----------
+    factor
+        1 passes everything through.
+    """
+
+    def __init__(self, factor: int) -> None:
+        self._factor = factor
+        self._taps = taps(factor)
+        self._half = len(self._taps) // 2
+        self._begin = self._next = 0  # index of the first sample in the buffer, and of the one after it
+        self._buffer: NDArray[np.float32] | None = None
+
+    def feed(self, first: int, samples: NDArray[np.float32]) -> tuple[int, NDArray[np.float32]]:
+        """Return the outputs that have become possible, and the index of the first of them.
+
+        Parameters
+        ----------
+        first
+            Index of the first sample; a jump is a gap.
+        samples : (n_samples, n_channels)
+            The next ones.
+
+        Returns
+        -------
+        int
+            Index of the first output, at the lower rate.
+        (n_outputs, n_channels)
+            May be empty.
+        """
+        if self._buffer is None or first != self._next:
+            self._buffer, self._begin = samples[:0], first
+        buffer = np.concatenate([self._buffer, samples])
+        self._next = first + len(samples)
+        output = math.ceil((self._begin + self._half) / self._factor)
+        start = output * self._factor - self._half - self._begin
+        if len(buffer) < start + len(self._taps):
+            self._buffer = buffer
+            return output, samples[:0]
+        windows = sliding_window_view(buffer[start:], len(self._taps), axis=0)[:: self._factor]
+        used = start + len(windows) * self._factor
+        self._buffer, self._begin = buffer[used:], self._begin + used
+        return output, (windows @ self._taps).astype(np.float32)
+
+
+def taps(factor: int) -> Array:
+    """Return the coefficients of the low-pass before lowering a rate by `factor`: a sinc in a Kaiser window.
+
+    Returns
+    -------
+    (2 · 12 · factor + 1,)
+        Symmetric, with the sum 1; only [1] for a factor of 1.
+    """
+    if factor == 1:
+        return np.ones(1)
+    half = HALF_WIDTH * factor
+    places = np.arange(-half, half + 1)
+    sinc = np.sinc(2 * CUTOFF * places / factor) * np.kaiser(len(places), KAISER_BETA)
+    return np.asarray(sinc / sinc.sum())

@@ -1,0 +1,1093 @@
+"""Robotiq TSF-85 fingertip: protocol, sample frames, settings, recordings and messages of the vendor, the sensor."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import math
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from struct import Struct
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import open_regular, param
+from texture_core.errors import DeviceError, InvalidData, InvalidParameter
+from texture_core.types import NANOSECONDS, AnyArray, Array, TactileSignal
+from texture_drivers import serial_line
+from texture_drivers.health import Limits
+from texture_drivers.sensor import SensorParams, load_settings
+from texture_drivers.serial_line import SerialPort
+from texture_drivers.timing import SampleCounter, StreamClock, UnseenLoss
+
+# --------------------
+# Numbers of the TSF-85's protocol and streams.
+#
+# Sources: robotiq/tactile_sensors @8cb0219 (`sdk_cpp/RobotiqTactileSensor.cpp`, `sensor_quickstart/protocol.py`) and
+# robotiq/ros @18335fa (`robotiq_tsf/src/PollData.cpp`). Both agree.
+
+START_BYTE = 0x9A
+HEADER_BYTES = 4  # start, checksum (sent as 0, checked by nobody), command, payload length
+MAX_PACKET_BYTES = HEADER_BYTES + 255
+
+READ_SENSORS = 0x61
+AUTOSEND = 0x58
+AUTOSEND_ASYNC = 0x59  # firmware >= 1.1.7
+DATA_COMMANDS = frozenset({READ_SENSORS, AUTOSEND, AUTOSEND_ASYNC})
+
+# An item byte: type in the high nibble, finger in bits 3..2, index (0 in practice) in bits 1..0.
+TYPE_MASK, FINGER_MASK, FINGER_SHIFT, INDEX_MASK = 0xF0, 0x0C, 2, 0x03
+FINGERS = 2
+STATIC, DYNAMIC, ACCELEROMETER, GYROSCOPE, MAGNETOMETER, TEMPERATURE, TIMESTAMP = range(0x10, 0x80, 0x10)
+ITEMS: Mapping[int, Struct] = {
+    DYNAMIC: Struct('>h'),
+    ACCELEROMETER: Struct('>3h'),
+    GYROSCOPE: Struct('>3h'),
+    MAGNETOMETER: Struct('>3h'),
+    TEMPERATURE: Struct('>h'),
+}
+# Firmware up to 1.0.6 sends 16 bits, from 1.1.7 on 64 bits; the packet does not say which. The short one is tried
+# first: it never fits a long stamp, whose third byte, taken as the next item, is 0 and no type (until the year 34).
+TIMESTAMPS = (Struct('>H'), Struct('>Q'))
+
+RATE_HZ = 1000.0  # of the dynamic channel; the device's stamps are milliseconds
+DYNAMIC_SENSOR, STATIC_SENSOR, MOTION_SENSOR = 'tsf85/dynamic', 'tsf85/static', 'tsf85/imu'
+DYNAMIC_CHANNELS = ('dynamic',)
+UNIT = 'count'
+LIMITS = {'signal': (-(2**15), 2**15 - 1), 'signal_static': (0, 2**16 - 1)}  # what the counts can be, by topic
+
+
+@dataclass(frozen=True)
+class Tsf85Layout:
+    """The taxels of one kind of fingertip, row by row."""
+
+    rows: int
+    columns: int
+    static_rate_hz: float
+
+    @cached_property
+    def static_channels(self) -> tuple[str, ...]:
+        """Name of each taxel."""
+        return tuple(f'taxel_{row}_{column}' for row in range(self.rows) for column in range(self.columns))
+
+    @cached_property
+    def items(self) -> Mapping[int, Struct]:
+        """What follows each item byte, but for the stamp's."""
+        return {STATIC: Struct(f'>{self.rows * self.columns}H'), **ITEMS}
+
+
+LAYOUTS: Mapping[str, Tsf85Layout] = {
+    'tsf85': Tsf85Layout(7, 4, 60.0),  # 60 Hz: Robotiq README 2026; 59 Hz in paper 2, about 25 Hz with some firmware
+    # The prototype of Roberge et al. ("3x4 taxels per phalanges ... about 25 Hz"). No public driver shows its packets:
+    # those of the TSF-85 are taken, with 12 taxels.
+    'tsf85_3x4': Tsf85Layout(3, 4, 25.0),
+}
+TSF85 = LAYOUTS['tsf85']
+STATIC_ROWS, STATIC_COLUMNS, STATIC_RATE_HZ = TSF85.rows, TSF85.columns, TSF85.static_rate_hz
+STATIC_CHANNELS = TSF85.static_channels
+
+USB_IDS = ((0x16D0, 0x14CC), (0x04B4, 0xF232))  # the present one; an older one, Cypress' default
+
+
+# --------------------
+# The TSF-85's protocol: bytes to packets, commands to bytes. Knows no port and no clock.
+
+
+class Item(NamedTuple):
+    """One measurement in a packet: its type, its finger and its numbers."""
+
+    kind: int
+    finger: int
+    values: tuple[int, ...]
+
+
+class Packet(NamedTuple):
+    """What the device sent at once."""
+
+    command: int
+    items: tuple[Item, ...]
+
+
+class Tsf85Parser:
+    """Turn a byte stream into packets, whatever is lost or added on the way.
+
+    The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item
+    types, index bits 0, a finger that exists, no item twice (a flipped type or finger would make a sample that never
+    was), items that end exactly with the payload, and a start byte after it as far as one has come. A flipped value
+    byte inside such a packet cannot be seen.
+
+    Parameters
+    ----------
+    layout
+        Kind of fingertip.
+    """
+
+    def __init__(self, layout: Tsf85Layout = TSF85) -> None:
+        self.packets = 0
+        self.refused = 0  # start bytes that led to no packet
+        self.refused_bytes = 0
+        self._items = layout.items
+        self._buffer = b''
+
+    def feed(self, data: bytes) -> list[Packet]:
+        """Return the packets completed by `data`; what is refused is counted. Keeps fewer than 260 bytes."""
+        buffer = self._buffer + data
+        packets: list[Packet] = []
+        position = 0
+        while True:
+            start = buffer.find(START_BYTE, position)
+            if start < 0:
+                self.refused_bytes += len(buffer) - position
+                position = len(buffer)
+                break
+            self.refused_bytes += start - position
+            position = start
+            if not _is_decidable(buffer, start):
+                break
+            packet = _packet_at(buffer, start, self._items)
+            if packet is None:
+                self.refused += 1
+                self.refused_bytes += 1
+                position += 1
+            else:
+                packets.append(packet)
+                position = _end(buffer, start)
+        self._buffer = buffer[position:]
+        self.packets += len(packets)
+        return packets
+
+
+def _end(buffer: bytes, start: int) -> int:
+    return start + HEADER_BYTES + buffer[start + 3]
+
+
+def _is_decidable(buffer: bytes, start: int) -> bool:
+    """Return whether the packet has come completely, or enough of it to be refused."""
+    if len(buffer) < start + HEADER_BYTES:
+        return False
+    end = _end(buffer, start)
+    if buffer[start + 2] not in DATA_COMMANDS or end < len(buffer):
+        return True
+    # A packet that lost a byte borrows the next start byte as its last: wait for what follows.
+    return end == len(buffer) and buffer[end - 1] != START_BYTE
+
+
+def _packet_at(buffer: bytes, start: int, layouts: Mapping[int, Struct]) -> Packet | None:
+    command, end = buffer[start + 2], _end(buffer, start)
+    if command not in DATA_COMMANDS or (end < len(buffer) and buffer[end] != START_BYTE):
+        return None
+    payload = buffer[start + HEADER_BYTES : end]
+    for timestamp in TIMESTAMPS:
+        items = _parse_items(payload, timestamp, layouts)
+        if items:
+            return Packet(command, items)
+    return None
+
+
+def _parse_items(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct]) -> tuple[Item, ...] | None:
+    """Return the items of a payload, or None if they do not fit it exactly."""
+    items = []
+    item_bytes: set[int] = set()
+    position = 0
+    while position < len(payload):
+        item_byte = payload[position]
+        kind, finger = item_byte & TYPE_MASK, (item_byte & FINGER_MASK) >> FINGER_SHIFT
+        layout = timestamp if kind == TIMESTAMP else layouts.get(kind)
+        if layout is None or item_byte & INDEX_MASK or finger >= FINGERS or item_byte in item_bytes:
+            return None
+        if position + 1 + layout.size > len(payload):
+            return None
+        item_bytes.add(item_byte)
+        items.append(Item(kind, finger, layout.unpack_from(payload, position + 1)))
+        position += 1 + layout.size
+    return tuple(items)
+
+
+def start_command(period_ms: int = 1) -> bytes:
+    """Return the command that makes the device send every `period_ms`, 1 to 255.
+
+    Raises
+    ------
+    ValueError
+        If the period is outside 1 to 255 ms.
+    """
+    if not 1 <= period_ms <= 255:
+        raise ValueError(f'the period is {period_ms} ms; 1 to 255 can be sent')
+    return _command(AUTOSEND, bytes([period_ms]))
+
+
+def stop_command() -> bytes:
+    """Return the command that ends the stream."""
+    return _command(AUTOSEND, b'\x00')
+
+
+def _command(command: int, payload: bytes) -> bytes:
+    return bytes([START_BYTE, 0, command, len(payload)]) + payload
+
+
+# --------------------
+# Sample frames of one finger, one a millisecond, from packets that may hold any of its measurements.
+
+MOTION_HOLD = 10  # sets; firmware that sends what is new may be a set late with it, not more
+UNKNOWN = (float('nan'),) * 3
+
+
+class SampleFrame(NamedTuple):
+    """One millisecond of one finger: the dynamic value, the taxel image if one came with it, the inertial values."""
+
+    stamp_ms: int | None
+    dynamic: int
+    image: tuple[int, ...] | None = None
+    motion: tuple[float, ...] = ()
+
+
+class SampleFrameSplitter:
+    """Turn packets into the sample frames of one finger: a dynamic item starts a frame, what came before it joins it.
+
+    Parameters
+    ----------
+    finger
+        Index of the finger, 0 or 1.
+    motion_kinds
+        Kinds of inertial items that are wanted, in order.
+    """
+
+    def __init__(self, finger: int, motion_kinds: Sequence[int] = ()) -> None:
+        self._finger = finger
+        self._image: tuple[int, ...] | None = None
+        self._motion: dict[int, tuple[float, ...]] = dict.fromkeys(motion_kinds, UNKNOWN)
+        self._ages = dict.fromkeys(motion_kinds, 0)
+
+    def frames(self, packets: Sequence[Packet]) -> list[SampleFrame]:
+        """Return the sets in a row of packets."""
+        found: list[SampleFrame] = []
+        for packet in packets:
+            stamp, dynamic = self._numbers(packet)
+            for value in dynamic:
+                found.append(SampleFrame(stamp, value, self._image, self._newest_motion()))
+                self._image = None
+        return found
+
+    def _numbers(self, packet: Packet) -> tuple[int | None, list[int]]:
+        """Return the stamp and the dynamic values of a packet; the rest is kept for the next set."""
+        stamp, dynamic = None, []
+        for kind, finger, values in packet.items:
+            if kind == TIMESTAMP:
+                stamp = values[0] if stamp is None or finger == self._finger else stamp
+            elif finger != self._finger:
+                continue
+            elif kind == DYNAMIC:
+                dynamic.append(values[0])
+            elif kind == STATIC:
+                self._image = values
+            elif kind in self._motion:
+                self._motion[kind], self._ages[kind] = values, 0
+        return stamp, dynamic
+
+    def _newest_motion(self) -> tuple[float, ...]:
+        """Return the newest inertial values, NaN for those that have not come for long."""
+        values: tuple[float, ...] = ()
+        for kind, newest in self._motion.items():
+            values += newest if self._ages[kind] < MOTION_HOLD else UNKNOWN
+            self._ages[kind] += 1
+        return values
+
+
+# --------------------
+# Settings of the TSF-85 beside those of every sensor: its inertial sensors.
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+TESLA_PER_UT = 1e-6
+SETTINGS_AXES = 'xyz'
+
+
+@dataclass(frozen=True)
+class Tsf85Settings:
+    """Whether and how the inertial sensors of the finger are published, as topic 'imu'."""
+
+    imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'imu'.")
+    magnetometer: bool = param(False, 'Publishes the magnetic field too, which only few firmware versions send.')
+    # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
+    acceleration_count_g: float = param(
+        16384.0,
+        'Sets the accelerometer counts of one g; a larger value gives smaller accelerations.',
+        unit='1/g',
+        low=1.0,
+        high=1e6,
+    )
+    rotation_count_dps: float = param(
+        131.072,
+        'Sets the gyroscope counts of one degree per second; a larger value gives smaller angular rates.',
+        unit='s/deg',
+        low=1e-3,
+        high=1e6,
+    )
+    # Data sheet of the ICM-20948: 0.15 microtesla a count.
+    field_count_ut: float = param(
+        1 / 0.15,
+        'Sets the magnetometer counts of one microtesla; a larger value gives smaller fields.',
+        unit='1/µT',
+        low=1e-3,
+        high=1e6,
+    )
+
+    @property
+    def kinds(self) -> tuple[int, ...]:
+        """Kinds of items that are published, three numbers each."""
+        wanted = {ACCELEROMETER: self.imu, GYROSCOPE: self.imu, MAGNETOMETER: self.magnetometer}
+        return tuple(kind for kind, is_wanted in wanted.items() if is_wanted)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Name of each column."""
+        return tuple(f'{QUANTITIES[kind][0]}_{axis}' for kind in self.kinds for axis in SETTINGS_AXES)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each column."""
+        return tuple(QUANTITIES[kind][1] for kind in self.kinds for _ in SETTINGS_AXES)
+
+    @property
+    def gains(self) -> Array:
+        """Unit per count of each column, (n_columns,)."""
+        gains = {
+            ACCELEROMETER: STANDARD_GRAVITY_M_S2 / self.acceleration_count_g,
+            GYROSCOPE: math.radians(1.0) / self.rotation_count_dps,
+            MAGNETOMETER: TESLA_PER_UT / self.field_count_ut,
+        }
+        return np.repeat([gains[kind] for kind in self.kinds], len(SETTINGS_AXES))
+
+
+QUANTITIES = {
+    ACCELEROMETER: ('acceleration', 'm/s²'),
+    GYROSCOPE: ('rotation', 'rad/s'),
+    MAGNETOMETER: ('field', 'T'),
+}
+
+
+# --------------------
+# Cut the samples of a finger into batches of signals.
+
+IMAGE_HOLD_S = 0.25  # an image older than this is no measurement of now
+SIGNAL, BATCH_STATIC, IMU = 'signal', 'signal_static', 'imu'
+
+
+class BatchCutter:
+    """Batch numbered sample frames: a new batch wherever the index jumps, and taxel images at a constant rate."""
+
+    def __init__(
+        self,
+        layout: Tsf85Layout,
+        settings: Tsf85Settings,
+        static_rate_hz: float,
+        frame_id: str,
+        clock: StreamClock,
+    ) -> None:
+        self.samples = 0
+        self.lost = 0
+        self.images = 0
+        self.repeated_images = 0  # published although no other image had come since the tick before
+        self.static_rate_hz = static_rate_hz
+        self._layout = layout
+        self._frame_id = frame_id
+        self._clock = clock
+        self._motion_channels, self._motion_units = settings.channels, settings.units
+        self._motion_gains: Array = settings.gains
+        self._next_index: int | None = None  # none published yet
+        self._image: tuple[int, ...] | None = None
+        self._image_index = 0
+        self._last_published: tuple[int, ...] | None = None
+        self._tick = 0
+        self._frames_per_tick = RATE_HZ / static_rate_hz
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether the inertial sensors are published."""
+        return bool(self._motion_channels)
+
+    def cut(self, indices: Sequence[int], frames: Sequence[SampleFrame]) -> Mapping[str, list[TactileSignal]]:
+        """Return the batches by topic; nothing while the clock is not settled."""
+        if not self._clock.settled:
+            return {}
+        batches: dict[str, list[TactileSignal]] = {SIGNAL: [], BATCH_STATIC: [], IMU: []}
+        for first, members in _runs(indices, frames):
+            if first != self._next_index:
+                self._jump(first)
+            self._next_index = first + len(members)
+            self.samples += len(members)
+            batches[SIGNAL].append(self._dynamic(first, members))
+            batches[BATCH_STATIC].extend(self._images(first, members))
+            batches[IMU].extend(self._motion(first, members))
+        return batches
+
+    def _jump(self, first: int) -> None:
+        self.lost += 0 if self._next_index is None else first - self._next_index
+        self._tick = math.ceil(first / self._frames_per_tick)
+
+    def _images(self, first: int, members: Sequence[SampleFrame]) -> Iterator[TactileSignal]:
+        for index, item in enumerate(members, first):
+            if item.image is not None:
+                self._image, self._image_index = item.image, index
+            while self._tick * self._frames_per_tick <= index:
+                if self._image is not None and index - self._image_index <= IMAGE_HOLD_S * RATE_HZ:
+                    yield self._static(self._tick, self._image)
+                self._tick += 1
+
+    def _dynamic(self, first: int, members: Sequence[SampleFrame]) -> TactileSignal:
+        return TactileSignal(
+            stamp_ns=self._clock.time_ns(first),
+            sensor=DYNAMIC_SENSOR,
+            channels=DYNAMIC_CHANNELS,
+            units=(UNIT,),
+            sampling_rate_hz=RATE_HZ,
+            first_sample=first,
+            samples=np.array([item.dynamic for item in members], dtype=np.float32)[:, None],
+            frame_id=self._frame_id,
+        )
+
+    def _motion(self, first: int, members: Sequence[SampleFrame]) -> Iterator[TactileSignal]:
+        """Yield the inertial values, unless the device has sent none of them."""
+        counts = np.array([item.motion for item in members])
+        if not self.has_motion or np.isnan(counts).all():
+            return
+        yield TactileSignal(
+            stamp_ns=self._clock.time_ns(first),
+            sensor=MOTION_SENSOR,
+            channels=self._motion_channels,
+            units=self._motion_units,
+            sampling_rate_hz=RATE_HZ,
+            first_sample=first,
+            samples=(counts * self._motion_gains).astype(np.float32),
+            frame_id=self._frame_id,
+        )
+
+    def _static(self, tick: int, image: tuple[int, ...]) -> TactileSignal:
+        self.images += 1
+        self.repeated_images += image == self._last_published
+        self._last_published = image
+        return TactileSignal(
+            stamp_ns=self._clock.time_ns(tick * self._frames_per_tick),
+            sensor=STATIC_SENSOR,
+            channels=self._layout.static_channels,
+            units=(UNIT,) * len(self._layout.static_channels),
+            sampling_rate_hz=self.static_rate_hz,
+            first_sample=tick,
+            samples=np.array([image], dtype=np.float32),
+            frame_id=self._frame_id,
+        )
+
+
+def _runs(indices: Sequence[int], frames: Sequence[SampleFrame]) -> Iterator[tuple[int, list[SampleFrame]]]:
+    """Yield the first index and the sets of each run without a gap."""
+    numbered = enumerate(zip(indices, frames, strict=True))
+    for _, run in groupby(numbered, key=lambda item: item[1][0] - item[0]):
+        members = [numbered_frame for _, numbered_frame in run]
+        yield members[0][0], [item for _, item in members]
+
+
+# --------------------
+# One finger of a TSF-85: its sample frames become numbered, timed batches.
+
+
+class FingerStream:
+    """Number the sample frames of one finger by the device's stamps, time them by the host's clock, cut batches.
+
+    Where the firmware sends no stamps, the host's clock also tells what was lost, half a second later.
+
+    Parameters
+    ----------
+    layout
+        Kind of fingertip.
+    settings
+        Of the inertial sensors.
+    static_rate_hz
+        Rate of the taxel images as published; 0: that of the layout.
+    frame_id
+        For the headers.
+    """
+
+    def __init__(
+        self,
+        layout: Tsf85Layout = TSF85,
+        settings: Tsf85Settings | None = None,
+        static_rate_hz: float = 0.0,
+        frame_id: str = '',
+    ) -> None:
+        settings = Tsf85Settings() if settings is None else settings
+        self.clock = StreamClock(RATE_HZ)
+        self.counter = SampleCounter()
+        self.cutter = BatchCutter(layout, settings, static_rate_hz or layout.static_rate_hz, frame_id, self.clock)
+        self._losses = UnseenLoss(RATE_HZ)
+        self._waiting: list[SampleFrame] = []
+        self._interrupted = False
+        self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        rates = {SIGNAL: RATE_HZ, BATCH_STATIC: self.cutter.static_rate_hz}
+        return {**rates, IMU: RATE_HZ} if self.cutter.has_motion else rates
+
+    def interrupt(self) -> None:
+        """Forget what belongs to the stream so far: another one begins."""
+        self._interrupted = True
+        self._waiting = []
+
+    def place(self, frames: Sequence[SampleFrame], arrival_ns: int) -> Mapping[str, list[TactileSignal]]:
+        """Return the batches, by topic, that the sets make which have just arrived."""
+        if not frames:
+            return {}
+        if self._interrupted:
+            self._resume()
+        waiting = [*self._waiting, *frames]
+        indices, restarted = self.counter.place([item.stamp_ms for item in waiting])
+        self._waiting = waiting[len(indices) :]
+        if restarted:
+            self.interrupt()
+        if not indices:
+            return {}
+        missing = self._unseen(waiting[: len(indices)], indices[-1], arrival_ns)
+        self.clock.observe(indices[-1] + missing, arrival_ns)
+        skipped = missing + self._skipped(indices[-1] + missing)
+        return self.cutter.cut([index + skipped for index in indices], waiting[: len(indices)])
+
+    def _resume(self) -> None:
+        """Number on after an interruption, and keep the clock of before for telling what was lost in it."""
+        self._interrupted = False
+        if self.clock.settled:
+            self._clock_before = copy.copy(self.clock)
+        self.clock.restart()
+        self.counter.interrupt()
+
+    def _unseen(self, frames: Sequence[SampleFrame], index: int, arrival_ns: int) -> int:
+        """Return how many samples must have been lost before these, which have no stamps, and number on behind them."""
+        stamped = any(item.stamp_ms is not None for item in frames)
+        if stamped or not self.clock.settled or self._clock_before is not None:
+            self._losses.restart()
+            return 0
+        missing = self._losses.lost(arrival_ns - self.clock.time_ns(index), arrival_ns)
+        self.counter.skip(missing)
+        return missing
+
+    def _skipped(self, index: int) -> int:
+        """Return how many samples an interruption has cost that is over now, and number on behind them.
+
+        That is known when the clock is settled again and not before: what arrives first may be long on its way.
+        """
+        if self._clock_before is None or not self.clock.settled:
+            return 0
+        skipped = max(0, round(self._clock_before.index_at(self.clock.time_ns(index))) - index)
+        self._clock_before = None
+        self.counter.skip(skipped)
+        self.clock.skip(skipped)
+        return skipped
+
+
+# --------------------
+# TSF-85 data as the vendor's ROS driver publishes it, made into the suite's signals. Knows no ROS.
+#
+# `robotiq/ros` @18335fa, `robotiq_tsf`: for each packet one message on each of several topics, both fingers in each,
+# none
+# with a header; the device's stamp, 16 bits in ms, is a message of its own and the last of its packet. So what
+# belongs
+# together follows from the times at which the messages were sent.
+#
+# The functions work on any objects with the attributes of those messages.
+
+MAX_WAITING_SAMPLES = 50  # samples that wait for a stamp; more, and the stamp is taken as lost
+SILENCE_NS = 1 * NANOSECONDS  # after so long the 16 bits of the stamps may have wrapped unseen
+MESSAGES_TAXELS = STATIC_ROWS * STATIC_COLUMNS
+
+
+class TimedValue(NamedTuple):
+    """A number and when its message was sent."""
+
+    source_ns: int
+    value: int
+
+
+class Tsf85MessageConverter:
+    """Make the messages about one finger into numbered, timed batches.
+
+    A message is handed over with the time at which it was sent, by the clock of the driver's host.
+
+    Parameters
+    ----------
+    finger
+        0 or 1.
+    settings
+        Of the inertial sensors.
+    static_rate_hz
+        Rate of the taxel images as published; 0: 60 Hz.
+    frame_id
+        Frame of the fingertip.
+    """
+
+    def __init__(
+        self, finger: int = 0, settings: Tsf85Settings | None = None, static_rate_hz: float = 0.0, frame_id: str = ''
+    ) -> None:
+        settings = Tsf85Settings() if settings is None else settings
+        self.repeated = 0  # messages of packets without a new dynamic value
+        self.unstamped = 0  # samples whose stamp was lost
+        self.unpaired = 0  # stamps whose sample was lost
+        self._finger = finger
+        self._line = FingerStream(TSF85, settings, static_rate_hz, frame_id)
+        self._dynamics: deque[TimedValue] = deque()
+        self._stamps: deque[TimedValue] = deque()
+        self._image: tuple[int, ...] | None = None
+        self._motion: dict[int, tuple[float, ...]] = dict.fromkeys(settings.kinds, UNKNOWN)
+        self._last_stamp: int | None = None
+        self._last_ns: int | None = None
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return self._line.rates_hz
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals for the diagnostics."""
+        return {
+            'samples': self._line.cutter.samples,
+            'lost': self._line.cutter.lost,
+            'repeated': self.repeated,
+            'unstamped': self.unstamped,
+            'unpaired': self.unpaired,
+        }
+
+    def take(self, topic: str, message: Any, source_ns: int) -> None:
+        """Note a message of a topic, named as in `TOPICS`.
+
+        Parameters
+        ----------
+        topic
+            Name of the topic in `TOPICS`.
+        message
+            Message with the attributes of its type.
+        source_ns
+            Time at which it was sent, ns by the clock of the driver's host.
+
+        Raises
+        ------
+        InvalidData
+            If an image has another number of taxels.
+        """
+        TOPICS[topic](self, message, source_ns)
+
+    def batches(self) -> Mapping[str, list[TactileSignal]]:
+        """Return the batches, by topic, of all messages that can be put together by now."""
+        frames: list[SampleFrame] = []
+        sent_ns = 0
+        while self._is_complete():
+            sample = self._dynamics.popleft()
+            stamp = self._stamp_of(sample, self._dynamics[0].source_ns)
+            if stamp is not None and stamp == self._last_stamp:
+                self.repeated += 1
+                continue
+            self._last_stamp = stamp
+            sent_ns = sample.source_ns
+            frames.append(SampleFrame(stamp, sample.value, self._image, sum(self._motion.values(), ())))
+            self._image = None
+        if frames and self._last_ns is not None and sent_ns - self._last_ns > SILENCE_NS:
+            self._line.interrupt()
+        self._last_ns = sent_ns or self._last_ns
+        return self._line.place(frames, sent_ns)
+
+    def _is_complete(self) -> bool:
+        """Return whether all that was sent with the oldest sample has come, or will not come any more."""
+        if len(self._dynamics) < 2:
+            return False
+        stamped = bool(self._stamps) and self._stamps[-1].source_ns >= self._dynamics[0].source_ns
+        return stamped or len(self._dynamics) > MAX_WAITING_SAMPLES
+
+    def _stamp_of(self, sample: TimedValue, until_ns: int) -> int | None:
+        """Return the stamp that was sent between a sample and the next one."""
+        stamp = None
+        while self._stamps and self._stamps[0].source_ns < until_ns:
+            sent = self._stamps.popleft()
+            if stamp is None and sent.source_ns >= sample.source_ns:
+                stamp = sent.value
+            else:
+                self.unpaired += 1
+        self.unstamped += stamp is None
+        return stamp
+
+    def _take_dynamic(self, message: Any, source_ns: int) -> None:
+        self._dynamics.append(TimedValue(source_ns, int(message.data[self._finger].value)))
+
+    def _take_stamp(self, message: Any, source_ns: int) -> None:
+        self._stamps.append(TimedValue(source_ns, int(message.values[self._finger])))
+        if len(self._stamps) > MAX_WAITING_SAMPLES and not self._dynamics:
+            self._stamps.popleft()
+            self.unpaired += 1
+
+    def _take_static(self, message: Any, _source_ns: int) -> None:
+        values = message.taxels[self._finger].values
+        if len(values) != MESSAGES_TAXELS:
+            raise InvalidData(
+                f'the message has {len(values)} taxels; a TSF-85 has {MESSAGES_TAXELS}; check the message package'
+            )
+        self._image = tuple(int(value) for value in values)
+
+    def _take_acceleration(self, message: Any, _source_ns: int) -> None:
+        self._motion[ACCELEROMETER] = _axes(message, self._finger)
+
+    def _take_rotation(self, message: Any, _source_ns: int) -> None:
+        self._motion[GYROSCOPE] = _axes(message, self._finger)
+
+
+def _axes(message: Any, finger: int) -> tuple[float, ...]:
+    return tuple(float(value) for value in message.data[finger].values)
+
+
+# Name of the vendor's topic and of its message type: what is done with it.
+TOPICS: Mapping[str, Callable[[Tsf85MessageConverter, Any, int], None]] = {
+    'Dynamic': Tsf85MessageConverter._take_dynamic,
+    'Timestamp': Tsf85MessageConverter._take_stamp,
+    'StaticData': Tsf85MessageConverter._take_static,
+    'Accelerometer': Tsf85MessageConverter._take_acceleration,
+    'Gyroscope': Tsf85MessageConverter._take_rotation,
+}
+
+
+# --------------------
+# Recordings of the vendor's SDK: the CSV that `sensor_quickstart/record_data.py` of robotiq/tactile_sensors writes.
+#
+# A header, then one line a packet, separated by semicolons: host time in ms; dynamic value of finger 0 and 1; 28
+# taxels
+# of finger 0, 28 of finger 1; acceleration of both; rotation of both. The first line holds the baseline of the taxels
+# and
+# no measurement; unless it was told otherwise, the program has subtracted it from those that follow.
+
+RECORDING_TAXELS, RECORDING_AXES = STATIC_ROWS * STATIC_COLUMNS, 3
+FIRST_COLUMN = 'Time(ms)'
+ChannelGroup = tuple[str, tuple[str, ...], tuple[str, ...], float]
+RECORDING_DYNAMIC: ChannelGroup = (DYNAMIC_SENSOR, DYNAMIC_CHANNELS, (UNIT,), RATE_HZ)
+TAXEL: ChannelGroup = (
+    STATIC_SENSOR,
+    STATIC_CHANNELS,
+    (UNIT,) * RECORDING_TAXELS,
+    STATIC_RATE_HZ,
+)
+MAX_LINE = 10_000  # characters; a number has 25 at most
+COLUMNS = 1 + FINGERS * (1 + RECORDING_TAXELS + RECORDING_AXES + RECORDING_AXES)
+
+
+@dataclass(frozen=True, eq=False)
+class VendorRecording:
+    """What was recorded, in counts; n lines.
+
+    Parameters
+    ----------
+    time_ms : (n,)
+        When the host polled the packet, since the epoch: coarse, in bursts, and no proof of evenness.
+    dynamic : (n, 2)
+        Of both fingers, as are the others.
+    static : (n, 2, 28)
+        Less the baseline, if it was subtracted.
+    acceleration, rotation : (n, 2, 3)
+    baseline : (2, 28)
+    """
+
+    time_ms: Array
+    dynamic: Array
+    static: Array
+    acceleration: Array
+    rotation: Array
+    baseline: Array
+
+    @property
+    def samples(self) -> NDArray[np.intp]:
+        """Lines that are samples, (n_samples,): where more than the taxels changed, or not even they.
+
+        New firmware sends an image in a packet of its own, for which the recorder writes the rest a second time.
+        """
+        changed = np.diff(np.concatenate([self.dynamic, *self._motion()], axis=1), axis=0).any(axis=1)
+        new_image = np.diff(self.static, axis=0).any(axis=(1, 2))
+        return np.flatnonzero(np.concatenate([[True], changed | ~new_image]))
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second, on the average; far from 1000 it tells of lines that the recorder lost."""
+        time_ms = self.time_ms[self.samples]
+        return float((len(time_ms) - 1) / (time_ms[-1] - time_ms[0]) * 1000)
+
+    def signals(self, finger: int = 0, settings: Tsf85Settings | None = None) -> Mapping[str, list[TactileSignal]]:
+        """Return one finger as the driver would have published it, by topic.
+
+        The file has no stamps of the device: samples are numbered through at 1 kHz from the first one's time on, and
+        what the recorder lost goes unseen; see `rate_hz`. Images are taken at ticks of 60 Hz.
+        """
+        settings = replace(settings or Tsf85Settings(), imu=True, magnetometer=False)
+        lines = self.samples
+        ticks = lines[np.arange(0, len(lines), RATE_HZ / STATIC_RATE_HZ).astype(int)]
+        motion = np.concatenate([values[lines, 3 * finger : 3 * finger + 3] for values in self._motion()], axis=1)
+        streams = {
+            SIGNAL: (RECORDING_DYNAMIC, self.dynamic[lines, finger, None]),
+            BATCH_STATIC: (TAXEL, self.static[ticks, finger]),
+            IMU: ((MOTION_SENSOR, settings.channels, settings.units, RATE_HZ), motion * settings.gains),
+        }
+        return {topic: [self._batch(stream, samples)] for topic, (stream, samples) in streams.items()}
+
+    def _motion(self) -> tuple[Array, Array]:
+        """Return acceleration and rotation, each (n, 6): finger after finger."""
+        n = len(self.time_ms)
+        return self.acceleration.reshape(n, -1), self.rotation.reshape(n, -1)
+
+    def _batch(self, stream: ChannelGroup, samples: Array) -> TactileSignal:
+        sensor, channels, units, rate_hz = stream
+        return TactileSignal(
+            stamp_ns=round(self.time_ms[0] * NANOSECONDS / 1000),
+            sensor=sensor,
+            channels=channels,
+            units=units,
+            sampling_rate_hz=rate_hz,
+            first_sample=0,
+            samples=samples.astype(np.float32),
+        )
+
+
+def load_vendor_csv(path: Path) -> VendorRecording:
+    """Return what the vendor's recorder wrote.
+
+    Raises
+    ------
+    InvalidData
+        If there is no such file, or it is another one.
+    """
+    try:
+        with open_regular(path) as file, io.TextIOWrapper(file, encoding='utf-8-sig') as text:
+            names = text.readline(MAX_LINE).strip().split(';')
+            lines = (line for line in iter(lambda: text.readline(MAX_LINE), '') if line.strip())
+            with warnings.catch_warnings():
+                warnings.simplefilter('ignore')  # an empty table is refused below, in our words
+                table = np.loadtxt(lines, delimiter=';', ndmin=2)
+    except OSError as error:
+        raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
+    except ValueError as error:
+        raise InvalidData(f"recording '{path}' is not usable: {error}") from error
+    if names[0] != FIRST_COLUMN or len(names) != COLUMNS or table.shape[1] != COLUMNS or len(table) < 3:
+        raise InvalidData(
+            f"recording '{path}' has {len(names)} columns from '{names[0]}' on and {len(table)} lines; a recording of "
+            f"the vendor's program has {COLUMNS} from '{FIRST_COLUMN}' on and at least 3 lines"
+        )
+    if not table[-1, 0] > table[1, 0]:
+        raise InvalidData(f"recording '{path}' has times that do not rise; record it again")
+    return _recording(table)
+
+
+def _recording(table: AnyArray) -> VendorRecording:
+    fingers = FINGERS
+    time_ms, dynamic, static, acceleration, rotation = np.split(
+        table, np.cumsum([1, fingers, fingers * RECORDING_TAXELS, fingers * RECORDING_AXES]), axis=1
+    )
+    taxels = static.reshape(-1, fingers, RECORDING_TAXELS)
+    return VendorRecording(
+        time_ms=time_ms[1:, 0],
+        dynamic=dynamic[1:],
+        static=taxels[1:],
+        acceleration=acceleration[1:].reshape(-1, fingers, RECORDING_AXES),
+        rotation=rotation[1:].reshape(-1, fingers, RECORDING_AXES),
+        baseline=taxels[0],
+    )
+
+
+# --------------------
+# The TSF-85 fingertip as a sensor of the suite.
+
+SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
+REVIVALS = 3  # so many times, as the vendor does, before the port is given up
+REVIVAL_PAUSE_S = 0.05  # between stop and start
+PPM = 1e6
+
+
+class Tsf85:
+    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'imu' at 1 kHz.
+
+    The device's own stamps number the samples, so losses are known exactly; over an interruption the host's clock
+    does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
+    at each tick of the static rate. See `texture_core.types.Sensor`.
+
+    Parameters
+    ----------
+    params
+        `device` is a path or 'auto', `finger` 0 or 1, `config` means `Tsf85Settings`.
+    now_ns
+        The host's clock.
+    layout
+        Kind of fingertip.
+    fingers
+        Several fingers instead of `params.finger`; topics are then 'finger0/signal' and so on.
+
+    Raises
+    ------
+    InvalidParameter
+        If there is no such finger, or the settings are wrong.
+    """
+
+    def __init__(
+        self,
+        params: SensorParams,
+        now_ns: Callable[[], int] = time.time_ns,
+        *,
+        layout: Tsf85Layout = TSF85,
+        fingers: Sequence[int] = (),
+    ) -> None:
+        if not fingers and params.finger >= FINGERS:
+            raise InvalidParameter(f"parameter 'finger' is {params.finger}; a TSF-85 has the fingers 0 and 1")
+        self._params = params
+        self._now_ns = now_ns
+        settings = load_settings(Tsf85Settings, params.config)
+        self._port: SerialPort | None = None
+        self._parser = Tsf85Parser(layout)
+        self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
+        self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in self._prefixes}
+        self._fingers = {
+            finger: FingerStream(layout, settings, params.static_rate_hz, params.frame_id) for finger in self._prefixes
+        }
+        self._serial = ''
+        self._last_packet: Packet | None = None
+        self._repeated = 0
+        self._silent_reads = self._silent_bytes = 0
+        self._opened = self._revived = self._revivals = 0
+
+    def open(self) -> None:
+        """Open the device and start its stream; DeviceError if it cannot be reached."""
+        self.close()
+        device = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
+        port = SerialPort(device)
+        port.write(start_command())
+        self._port = port
+        self._serial = serial_line.serial_number(device)
+        self._opened += 1
+        self._silent_reads = self._silent_bytes = self._revivals = 0
+        self._interrupt()
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        """Wait for the length of one batch and return what arrived.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone, or the device stays silent after three restarts.
+        """
+        if self._port is None:
+            raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
+        time.sleep(self._params.batch_s)
+        data = self._port.read()
+        arrival_ns = self._now_ns()
+        packets = self._without_duplicates(self._parser.feed(data))
+        topics, alive = self._place(packets, arrival_ns)
+        self._watch_silence(self._port, alive, len(data))
+        return topics
+
+    def _place(self, packets: Sequence[Packet], arrival_ns: int) -> tuple[dict[str, Sequence[TactileSignal]], bool]:
+        """Return the batches of each topic, and whether any finger sent a frame."""
+        topics: dict[str, Sequence[TactileSignal]] = {}
+        alive = False
+        for number, finger in self._fingers.items():
+            frames = self._splitters[number].frames(packets)
+            alive = alive or bool(frames)
+            for topic, batches in finger.place(frames, arrival_ns).items():
+                topics[f'{self._prefixes[number]}{topic}'] = batches
+        return topics, alive
+
+    def close(self) -> None:
+        """Stop the stream and close the device."""
+        if self._port is None:
+            return
+        with contextlib.suppress(DeviceError):  # if it is gone there is nothing to stop
+            self._port.write(stop_command())
+        self._port.close()
+        self._port = None
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals: samples published, samples lost, bogus candidates and bytes refused, and what was done about it."""
+        cutters = [finger.cutter for finger in self._fingers.values()]
+        return {
+            'samples': sum(cutter.samples for cutter in cutters),
+            'lost': sum(cutter.lost for cutter in cutters),
+            'bogus': self._parser.refused,
+            'refused_bytes': self._parser.refused_bytes,
+            'repeated': self._repeated,
+            'damaged_stamps': sum(finger.counter.damaged_stamps for finger in self._fingers.values()),
+            'images': sum(cutter.images for cutter in cutters),
+            'repeated_images': sum(cutter.repeated_images for cutter in cutters),
+            'reopened': max(0, self._opened - 1),
+            'revived': self._revived,
+            'clock_steps': sum(finger.clock.steps for finger in self._fingers.values()),
+        }
+
+    @property
+    def details(self) -> Mapping[str, str | float]:
+        """Serial number of the USB device if it tells one, and how much its clock is slow."""
+        drift = next(iter(self._fingers.values())).clock.drift
+        serial = {'serial number': self._serial} if self._serial else {}
+        return {**serial, 'device clock slow by [ppm]': PPM * drift}
+
+    @property
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return {
+            f'{prefix}{topic}': rate
+            for number, prefix in self._prefixes.items()
+            for topic, rate in self._fingers[number].rates_hz.items()
+        }
+
+    @property
+    def limits(self) -> Limits:
+        """Ends of the int16 and of the uint16 by topic."""
+        return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in LIMITS.items()}
+
+    def _without_duplicates(self, packets: Sequence[Packet]) -> list[Packet]:
+        """Leave out what came twice: the same to the last bit, stamp and all."""
+        unique = []
+        for packet in packets:
+            if packet == self._last_packet and any(item.kind == TIMESTAMP for item in packet.items):
+                self._repeated += 1
+            else:
+                unique.append(packet)
+            self._last_packet = packet
+        return unique
+
+    def _watch_silence(self, port: SerialPort, alive: bool, n_bytes: int) -> None:
+        """Wake a device that is open but silent; DeviceError when that does not help."""
+        if alive:
+            self._silent_reads = self._silent_bytes = self._revivals = 0
+            return
+        self._silent_reads += 1
+        self._silent_bytes += n_bytes
+        if self._silent_reads * self._params.batch_s < SILENCE_S:
+            return
+        if self._revivals == REVIVALS:
+            raise DeviceError(self._silence_sentence())
+        self._silent_reads = 0
+        self._revivals += 1
+        self._revived += 1
+        port.write(stop_command())
+        time.sleep(REVIVAL_PAUSE_S)
+        port.write(start_command())
+        self._interrupt()
+
+    def _silence_sentence(self) -> str:
+        fingers = ' or '.join(str(finger) for finger in self._prefixes)
+        if self._silent_bytes:
+            return (
+                f"device '{self._params.device}' sends bytes, and nothing of finger {fingers} in them that this driver "
+                'knows; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'
+            )
+        return f"device '{self._params.device}' is open and sends nothing, started {1 + REVIVALS} times; replug it"
+
+    def _interrupt(self) -> None:
+        for finger in self._fingers.values():
+            finger.interrupt()

@@ -1,1 +1,0 @@
-"""Classification: training of a classifier and accumulation of evidence over the windows of a slide."""

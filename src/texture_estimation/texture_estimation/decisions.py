@@ -1,0 +1,1402 @@
+"""Known or not, decided or not: novelty, stopping rule, prediction sets, confidence floor, error bound, domain."""
+
+from __future__ import annotations
+
+import math
+import sys
+from bisect import bisect_right
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise, product
+from types import UnionType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import safe_repr
+from texture_core.errors import InvalidData
+from texture_core.types import AnyArray, Array
+from texture_estimation.learners.learner import Codes
+from texture_features.examples import Interval, SlideConditions
+
+# --------------------
+# Distance of the mean features of a slide to the training slides of one class.
+
+# Chosen on slides 1-24 against 25-30 of recorded materials, five of twenty left out of the training.
+NEAREST = 3  # slides to which the distance counts: one alone may be an odd one
+SHRINKAGE = 0.6  # of the covariances towards their diagonals: there are hardly more slides than features
+FLOOR = 0.18  # of the mean variance within classes, added to each
+MAX_DIRECTIONS = 128  # in which slides are compared: those in which classes differ most; more cost time
+SMALLEST = 1e-9  # variance within classes, in that of all: slides that are the same to the last bit
+
+
+@dataclass(frozen=True, eq=False)
+class ClassDistance:
+    """Squared distance to the nearest slides of a class, less that to the centre of all classes.
+
+    The metric is that of the covariance within classes, as in probabilistic linear discriminant analysis.
+
+    Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with slides in place of the mean of a class.
+
+    Parameters
+    ----------
+    projection : (n_features, n_directions)
+        Makes the covariance within classes the identity, and that between them diagonal.
+    references : (n_slides, n_directions)
+        Mean of each training slide, projected; class by class.
+    classes : (n_slides,)
+        Number of the class of each, ascending.
+    centre, weights : (n_directions,)
+        Mean of the classes, projected, and one over the variance about it.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> classes = np.repeat([0, 1], 10)
+    >>> means = 5.0 * classes[:, None] + 0.1 * rng.standard_normal((20, 2))
+    >>> distance = ClassDistance.fit(means, classes)
+    >>> distance.score(np.array([0.0, 0.0]), 0) < distance.score(np.array([0.0, 0.0]), 1)
+    True
+    """
+
+    projection: Array
+    references: Array
+    classes: Codes
+    centre: Array
+    weights: Array
+
+    @classmethod
+    def fit(cls, means: Array, classes: Codes) -> ClassDistance:
+        """Fit to the means of slides (n_slides, n_features) and the numbers of their classes (n_slides,).
+
+        Parameters
+        ----------
+        means : (n_slides, n_features)
+            Mean features of each slide.
+        classes : (n_slides,)
+            Number of the label of each.
+        """
+        from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
+        names, codes = np.unique(classes, return_inverse=True)
+        scale = means.std(axis=0)
+        scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # what is constant tells nothing
+        scaled = means / scale
+        own = np.stack([scaled[codes == code].mean(axis=0) for code in range(len(names))])
+        centre = own.mean(axis=0)
+        within = _covariance(scaled - own[codes], len(means) - len(names))
+        floor = FLOOR * max(float(np.diag(within).mean()), SMALLEST)
+        between = _covariance(own - centre, len(names) - 1)
+        spread, directions = eigh(between, within + floor * np.eye(len(within)))
+        spread, directions = spread[-MAX_DIRECTIONS:], directions[:, -MAX_DIRECTIONS:]
+        order = np.argsort(classes, kind='stable')
+        return cls(
+            projection=directions / scale[:, None],
+            references=(scaled @ directions)[order],
+            classes=classes[order],
+            centre=centre @ directions,
+            weights=1.0 / (1.0 + np.maximum(spread, 0.0)),
+        )
+
+    @cached_property
+    def _own(self) -> dict[int, tuple[Array, Array]]:
+        """Slides of each class relative to the centre, (n_own, n_directions), and half their squares, (n_own,)."""
+        found = {}
+        for code in np.unique(self.classes).tolist():
+            own = self.references[self.classes == code] - self.centre
+            found[code] = (own, 0.5 * np.einsum('ij,ij->i', own, own))
+        return found
+
+    @cached_property
+    def _directions(self) -> Array:
+        """Projection by columns: so a product with one slide is faster."""
+        return np.asfortranarray(self.projection)
+
+    @cached_property
+    def _nearer(self) -> Array:
+        """What the square along each direction counts less about the centre than about a slide, (n_directions,)."""
+        return 1.0 - self.weights
+
+    def score(self, mean: Array, code: int) -> float:
+        """Return the score of the mean features (n_features,) of a slide for a class; infinite without its slides.
+
+        Parameters
+        ----------
+        mean : (n_features,)
+            Mean features of the slide.
+        code
+            Number of the label.
+        """
+        found = self._own.get(code)
+        if found is None:
+            return np.inf
+        own, half_squares = found
+        away = mean @ self._directions
+        away -= self.centre
+        # Half the squared distances, less half the square of what is away from the centre.
+        halves = half_squares - own @ away
+        if len(halves) > NEAREST:
+            halves.partition(NEAREST - 1)
+            halves = halves[:NEAREST]
+        return 2.0 * float(np.add.reduce(halves)) / len(halves) + float((away * away) @ self._nearer)
+
+    def with_slides(self, means: Array, classes: Codes) -> ClassDistance:
+        """Return the distance with more reference slides, (n_slides, n_features) and (n_slides,).
+
+        Parameters
+        ----------
+        means : (n_slides, n_features)
+            Mean features of each further slide.
+        classes : (n_slides,)
+            Number of the label of each.
+        """
+        references = np.concatenate([self.references, means @ self.projection])
+        every = np.concatenate([self.classes, classes])
+        order = np.argsort(every, kind='stable')
+        return ClassDistance(self.projection, references[order], every[order], self.centre, self.weights)
+
+    def as_arrays(self) -> dict[str, AnyArray]:
+        """Return the arrays for the model file.
+
+        Returns
+        -------
+        dict
+            Name of each field, and its array.
+        """
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> ClassDistance:
+        """Return what `as_arrays` gave."""
+        projection, references, centre, weights = (
+            np.asarray(arrays[name], dtype=np.float64) for name in ('projection', 'references', 'centre', 'weights')
+        )
+        return cls(projection, references, np.asarray(arrays['classes'], dtype=np.intp), centre, weights)
+
+
+def _covariance(deviations: Array, freedom: int) -> Array:
+    """Return the covariance, drawn to its diagonal: few classes do not show all directions in which others differ."""
+    covariance = deviations.T @ deviations / max(freedom, 1)
+    shrunk: Array = (1.0 - SHRINKAGE) * covariance + SHRINKAGE * np.diag(np.diag(covariance))
+    return shrunk
+
+
+# --------------------
+# The smallest confidence that a slide over a known surface has, by the length of its evidence.
+
+FLOOR_ENTRY = 'confidence_floor'  # of a model card
+# Lengths of evidence at which it is fitted, in windows that do not overlap. Up to the last one the confidence of known
+# slides grows, which tells them from disturbed slides that resemble two textures.
+FLOOR_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+LARGEST = 1.0 - sys.float_info.epsilon  # confidence whose log-odds are finite
+
+
+@dataclass(frozen=True)
+class ConfidenceFloor:
+    """Smallest confidence of the best label with which a surface is taken for known.
+
+    A slide that resembles two textures after much evidence is like no slide of the training, even if it is near to the
+    slides of both.
+
+    Source: Hendrycks & Gimpel 2017 for the confidence as a novelty score; Vovk, Gammerman & Shafer 2005 for its limit.
+
+    Parameters
+    ----------
+    effective_window_counts
+        Lengths of evidence, ascending; none if there is no limit.
+    log_odds
+        Logarithm of p / (1 - p) at each, where p is the smallest confidence of a known surface.
+
+    Raises
+    ------
+    InvalidData
+        If the two have different lengths, the lengths of evidence do not ascend, or a number is not finite.
+
+    Examples
+    --------
+    >>> floor = ConfidenceFloor((1.0, 10.0), (-1.0, 4.0))
+    >>> floor.reached(0.5, effective_windows=1.0), floor.reached(0.5, effective_windows=10.0)
+    (True, False)
+    >>> ConfidenceFloor().reached(0.1, effective_windows=10.0)
+    True
+    """
+
+    effective_window_counts: tuple[float, ...] = ()
+    log_odds: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        counts = self.effective_window_counts
+        ascending = all(earlier < later for earlier, later in pairwise(counts))
+        if len(counts) != len(self.log_odds) or not ascending or not all(map(math.isfinite, (*counts, *self.log_odds))):
+            raise InvalidData(
+                f'{FLOOR_ENTRY} has {len(counts)} effective_window_counts and {len(self.log_odds)} log_odds; it needs '
+                'as many of both, finite, the counts ascending'
+            )
+
+    @classmethod
+    def from_card(cls, card: Mapping[str, Any]) -> ConfidenceFloor:
+        """Return the limit that a model card holds.
+
+        Raises
+        ------
+        InvalidData
+            If the card has no entry of it. A model without a limit has one that is empty.
+        """
+        if FLOOR_ENTRY not in card:
+            raise InvalidData(f"its card has no entry '{FLOOR_ENTRY}', the smallest confidence of known surfaces")
+        return cls(**{name: tuple(map(float, values)) for name, values in card[FLOOR_ENTRY].items()})
+
+    def reached(self, confidence: float, effective_windows: float) -> bool:
+        """Return whether a known surface may have so little confidence.
+
+        Parameters
+        ----------
+        confidence
+            Probability of the best label, 0 to 1.
+        effective_windows
+            Effective window count so far.
+
+        Returns
+        -------
+        bool
+        """
+        return not self.log_odds or confidence >= 1.0 / (1.0 + math.exp(-self._at(effective_windows)))
+
+    def _at(self, effective_windows: float) -> float:
+        """Return the log-odds, linear between two lengths of evidence."""
+        counts = self.effective_window_counts
+        after = bisect_right(counts, effective_windows)
+        if after == 0 or after == len(counts):
+            return self.log_odds[max(after - 1, 0)]
+        low, high = self.log_odds[after - 1 : after + 1]
+        return low + (high - low) * (effective_windows - counts[after - 1]) / (counts[after] - counts[after - 1])
+
+
+def fit_confidence_floor(
+    confidences: Sequence[Array], effective_window_counts: Sequence[Array], rate: float
+) -> ConfidenceFloor:
+    """Return the limit that a fraction of the slides over known surfaces stays below.
+
+    Parameters
+    ----------
+    confidences : of each slide (n_windows,)
+        Of the best label after each window, of undisturbed slides held out of the training that end with the right one.
+    effective_window_counts : of each slide (n_windows,)
+        Length of the evidence after each window.
+    rate
+        Fraction of the slides that may lie below the limit at each length of evidence.
+
+    Returns
+    -------
+    ConfidenceFloor
+        Without a limit if the slides are too few for the fraction.
+    """
+    rank = int((len(confidences) + 1) * rate)
+    if not rank:
+        return ConfidenceFloor()
+    log_odds = []
+    for length in FLOOR_WINDOWS:
+        places = [int(np.abs(own - length).argmin()) for own in effective_window_counts]
+        found = np.sort([own[place] for own, place in zip(confidences, places, strict=True)])
+        limit = min(float(found[rank - 1]), LARGEST)
+        log_odds.append(math.log(limit / (1.0 - limit)))
+    return ConfidenceFloor(FLOOR_WINDOWS, tuple(log_odds))
+
+
+# --------------------
+# How far beyond the trained conditions a slide may be made.
+
+
+@dataclass(frozen=True)
+class DomainMargins:
+    """How far an exploration may lie outside the conditions of the training.
+
+    Parameters
+    ----------
+    speed, force
+        Relative margins: from low / (1 + margin) to high · (1 + margin) is within.
+    direction_rad
+        Largest angle to a direction of the training.
+    level
+        Relative margin of the signal level.
+
+    Examples
+    --------
+    >>> DomainMargins(speed=0.2).speed
+    0.2
+    """
+
+    speed: float = 0.15
+    force: float = 0.3
+    direction_rad: float = 0.35
+    level: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not 0.0 <= value < math.inf:
+                raise InvalidData(f'the margin {name} of a domain is {value}; 0 or a positive number is needed')
+
+
+# --------------------
+# How small an error rate the slides held out of a training can show.
+
+LEVEL = 0.05  # the error rate exceeds its upper bound in so many of all trainings
+PERCENT = 100.0
+ERROR_BOUND_ENTRY = 'error_bound'  # of a model card
+MAX_SLIDES = 1_000_000
+ALLOWED = f'slides, a whole number from 0 to {MAX_SLIDES}, and max_error_rate, a number from 0 to 1'
+
+
+@dataclass(frozen=True)
+class ErrorBound:
+    """Upper 95 % bound of the error rate of decisions when none of the held-out slides was decided wrongly.
+
+    Few slides show little, however confident the classifier is in each: without an error in n slides the error rate may
+    still be 1 - 0.05^(1/n), about 3/n. No confidence above the rest is reported, and no slide is ended early where the
+    allowed error rate lies below the bound.
+
+    Source: Hanley & Lippman-Hand 1983 for the rule of three; Clopper & Pearson 1934 for the bound.
+
+    Parameters
+    ----------
+    slides
+        Number of held-out slides, at most MAX_SLIDES; 0 if nothing was held out.
+    max_error_rate
+        Allowed fraction of wrong decisions when slides are ended early, 0 to 1.
+
+    Raises
+    ------
+    InvalidData
+        If a value has another type or is out of its range.
+
+    Examples
+    --------
+    >>> few = ErrorBound(slides=12, max_error_rate=0.02)
+    >>> round(few.highest_confidence, 3), few.shown, few.slides_needed
+    (0.779, False, 149)
+    """
+
+    slides: int
+    max_error_rate: float
+
+    def __post_init__(self) -> None:
+        if not (_is_within(self.slides, int, MAX_SLIDES) and _is_within(self.max_error_rate, int | float, 1.0)):
+            slides, rate = safe_repr(self.slides), safe_repr(self.max_error_rate)
+            raise InvalidData(
+                f'{ERROR_BOUND_ENTRY} has slides {slides:.40} and max_error_rate {rate:.40}; it needs {ALLOWED}'
+            )
+
+    @classmethod
+    def from_card(cls, card: Mapping[str, Any]) -> ErrorBound:
+        """Return the bound that a model card holds.
+
+        Raises
+        ------
+        InvalidData
+            If the card holds none, as cards of earlier versions, or if it has other keys or values.
+        """
+        if ERROR_BOUND_ENTRY not in card:
+            raise InvalidData(
+                f"its card is of an earlier version and has no entry '{ERROR_BOUND_ENTRY}'; it needs {ALLOWED}"
+            )
+        values = card[ERROR_BOUND_ENTRY]
+        if not isinstance(values, Mapping) or set(values) != {'slides', 'max_error_rate'}:
+            raise InvalidData(f'{ERROR_BOUND_ENTRY} is {safe_repr(values):.80}; it needs {ALLOWED}')
+        return cls(**values)
+
+    @property
+    def highest_confidence(self) -> float:
+        """Largest confidence that the held-out slides can show; 1 if none was held out: nothing is calibrated then."""
+        return float(LEVEL ** (1.0 / self.slides)) if self.slides else 1.0
+
+    @property
+    def slides_needed(self) -> float:
+        """Smallest number of held-out slides that can show the allowed error rate; infinite if no error is allowed."""
+        if self.max_error_rate >= 1.0:
+            return 0
+        if self.max_error_rate <= 0.0:
+            return math.inf
+        return math.ceil(math.log(LEVEL) / math.log1p(-self.max_error_rate))
+
+    @property
+    def shown(self) -> bool:
+        """Whether the held-out slides can show the allowed error rate."""
+        return self.slides >= self.slides_needed
+
+    @property
+    def reason(self) -> str:
+        """Why no slide is ended early, in one sentence; '' if slides are."""
+        if self.shown:
+            return ''
+        rate = f'at most {PERCENT * self.max_error_rate:g} % wrong decisions'
+        if math.isinf(self.slides_needed):
+            return f'no early stopping: {rate} cannot be shown'
+        limit = f'; with {self.slides} the confidence is {self.highest_confidence:.2f} at most' if self.slides else ''
+        needed = f'{self.slides_needed:g} slides or more to be held out of the training'
+        return f'too few slides for early stopping: {rate} need {needed}{limit}'
+
+    def limited(self, probabilities: Array) -> Array:
+        """Return the probabilities, mixed with equal ones just so much that none is above the highest confidence.
+
+        Parameters
+        ----------
+        probabilities : (n_labels,)
+            They add up to 1, as the returned ones do; their order stays.
+
+        Returns
+        -------
+        (n_labels,)
+        """
+        equal, highest = 1.0 / len(probabilities), float(probabilities.max())
+        limit = max(self.highest_confidence, equal)
+        if highest <= limit:
+            return probabilities
+        kept = (limit - equal) / (highest - equal)
+        mixed: Array = equal + kept * (probabilities - equal)
+        return mixed
+
+
+def _is_within(value: Any, kind: type | UnionType, largest: float) -> bool:
+    """Return whether a value is a number of this type from 0 to the largest one; a truth value is no number."""
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    return is_number and bool(0 <= value <= largest)
+
+
+# --------------------
+# Intervals of conditions and arcs of directions that slides cover.
+
+# Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
+ODD_SHARE = 0.01
+FULL_CIRCLE: Interval = (-math.pi, math.pi)
+
+
+def covered_arcs(directions_rad: Iterable[float], gap_rad: float) -> tuple[Interval, ...]:
+    """Return the arcs that directions cover when gaps of at most `gap_rad` between neighbours count as covered.
+
+    Parameters
+    ----------
+    directions_rad
+        Any angles.
+    gap_rad
+        Largest gap that is bridged.
+    """
+    ordered = sorted({math.remainder(direction, math.tau) for direction in directions_rad})
+    if not ordered:
+        return ()
+    turned = [*ordered[1:], ordered[0] + math.tau]
+    ends = [place for place, (one, other) in enumerate(zip(ordered, turned, strict=True)) if other - one > gap_rad]
+    if not ends:
+        return (FULL_CIRCLE,)
+    starts = [ordered[(end + 1) % len(ordered)] for end in (ends[-1], *ends[:-1])]
+    return tuple(
+        (start, ordered[end] if ordered[end] >= start else ordered[end] + math.tau)
+        for start, end in zip(starts, ends, strict=True)
+    )
+
+
+def joint_interval(trained: Interval | None, added: Interval | None) -> Interval | None:
+    """Return the range of the training with that of added slides; None if the training knew none."""
+    if trained is None or added is None:
+        return trained
+    return min(trained[0], added[0]), max(trained[1], added[1])
+
+
+def interval_of(means: Iterable[Iterable[float]]) -> Interval | None:
+    """Return the range of the means of slides without the odd slides; None if no slide has a known one."""
+    known = [own for slide in means for own in [[mean for mean in slide if math.isfinite(mean)]] if own]
+    if not known:
+        return None
+    low = np.quantile([min(own) for own in known], ODD_SHARE, method='lower')
+    high = np.quantile([max(own) for own in known], 1.0 - ODD_SHARE, method='higher')
+    return float(low), float(high)
+
+
+def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
+    """Return whether a value lies outside an interval widened by a relative margin; False for an unknown one.
+
+    Parameters
+    ----------
+    value
+        NaN if not known.
+    interval
+        None if not known.
+    margin
+        Relative, at both ends.
+
+    Returns
+    -------
+    bool
+    """
+    if interval is None or math.isnan(value):
+        return False
+    low, high = interval
+    return not low / (1.0 + margin) <= value <= high * (1.0 + margin)
+
+
+# --------------------
+# The domain of a model: under which conditions it was trained, and whether an exploration lies within them.
+
+# Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
+TURNING_MOTIONS = ('circular',)
+REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
+OUTSIDE = 'outside what was trained'
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The conditions under which a model was trained; what was unknown in the training is not compared.
+
+    A range goes from the lowest to the highest mean over the first windows of the slides, however many: speed and force
+    settle at the start of a slide, and an exploration is compared by the mean over its windows so far. Between two
+    trained speeds or forces a model is within its domain.
+
+    Parameters
+    ----------
+    motions, sensors
+        Names of the exploratory motions and of the sensors; empty if unknown.
+    speed_m_s, force_n
+        Lowest and highest mean; None if unknown.
+    directions_rad
+        Arcs (from, to) that the directions of travel cover, from +x towards +y; `to` may exceed π. Empty if unknown.
+    levels
+        Lowest and highest signal level of each channel, root mean square in the unit of the signal; empty if unknown.
+    slides
+        Number of slides of each label.
+    margins
+        How far an exploration may lie outside.
+
+    Examples
+    --------
+    >>> domain = Domain(motions=('linear_slide',), speed_m_s=(0.045, 0.055))
+    >>> domain.deviation(SlideConditions('linear_slide', speed_m_s=0.02))
+    'outside what was trained: speed 0.02 m/s, trained 0.045 to 0.055 m/s'
+    >>> domain.deviation(SlideConditions('linear_slide', speed_m_s=0.05))
+    ''
+    """
+
+    motions: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
+    speed_m_s: Interval | None = None
+    force_n: Interval | None = None
+    directions_rad: tuple[Interval, ...] = ()
+    levels: Mapping[str, Interval] = field(default_factory=dict)
+    slides: Mapping[str, int] = field(default_factory=dict)
+    margins: DomainMargins = field(default_factory=DomainMargins)
+
+    def __post_init__(self) -> None:
+        ranges = {'speed_m_s': self.speed_m_s, 'force_n': self.force_n, **self.levels}
+        for name, interval in ranges.items():
+            if interval is not None and not 0.0 <= interval[0] <= interval[1] < math.inf:
+                raise InvalidData(f'{name} of a domain is {interval}; two numbers from 0 on in rising order are needed')
+        for start, end in self.directions_rad:
+            if not (math.isfinite(start) and 0.0 <= end - start <= math.tau):
+                raise InvalidData(f'an arc of a domain goes from {start} to {end} rad; at most one turn is needed')
+
+    @classmethod
+    def of_slides(
+        cls, conditions: Iterable[SlideConditions], labels: Iterable[str], margins: DomainMargins | None = None
+    ) -> Domain:
+        """Return the domain of a model that is trained on slides.
+
+        Parameters
+        ----------
+        conditions
+            Of each slide, as far as they are known.
+        labels
+            Of each slide.
+        margins
+            How far an exploration may lie outside; the defaults if None.
+
+        Returns
+        -------
+        Domain
+            Ranges of speed and force, motions, directions and sensors of the slides.
+        """
+        slides = tuple(conditions)
+        margins = margins or DomainMargins()
+        return cls(
+            motions=_names(slide.motion for slide in slides),
+            sensors=_names(slide.sensor for slide in slides if not slide.sensor.startswith(REPLAYS)),
+            speed_m_s=interval_of((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
+            force_n=interval_of((slide.force_n, *slide.force_range_n) for slide in slides),
+            directions_rad=_directions(slides, margins.direction_rad),
+            levels=_levels(slides),
+            slides=dict(Counter(labels)),
+            margins=margins,
+        )
+
+    def widened(self, conditions: Sequence[SlideConditions], labels: Iterable[str]) -> Domain:
+        """Return the domain with slides that were added after the training.
+
+        They widen what is known of the training; what was unknown there is still not compared.
+
+        Parameters
+        ----------
+        conditions
+            Of each added slide, as far as they are known.
+        labels
+            Of each added slide.
+        """
+        new = Domain.of_slides(conditions, labels, self.margins)
+        return replace(
+            self,
+            motions=_names((*self.motions, *new.motions)) if self.motions else (),
+            sensors=_names((*self.sensors, *new.sensors)) if self.sensors else (),
+            speed_m_s=joint_interval(self.speed_m_s, new.speed_m_s),
+            force_n=joint_interval(self.force_n, new.force_n),
+            directions_rad=(*self.directions_rad, *new.directions_rad) if self.directions_rad else (),
+            levels={name: joint_interval(own, new.levels.get(name)) or own for name, own in self.levels.items()},
+            slides=dict(Counter(self.slides) + Counter(new.slides)),
+        )
+
+    def deviation(self, conditions: SlideConditions) -> str:
+        """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
+        found = '; '.join(self._deviations(conditions))
+        return f'{OUTSIDE}: {found}' if found else ''
+
+    def as_card(self) -> dict[str, Any]:
+        """Return what a model's card holds, in the form of JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_card(cls, card: Mapping[str, Any] | None) -> Domain:
+        """Return what `as_card` gave.
+
+        Raises
+        ------
+        InvalidData
+            If there is none, or a range is none. A model without a domain would be certain under any conditions.
+        """
+        if not isinstance(card, Mapping):
+            raise InvalidData("the model card has no entry 'domain', the conditions of the training")
+        intervals = {name: _pair(card[name]) for name in ('speed_m_s', 'force_n') if card.get(name) is not None}
+        return cls(
+            motions=tuple(map(str, card.get('motions', ()))),
+            sensors=tuple(map(str, card.get('sensors', ()))),
+            directions_rad=tuple(_pair(arc) for arc in card.get('directions_rad', ())),
+            levels={str(name): _pair(interval) for name, interval in card.get('levels', {}).items()},
+            slides={str(label): int(count) for label, count in card.get('slides', {}).items()},
+            margins=DomainMargins(**{name: float(value) for name, value in card.get('margins', {}).items()}),
+            **intervals,
+        )
+
+    def _deviations(self, conditions: SlideConditions) -> Iterator[str]:
+        speed, force = conditions.speed_m_s, conditions.force_n
+        if is_beyond(speed, self.speed_m_s, self.margins.speed):
+            yield f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s'
+        if is_beyond(force, self.force_n, self.margins.force):
+            yield f'force {force:.3g} N, trained {_range(self.force_n)} N'
+        if self.motions and conditions.motion and conditions.motion not in self.motions:
+            yield f"motion '{conditions.motion}', trained {_listed(self.motions)}"
+        sensor = '' if conditions.sensor.startswith(REPLAYS) else conditions.sensor
+        if self.sensors and sensor and sensor not in self.sensors:
+            yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
+        for direction in self._untrained_directions(conditions)[:1]:
+            yield f'direction {direction:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
+        for level in conditions.levels:
+            trained = self.levels.get(level.channel)
+            if is_beyond(level.rms, trained, self.margins.level):
+                yield f'signal level {level.rms:.3g} of {level.channel}, trained {_range(trained)}'
+
+    def _untrained_directions(self, conditions: SlideConditions) -> list[float]:
+        """Return the directions of a slide outside the arcs; none where directions are not compared."""
+        if not self.directions_rad or conditions.motion in TURNING_MOTIONS:
+            return []
+        return [direction for direction in conditions.directions_rad if not self._covers(direction)]
+
+    def _covers(self, direction_rad: float) -> bool:
+        margin = self.margins.direction_rad
+        return any(
+            (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin
+            for start, end in self.directions_rad
+        )
+
+
+def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[Interval, ...]:
+    if any(slide.motion in TURNING_MOTIONS for slide in slides):
+        return (FULL_CIRCLE,)
+    return covered_arcs((angle for slide in slides for angle in slide.directions_rad), 2.0 * margin_rad)
+
+
+def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
+    """Return the range of the signal level of each channel."""
+    by_channel: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+    for slide in slides:
+        for level in slide.levels:
+            by_channel[level.channel].append((level.rms, level.lowest, level.highest))
+    found = {channel: interval_of(means) for channel, means in by_channel.items()}
+    return {channel: interval for channel, interval in found.items() if interval is not None}
+
+
+def _names(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted({name for name in names if name}))
+
+
+def _pair(values: Sequence[Any]) -> Interval:
+    low, high = values
+    return float(low), float(high)
+
+
+def _range(interval: Interval | None) -> str:
+    low, high = (f'{value:.3g}' for value in interval or ())
+    return low if low == high else f'{low} to {high}'
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ', '.join(f"'{name}'" for name in names)
+
+
+# --------------------
+# Novelty detection: how rare a slide is among those of the class for which it is taken.
+
+# Lengths of evidence at which tails and thresholds are fitted, in windows that do not overlap. The start of a slide is
+# like no other part, so slides are compared by the same stretch: by all that was measured, up to the last of these.
+NOVELTY_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0)
+# Spaces in which a slide is compared with the slides of its class, and the length of its start that is compared. The
+# first windows of slides are compared by themselves, as this shows soonest that something differs.
+FEATURES, HIDDEN, ONSET = 'features', 'hidden', 'onset'
+SPACES: Mapping[str, float] = {
+    FEATURES: NOVELTY_WINDOWS[-1],
+    HIDDEN: NOVELTY_WINDOWS[-1],
+    ONSET: 1.5,
+}
+# Negative log-odds of the best to the second label, and the negative fraction of the windows that agree with the best.
+LOG_ODDS, AGREEMENT = 'log_odds', 'agreement'
+OTHER_SCORES = (LOG_ODDS, AGREEMENT)
+SCORES = (*SPACES, *OTHER_SCORES)
+TAIL_QUANTILE = 0.9
+MIN_SPREAD = 1e-6  # of a score, relative to its median: slides that are all the same
+LEAST_AGREEMENT_SPREAD = 0.1  # in most slides all windows may agree, which makes one that does not no novelty
+UNCOUNTED_SPREAD = 1e30  # of a score that is left out: its tail is zero
+
+
+@dataclass(frozen=True, eq=False)
+class NoveltyDetector:
+    """Sum of the one-sided tails of several scores, and the threshold above which the surface is unknown.
+
+    Each score is compared with those of training slides when they were held out and labelled rightly: what exceeds the
+    median counts in units of the distance from the median to the 90 % quantile, which is the negative logarithm of an
+    exponential tail but for a factor; what lies below counts nothing, so no score makes up for another. The thresholds
+    are those of split conformal prediction.
+
+    Source: Fisher 1932 for the sum of logarithms of tail probabilities; Vovk, Gammerman & Shafer 2005 for thresholds.
+
+    Parameters
+    ----------
+    distances
+        By space, in the order of the scores: mean features, mean outputs of the hidden layer if the classifier has one,
+        mean features of the onset.
+    medians, spreads : (n_levels, n_scores)
+        Of the scores of held-out slides, by the effective window count.
+    thresholds, distance_thresholds : (n_levels,)
+        Largest novelty score of known surfaces at the false rejection rate: of all scores, and of the distances alone.
+    distances_only
+        Whether the distances alone count: the other scores of an incremental classifier are of another size.
+
+    Examples
+    --------
+    >>> held_out = [np.random.default_rng(0).standard_normal((99, 3))] * len(EFFECTIVE_WINDOWS)
+    >>> detector = NoveltyDetector.fit({}, held_out, false_rejection_rate=0.1)
+    >>> scores = [detector.novelty_score(row.tolist(), 1.0) for row in held_out[0]]
+    >>> sum(score > detector.threshold(1.0) for score in scores) <= 10  # of 99
+    True
+    """
+
+    distances: Mapping[str, ClassDistance]
+    medians: Array
+    spreads: Array
+    thresholds: Array
+    distance_thresholds: Array
+    distances_only: bool = False
+
+    @classmethod
+    def fit(
+        cls,
+        distances: Mapping[str, ClassDistance],
+        held_out: Sequence[Array],
+        false_rejection_rate: float,
+        counted: Collection[str] = SCORES,
+    ) -> NoveltyDetector:
+        """Fit tails and thresholds.
+
+        Parameters
+        ----------
+        distances
+            Fitted to all slides.
+        held_out : of each of EFFECTIVE_WINDOWS (n_slides, n_scores)
+            Scores of slides when they were held out and labelled rightly.
+        false_rejection_rate
+            Fraction of the slides over known surfaces that may be taken for unknown: of new slides like those held out,
+            no more are, on average. With too few slides for the fraction, none of those held out is.
+        counted
+            Which of OTHER_SCORES count; of the spaces, those in `distances` do.
+
+        Returns
+        -------
+        NoveltyDetector
+            With a threshold for each effective window count.
+        """
+        medians = np.stack([np.median(scores, axis=0) for scores in held_out])
+        spreads = np.stack([np.quantile(scores, TAIL_QUANTILE, axis=0) for scores in held_out]) - medians
+        spreads = np.maximum(spreads, MIN_SPREAD * (1.0 + np.abs(medians)))
+        if spreads.shape[1] == len(distances) + len(OTHER_SCORES):
+            spreads[:, -1] = np.maximum(spreads[:, -1], LEAST_AGREEMENT_SPREAD)
+            spreads[:, len(distances) :][:, [name not in counted for name in OTHER_SCORES]] = UNCOUNTED_SPREAD
+        tails = [
+            np.maximum(scores - median, 0.0) / spread
+            for scores, median, spread in zip(held_out, medians, spreads, strict=True)
+        ]
+        thresholds, distance_thresholds = (
+            np.array([_conformal(tail[:, :count].sum(axis=1), false_rejection_rate) for tail in tails])
+            for count in (None, len(distances))
+        )
+        return cls(distances, medians, spreads, thresholds, distance_thresholds)
+
+    @cached_property
+    def _levels(self) -> list[tuple[float, ...]]:
+        """By level, one number after the other: threshold, then medians, then spreads of the scores that count."""
+        count = len(self.distances) if self.distances_only else self.medians.shape[1]
+        thresholds = self.distance_thresholds if self.distances_only else self.thresholds
+        table = np.column_stack([thresholds, self.medians[:, :count], self.spreads[:, :count]])
+        return [tuple(row) for row in table.tolist()]
+
+    def novelty_score(self, scores: Sequence[float], effective_windows: float) -> float:
+        """Return the novelty score from the scores of a slide after this effective window count."""
+        return self.score_and_threshold(scores, effective_windows)[0]
+
+    def threshold(self, effective_windows: float) -> float:
+        """Return the largest novelty score of a known surface after this effective window count."""
+        return self._row(effective_windows)[0]
+
+    def score_and_threshold(self, scores: Sequence[float], effective_windows: float) -> tuple[float, float]:
+        """Return the novelty score, and the largest one of a known surface.
+
+        Parameters
+        ----------
+        scores
+            Of a slide, as `SlideNovelty.scores` returns them.
+        effective_windows
+            Effective window count of the slide.
+
+        Returns
+        -------
+        float
+            Sum of the tails.
+        float
+            Threshold.
+        """
+        row = self._row(effective_windows)
+        count = len(row) // 2
+        tails = zip(scores, row[1 : 1 + count], row[1 + count :], strict=False)
+        return sum((score - median) / spread for score, median, spread in tails if score > median), row[0]
+
+    def _row(self, effective_windows: float) -> list[float]:
+        """Return the row of `_levels`, linear between two levels."""
+        after = bisect_right(NOVELTY_WINDOWS, effective_windows)
+        if after == 0 or after == len(NOVELTY_WINDOWS):
+            return list(self._levels[max(after - 1, 0)])
+        low, high = NOVELTY_WINDOWS[after - 1], NOVELTY_WINDOWS[after]
+        share = (effective_windows - low) / (high - low)
+        pairs = zip(self._levels[after - 1], self._levels[after], strict=True)
+        return [first + share * (second - first) for first, second in pairs]
+
+    def with_slides(self, slides: Sequence[Mapping[str, Array]], classes: Codes) -> NoveltyDetector:
+        """Return the detector of an incremental classifier, with added slides.
+
+        Parameters
+        ----------
+        slides
+            Mean of each slide by space, as `space_means` returns it.
+        classes : (n_slides,)
+            Number of the label of each.
+        """
+        distances = {
+            space: distance.with_slides(np.stack([means[space] for means in slides]), classes)
+            for space, distance in self.distances.items()
+        }
+        return replace(self, distances=distances, distances_only=True)
+
+    def as_arrays(self) -> dict[str, AnyArray]:
+        """Return the arrays for the model file.
+
+        Returns
+        -------
+        dict
+            Name of each field, and its array.
+        """
+        numbers = {name: getattr(self, name) for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')}
+        spaces = {
+            f'{space}/{name}': array
+            for space, distance in self.distances.items()
+            for name, array in distance.as_arrays().items()
+        }
+        return {**numbers, **spaces}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> NoveltyDetector:
+        """Return what `as_arrays` gave."""
+        distances = {
+            space: ClassDistance.from_arrays(
+                {
+                    name.removeprefix(f'{space}/'): array
+                    for name, array in arrays.items()
+                    if name.startswith(f'{space}/')
+                }
+            )
+            for space in SPACES
+            if f'{space}/projection' in arrays
+        }
+        medians, spreads, thresholds, distance_thresholds = (
+            np.asarray(arrays[name], dtype=np.float64)
+            for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')
+        )
+        return cls(distances, medians, spreads, thresholds, distance_thresholds)
+
+
+class SlideNovelty:
+    """Accumulate what the scores of one slide depend on, window by window.
+
+    Parameters
+    ----------
+    distances
+        By space, as in `NoveltyDetector`.
+    n_labels
+        Number of labels of the classifier.
+
+    Examples
+    --------
+    >>> classes = np.repeat([0, 1], 10)
+    >>> means = 5.0 * classes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((20, 2))
+    >>> distances = {'features': ClassDistance.fit(means, classes)}
+    >>> novelty = SlideNovelty(distances, n_labels=2)
+    >>> novelty.add(np.array([5.0, 5.0]), None, label=1, effective_windows=1.0)
+    >>> own, other = novelty.scores(1, log_odds=1.0), novelty.scores(0, log_odds=1.0)
+    >>> len(own) == len(other)
+    True
+    """
+
+    def __init__(self, distances: Mapping[str, ClassDistance], n_labels: int) -> None:
+        self._distances = distances
+        self._sums: dict[str, Array] = {}
+        self._counts = dict.fromkeys(distances, 0)
+        self._votes = [0] * n_labels
+        self._windows = 0
+        # Sums stop changing after a few windows, that of the onset first, and the label rarely changes.
+        self._found: dict[str, dict[int, float]] = {space: {} for space in distances}
+
+    def add(self, values: Array, hidden: Array | None, label: int, effective_windows: float) -> None:
+        """Add a window.
+
+        Parameters
+        ----------
+        values : (n_features,)
+        hidden : (n_hidden,) or None
+            Outputs of the hidden layer.
+        label
+            Number of the best label of this window alone.
+        effective_windows
+            Effective window count including this window.
+        """
+        self._windows += 1
+        self._votes[label] += 1
+        if effective_windows > NOVELTY_WINDOWS[-1] + 1e-9 and self._sums:
+            return
+        for space in self._distances:
+            if effective_windows > SPACES[space] + 1e-9 and self._counts[space]:
+                continue
+            own = hidden if space == HIDDEN and hidden is not None else values
+            self._sums[space] = self._sums[space] + own if self._counts[space] else own
+            self._counts[space] += 1
+            self._found[space].clear()
+
+    def scores(self, label: int, log_odds: float) -> list[float]:
+        """Return the scores for a label: distances, then `OTHER_SCORES`; larger ones are rarer.
+
+        Parameters
+        ----------
+        label
+            Number of the best label of the slide.
+        log_odds
+            Mean evidence of it less that of the second best label.
+        """
+        distances = [self._distance(space, label) for space in self._distances]
+        return [*distances, -log_odds, -self._votes[label] / self._windows]
+
+    def _distance(self, space: str, label: int) -> float:
+        found = self._found[space]
+        if label not in found:
+            found[label] = self._distances[space].score(self._sums[space] / self._counts[space], label)
+        return found[label]
+
+
+def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str, Array]:
+    """Return the mean of the windows of a slide in each space.
+
+    Parameters
+    ----------
+    values : (n_windows, n_features)
+        In temporal order.
+    hidden : (n_windows, n_hidden) or None
+        Outputs of the hidden layer.
+    overlap
+        Distance of two windows over their length, at most 1.
+
+    Returns
+    -------
+    dict
+        Mean vector of each space, by its name.
+    """
+    by_space = {FEATURES: values, HIDDEN: hidden, ONSET: values}
+    return {
+        space: own[: window_count(SPACES[space], overlap)].mean(axis=0)
+        for space, own in by_space.items()
+        if own is not None
+    }
+
+
+def window_count(effective_windows: float, overlap: float) -> int:
+    """Return how many windows count as so many that do not overlap."""
+    return 1 + round((effective_windows - 1.0) / overlap)
+
+
+def _conformal(novelty_scores: Array, false_rejection_rate: float) -> float:
+    rank = max(1, int((len(novelty_scores) + 1) * false_rejection_rate))
+    return float(np.sort(novelty_scores)[-rank])
+
+
+# --------------------
+# Conformal prediction sets: the smallest sets of textures with a given coverage.
+
+ROUNDING = 1e-9
+SETS_WINDOWS = (
+    1.0,
+    2.0,
+    4.0,
+    8.0,
+)  # lengths of evidence at which it is fitted, in windows that do not overlap
+
+
+@dataclass(frozen=True)
+class PredictionSets:
+    """Split conformal prediction: textures at least as probable as the true one is in all but a few held-out slides.
+
+    The coverage holds on average over slides like those held out; not for each texture, and not for a later day.
+
+    Source: Vovk, Gammerman & Shafer 2005; Angelopoulos & Bates 2021, section 1.
+
+    Parameters
+    ----------
+    coverage
+        Share of slides whose texture is to be in the set.
+    effective_window_counts, thresholds
+        Effective window count, and the smallest probability of a texture in the set; empty if the held-out slides were
+        too few for the coverage.
+
+    Examples
+    --------
+    >>> sets = PredictionSets(0.9, effective_window_counts=(1.0,), thresholds=(0.15,))
+    >>> sets.members(np.array([0.2, 0.7, 0.1]), effective_windows=1.0)
+    [1, 0]
+    """
+
+    coverage: float = 0.95
+    effective_window_counts: tuple[float, ...] = ()
+    thresholds: tuple[float, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why there are no sets, in one sentence; '' if there are."""
+        if self.thresholds:
+            return ''
+        return (
+            f'too few slides for a prediction set: a coverage of {100 * self.coverage:g} % needs '
+            f'{slides_needed(self.coverage)} slides or more to be held out of the training'
+        )
+
+    def members(self, probabilities: Array, effective_windows: float) -> list[int]:
+        """Return the numbers of the textures in the set, the most probable first; none only for a `reason`.
+
+        Parameters
+        ----------
+        probabilities : (n_labels,)
+            Of each texture after the slide.
+        effective_windows
+            Effective window count of the slide.
+        """
+        if not self.thresholds:
+            return []
+        thresholds = min(
+            float(np.interp(effective_windows, self.effective_window_counts, self.thresholds)),
+            float(probabilities.max()),
+        )
+        order = np.argsort(-probabilities, kind='stable')
+        return [int(number) for number in order if probabilities[number] >= thresholds]
+
+
+def fit_prediction_sets(
+    posteriors: Sequence[Array], truths: Sequence[int], effective_window_counts: Sequence[Array], coverage: float
+) -> PredictionSets:
+    """Return the sets for a coverage from slides held out of the training.
+
+    With too few slides for the coverage every texture would be in each set: there are none then.
+
+    Parameters
+    ----------
+    posteriors : of each slide (n_windows, n_labels)
+        Log-probabilities after each window.
+    truths
+        Number of the true texture of each slide.
+    effective_window_counts : of each slide (n_windows,)
+        Length of the evidence after each window.
+    coverage
+        Share of slides whose texture is to be in the set.
+
+    Returns
+    -------
+    PredictionSets
+        With a threshold, or with the reason why there is none.
+    """
+    thresholds = []
+    rank = _rank(len(truths), coverage)
+    if not rank:
+        return PredictionSets(coverage)
+    for effective_windows in SETS_WINDOWS:
+        places = [int(np.abs(own - effective_windows).argmin()) for own in effective_window_counts]
+        true = np.sort([np.exp(p[place, truth]) for p, place, truth in zip(posteriors, places, truths, strict=True)])
+        thresholds.append(float(true[rank - 1]))
+    return PredictionSets(coverage, SETS_WINDOWS, tuple(thresholds))
+
+
+def slides_needed(coverage: float) -> int:
+    """Return the smallest number of held-out slides from which sets of this coverage can be fitted."""
+    number = max(1, round(1.0 / (1.0 - coverage)) - 1)
+    return number if _rank(number, coverage) else number + 1
+
+
+def _rank(slides: int, coverage: float) -> int:
+    """Return how many of the slides held out may lie below the threshold for the coverage to be exact."""
+    return math.floor((slides + 1) * (1.0 - coverage) + ROUNDING)
+
+
+# --------------------
+# Early stopping of a slide by a rule fitted on held-out slides.
+
+Mask = NDArray[np.bool_]
+# Rules tried: end at this confidence and novelty score, or after so much sliding whatever they are. Without a novelty
+# detector the novelty score is 0. In windows that do not overlap.
+CONFIDENCES = 1.0 - np.geomspace(0.5, 1e-4, 50)
+MAX_WINDOWS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
+NEVER = 1e6
+# Smaller ones make later slides of a session, which drift, wait for long (trained on slides 1-20, tested on 21-30).
+NOVELTY_SCORES = (NEVER, 9.0, 6.0)
+# The limit for the start of a slide grows by this factor with each effective window: a limit that ends at one moment
+# lets many slides end right after it. Chosen among 3, 4, 5, 6 and 8 on slides 21-30, trained on 1-20.
+EARLY_GROWTH = 6.0
+MAX_EARLY_WINDOWS = 20.0  # beyond, the limit grows no more, so that it stays a number
+
+
+@dataclass(frozen=True)
+class StoppingRule:
+    """Truncated sequential test: stop at a confidence threshold, or after a number of effective windows.
+
+    Source: Wald 1945 for a decision at a threshold of the evidence; the end after some time, as with one window in a
+    hundred that would go on for ever, is fitted with the threshold.
+
+    Parameters
+    ----------
+    confidence
+        Decision threshold on the probability of the best label.
+    max_windows
+        Effective window count at which a slide is stopped whatever the confidence.
+    novelty_score
+        Largest novelty score at which a slide is stopped.
+    early_novelty_score
+        Largest one after the first window, if it is smaller, and EARLY_GROWTH times as much after each further
+        effective window: little evidence shows little of what is novel.
+
+    Examples
+    --------
+    >>> rule = StoppingRule(confidence=0.95, max_windows=10.0)
+    >>> rule.certain(0.9, 2.0), rule.certain(0.96, 2.0), rule.certain(0.5, 10.0)
+    (False, True, True)
+    """
+
+    confidence: float = 0.95
+    max_windows: float = NEVER
+    novelty_score: float = NEVER
+    early_novelty_score: float = NEVER
+
+    def certain(self, confidence: float, effective_windows: float, novelty_score: float = 0.0) -> bool:
+        """Return whether the slide may end.
+
+        Parameters
+        ----------
+        confidence
+            Probability of the best label, 0 to 1.
+        effective_windows
+            Effective window count so far.
+        novelty_score
+            Novelty score so far.
+
+        Returns
+        -------
+        bool
+        """
+        growing = EARLY_GROWTH ** (min(effective_windows, MAX_EARLY_WINDOWS) - 1.0)
+        limit = min(self.novelty_score, self.early_novelty_score * growing)
+        confident = confidence >= self.confidence and novelty_score <= limit
+        return confident or effective_windows >= self.max_windows
+
+
+@dataclass(frozen=True, eq=False)
+class SlideCourse:
+    """What was said of one held-out slide after each window.
+
+    Parameters
+    ----------
+    confidences : (n_windows,)
+        Of the best label.
+    right : (n_windows,)
+        Whether it is the true one.
+    effective_windows : (n_windows,)
+        Length of the evidence.
+    known : (n_windows,)
+        Whether the surface was taken for known; all without a novelty detector.
+    novelty_scores : (n_windows,)
+        0 without a novelty detector.
+    disturbance
+        Kind of the disturbance; '' for none.
+
+    Examples
+    --------
+    >>> right = np.array([False, True])
+    >>> course = SlideCourse(np.array([0.6, 0.99]), right, np.array([1.0, 1.2]), np.array([True, True]), np.zeros(2))
+    >>> fit_open_set_rule([course] * 30, wrong=0.02, wrong_disturbed=0.02).certain(0.99, 1.2)
+    True
+    """
+
+    confidences: Array
+    right: Mask
+    effective_windows: Array
+    known: Mask
+    novelty_scores: Array
+    disturbance: str = ''
+
+
+def fit_stopping_rule(
+    confidences: Sequence[Array], right: Sequence[Mask], effective_window_counts: Sequence[Array], wrong: float
+) -> StoppingRule:
+    """Return the rule with the shortest mean slide whose error rate is at most `wrong`.
+
+    If no rule reaches the error rate, the one with the lowest error rate is returned.
+
+    Parameters
+    ----------
+    confidences, right, effective_window_counts : of each slide (n_windows,)
+        After each window: confidence of the best label, whether it is the true one, length of the evidence.
+    wrong
+        Share of the slides that may be decided wrongly.
+
+    Returns
+    -------
+    StoppingRule
+    """
+    tried = [StoppingRule(confidence, longest) for confidence, longest in product(CONFIDENCES.tolist(), MAX_WINDOWS)]
+    outcomes = _outcomes(tried, confidences, right, effective_window_counts)
+    least = max(wrong, min(errors for errors, _ in outcomes))
+    good = [(mean, number) for number, (errors, mean) in enumerate(outcomes) if errors <= least]
+    return tried[min(good)[1]]
+
+
+def fit_open_set_rule(
+    courses: Sequence[SlideCourse], wrong: float, wrong_disturbed: float, early_novelty_score: float = NEVER
+) -> StoppingRule:
+    """Return the rule with the shortest mean undisturbed slide that rarely stops a slide with a wrong label.
+
+    A slide is stopped only while its surface is taken for known. Errors under disturbances are counted over all kinds
+    together: of each kind alone there are so few that the worst one would decide by chance. If no rule reaches the
+    error rates, the one that exceeds them least is returned.
+
+    Parameters
+    ----------
+    courses
+        Of undisturbed slides and of disturbed copies.
+    wrong
+        Share of the undisturbed slides that may be stopped with a wrong label.
+    wrong_disturbed
+        The same of the disturbed copies.
+    early_novelty_score
+        Of the rule, as it is.
+
+    Returns
+    -------
+    StoppingRule
+    """
+    table = _CourseTable(courses, early_novelty_score)
+    best, rule = (np.inf, np.inf), StoppingRule()
+    for confidence, novelty_score in product(CONFIDENCES.tolist(), NOVELTY_SCORES):
+        errors, disturbed_errors, windows = table.outcome(confidence, novelty_score)
+        excess = max(0.0, errors - wrong) + max(0.0, disturbed_errors - wrong_disturbed)
+        if (excess, windows) < best:
+            best, rule = (excess, windows), StoppingRule(confidence, NEVER, novelty_score, early_novelty_score)
+    return rule
+
+
+class _CourseTable:
+    """Courses as arrays (n_slides, n_windows), the shorter ones filled with what never stops a slide."""
+
+    def __init__(self, courses: Sequence[SlideCourse], early_novelty_score: float) -> None:
+        self._novelty = _filled([course.novelty_scores for course in courses], np.inf)
+        self._windows = _filled([course.effective_windows for course in courses], np.nan)
+        known = _filled([course.known for course in courses], 0.0) > 0.0
+        growing = EARLY_GROWTH ** (np.fmin(self._windows, MAX_EARLY_WINDOWS) - 1.0)
+        known &= self._novelty <= early_novelty_score * growing
+        self._confidences = np.where(known, _filled([course.confidences for course in courses], -1.0), -1.0)
+        self._wrong = _filled([~course.right for course in courses], 0.0) > 0.0
+        self._whole = np.array([course.effective_windows[-1] for course in courses])
+        self._undisturbed = np.array([not course.disturbance for course in courses])
+
+    def outcome(self, confidence: float, novelty_score: float) -> tuple[float, float, float]:
+        """Return the share of slides stopped with a wrong label, undisturbed and disturbed, and the mean evidence.
+
+        The evidence is that of undisturbed slides, in effective windows; without disturbed ones, none of them is wrong.
+        """
+        stops = (self._confidences >= confidence) & (self._novelty <= novelty_score)
+        places, stopped = stops.argmax(axis=1), stops.any(axis=1)
+        rows = np.arange(len(places))
+        wrong = stopped & self._wrong[rows, places]
+        taken = np.where(stopped, self._windows[rows, places], self._whole)
+        undisturbed = self._undisturbed
+        disturbed = wrong[~undisturbed]
+        disturbed_errors = float(disturbed.mean()) if len(disturbed) else 0.0
+        return float(wrong[undisturbed].mean()), disturbed_errors, float(taken[undisturbed].mean())
+
+
+def _outcomes(
+    rules: Sequence[StoppingRule],
+    confidences: Sequence[Array],
+    right: Sequence[Mask],
+    effective_window_counts: Sequence[Array],
+) -> list[tuple[float, float]]:
+    """Return of each rule the share of wrong decisions, and the mean length of the evidence they took."""
+    windows, confident = _filled(effective_window_counts, -np.inf), _filled(confidences, -np.inf)
+    wrong = _filled([~correct for correct in right], 0.0) > 0.0
+    rows, last = np.arange(len(right)), np.array([len(correct) - 1 for correct in right])
+
+    def outcome(rule: StoppingRule) -> tuple[float, float]:
+        over = (confident >= rule.confidence) | (windows >= rule.max_windows)
+        places = np.where(over.any(axis=1), over.argmax(axis=1), last)
+        return float(wrong[rows, places].mean()), float(windows[rows, places].mean())
+
+    return [outcome(rule) for rule in rules]
+
+
+def _filled(rows: Sequence[Array | Mask], value: float) -> Array:
+    """Return the rows as an array (n_rows, longest), the shorter ones filled with a value."""
+    table = np.full((len(rows), max(len(row) for row in rows)), value)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table

@@ -1,0 +1,318 @@
+"""Rules that combine the window predictions of one slide."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.types import Array
+from texture_estimation.numerics import log_softmax, softmax
+
+# A label without a single vote keeps so much, so that its logarithm is finite.
+MIN_SHARE = 1e-6
+ROUNDING = 1e-9
+# Effective windows from which a slide counts as late. The novelty of a slide rests on as many, and slides that drift
+# begin to look like other textures after them.
+FULL_WINDOWS = 5.0
+
+
+class EvidenceRule(Protocol):
+    """Frozen parameters of a rule.
+
+    Where several labels share the highest log-probability nothing is decided: the surface is unclassified.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def group(self) -> int:
+        """How many consecutive windows decide together, the newest complete group for the slide; 0: all windows."""
+
+    def window_evidence(self, log_probabilities: Array) -> Array:
+        """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean.
+
+        Parameters
+        ----------
+        log_probabilities : (..., n_labels)
+            As the predictor gives them.
+
+        Returns
+        -------
+        (..., n_labels)
+            What is averaged over the windows.
+        """
+
+    def window_weights(self, effective_windows: float | Array) -> Array:
+        """Return the weight of windows in the mean evidence.
+
+        Parameters
+        ----------
+        effective_windows : (n_windows,) or a number
+            Effective window count including each window.
+
+        Returns
+        -------
+        (n_windows,) or a number
+            1 for a window that counts fully.
+        """
+
+    def window_weight(self, effective_windows: float) -> float:
+        """Return the weight of one window, as `window_weights` does; without an array it costs a tenth."""
+
+    def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
+        """Return the log-probability of each texture given all windows so far, (..., n_labels).
+
+        Parameters
+        ----------
+        mean_evidence : (..., n_labels)
+        effective_windows : (..., 1) or a number
+            Effective window count: sliding time over the length of a window.
+        tempering_exponent
+            Exponent of the effective window count, 0 to 1, fitted on held-out slides.
+
+        Returns
+        -------
+        (..., n_labels)
+            Logarithms of probabilities that add up to 1.
+        """
+
+    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
+        """Return the probabilities of which `log_posterior` gives the logarithms; it costs half of that.
+
+        Parameters
+        ----------
+        mean_evidence : (..., n_labels)
+            Mean of the evidence of the windows.
+        effective_windows
+            Effective window count: sliding time over the length of a window.
+        tempering_exponent
+            Exponent of the effective window count, 0 to 1.
+
+        Returns
+        -------
+        (..., n_labels)
+            Probabilities that add up to 1.
+        """
+
+
+@dataclass(frozen=True)
+class SoftVote:
+    """Mean log-probability of the windows, times their tempered effective number.
+
+    Independent windows would count as their number n. Windows of one slide share force, place and contact, and count
+    as n^tempering_exponent; the exponent is fitted on held-out slides.
+
+    Examples
+    --------
+    >>> mean = np.log(np.array([0.8, 0.2]))
+    >>> SoftVote().posterior(mean, effective_windows=2.0, tempering_exponent=1.0).round(3).tolist()  # 0.8² : 0.2²
+    [0.941, 0.059]
+    """
+
+    late_weight: float = param(
+        1.0,
+        'Sets the weight of windows later than five that do not overlap, relative to those before; with a smaller one, '
+        'drift within a long slide changes its label less, and what shows late in a slide counts less.',
+        low=0.0,
+        high=1.0,
+    )
+    group: ClassVar[int] = 0
+
+    def window_evidence(self, log_probabilities: Array) -> Array:
+        """Return the log-probabilities as they are."""
+        return log_probabilities
+
+    def window_weights(self, effective_windows: float | Array) -> Array:
+        """Return 1 for the first FULL_WINDOWS effective windows, and `late_weight` for those after them."""
+        return np.where(np.asarray(effective_windows) > FULL_WINDOWS + ROUNDING, self.late_weight, 1.0)
+
+    def window_weight(self, effective_windows: float) -> float:
+        """Return 1 for one of the first FULL_WINDOWS effective windows, and `late_weight` for one after them."""
+        return self.late_weight if effective_windows > FULL_WINDOWS + ROUNDING else 1.0
+
+    def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
+        """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""
+        return log_softmax(mean_evidence * effective_windows**tempering_exponent)
+
+    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
+        """Return softmax(n^tempering_exponent · mean log p)."""
+        return softmax(mean_evidence * effective_windows**tempering_exponent)
+
+
+@dataclass(frozen=True)
+class MajorityVote:
+    """Each window votes for its best label; one that is undecided for none. Too few equal votes: unclassified.
+
+    Windows vote in groups: with five windows of 0.1 s a decision rests on 0.5 s, however long the slide is. The newest
+    complete group decides, the first one while it grows.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section IV.B: a scan of 500 ms is cut
+    into five parts, and the answer that at least three of them give is the answer.
+
+    Examples
+    --------
+    >>> rule = MajorityVote(share=0.6, windows=5)
+    >>> votes = rule.window_evidence(np.log(np.array([[0.9, 0.1], [0.8, 0.2], [0.7, 0.3], [0.2, 0.8]])))
+    >>> rule.posterior(votes.mean(axis=0), effective_windows=4.0, tempering_exponent=1.0).round(2).tolist()
+    [0.75, 0.25]
+    """
+
+    share: float = param(
+        0.6,
+        'Sets the fraction of the votes that a label needs; a larger fraction leaves more slides undecided,'
+        ' 0 takes the label with the most votes.',
+        low=0.0,
+        high=1.0,
+    )
+    windows: int = param(
+        5,
+        'Sets how many consecutive windows vote together; more decide later and more safely, 0 lets all windows of the '
+        'slide vote.',
+        low=0,
+        high=10_000,
+    )
+
+    @property
+    def group(self) -> int:
+        """How many consecutive windows vote together."""
+        return self.windows
+
+    def window_evidence(self, log_probabilities: Array) -> Array:
+        """Return 1 for the best label and 0 for the others; 0 for all if several are best."""
+        best = log_probabilities == np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
+        alone = np.count_nonzero(best, axis=-1, keepdims=True) == 1
+        votes: Array = (best & alone).astype(np.float64)
+        return votes
+
+    def window_weights(self, effective_windows: float | Array) -> Array:
+        """Return 1 for each window: votes are counted."""
+        return np.ones(np.shape(effective_windows))
+
+    def window_weight(self, effective_windows: float) -> float:
+        """Return 1: votes are counted."""
+        return 1.0
+
+    def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
+        """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.
+
+        What did not vote is shared out equally. `tempering_exponent` does not matter: votes are counted.
+        """
+        n_labels = mean_evidence.shape[-1]
+        most = np.maximum.reduce(mean_evidence, axis=-1, keepdims=True) * effective_windows
+        won = most >= self.share * np.maximum(effective_windows, self.windows) - ROUNDING
+        abstained = 1.0 - np.add.reduce(mean_evidence, axis=-1, keepdims=True)
+        shares = np.maximum(mean_evidence + abstained / n_labels, MIN_SHARE)
+        return log_softmax(np.where(won, np.log(shares), 0.0))
+
+    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
+        """Return the shares of the votes; equal ones for all labels where the majority is lacking."""
+        probabilities: Array = np.exp(self.log_posterior(mean_evidence, effective_windows, tempering_exponent))
+        return probabilities
+
+
+class GroupedEvidence:
+    """Sum of the evidence of windows: of all so far, or of the newest complete group.
+
+    While the first group grows, it counts as it is.
+
+    Parameters
+    ----------
+    n_labels
+        Length of the evidence of a window.
+    group
+        Windows of a group; 0 sums over all.
+
+    Examples
+    --------
+    >>> grouped = GroupedEvidence(n_labels=2, group=2)
+    >>> for vote in ([1.0, 0.0], [1.0, 0.0], [0.0, 1.0]):
+    ...     grouped.add(np.array(vote), new_s=0.1)
+    >>> grouped.mean.tolist(), grouped.time_s  # the second group is not complete yet
+    ([1.0, 0.0], 0.2)
+    """
+
+    def __init__(self, n_labels: int, group: int = 0) -> None:
+        self._group = group
+        self._newest = self._decides = _Sum(np.zeros(n_labels))
+
+    def add(self, evidence: Array, new_s: float, weight: float = 1.0) -> None:
+        """Add the evidence of a window, (n_labels,), which adds so much new sliding time.
+
+        Parameters
+        ----------
+        evidence : (n_labels,)
+            Evidence of the window.
+        new_s
+            Sliding time that no window before it covers.
+        weight
+            Weight of the window in the mean, above 0 for the first one.
+        """
+        if self._group and self._newest.count == self._group:
+            self._newest = _Sum(np.zeros(len(evidence)))
+        self._newest.evidence += evidence if weight == 1.0 else weight * evidence
+        self._newest.weight += weight
+        self._newest.count += 1
+        self._newest.time_s += new_s
+        if not self._group or self._newest.count == self._group:
+            self._decides = self._newest
+
+    @property
+    def mean(self) -> Array:
+        """Weighted mean evidence of the windows that decide, (n_labels,)."""
+        return self._decides.evidence / self._decides.weight
+
+    @property
+    def time_s(self) -> float:
+        """Sliding time of the windows that decide."""
+        return self._decides.time_s
+
+
+@dataclass
+class _Sum:
+    evidence: Array
+    count: int = 0
+    weight: float = 0.0
+    time_s: float = 0.0
+
+
+def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array) -> Array:
+    """Return the weighted mean evidence of a slide after each window, where all windows decide together.
+
+    Parameters
+    ----------
+    rule
+        Weighs the windows.
+    evidence : (n_windows, n_labels)
+        Of each window.
+    effective_windows : (n_windows,)
+        Effective window count including each window.
+
+    Returns
+    -------
+    (n_windows, n_labels)
+        Mean of the evidence up to each window.
+
+    Examples
+    --------
+    >>> running_means(SoftVote(), np.array([[0.0], [1.0]]), np.array([1.0, 2.0])).tolist()
+    [[0.0], [0.5]]
+    """
+    weights = rule.window_weights(effective_windows)[:, None]
+    means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
+    return means
+
+
+def deciding_rows(count: int, group: int) -> slice:
+    """Return which of so many windows of a slide decide: the newest complete group, or all before the first is."""
+    complete = count // group if group else 0
+    return slice(group * (complete - 1), group * complete) if complete else slice(0, count)
+
+
+EVIDENCE_RULES: Mapping[str, type[EvidenceRule]] = {
+    'soft_vote': SoftVote,
+    'majority_vote': MajorityVote,  # Roberge et al.
+}

@@ -1,0 +1,513 @@
+"""Class-conditional Gaussians with shrunken covariances, and what they are fitted to."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.types import AnyArray, Array
+from texture_estimation.decisions import window_count
+from texture_estimation.learners.learner import Codes
+from texture_estimation.numerics import group_means, log_softmax
+
+# --------------------
+# Gaussian classes with one covariance, to which classes of a few samples can be added.
+
+# Chosen on slides 21-30 of recorded materials, five of twenty added to a model of slides 1-20 of the others.
+PRIOR_SAMPLES = 30.0  # the covariance is drawn to its diagonal as by so many further samples
+MIN_VARIANCE = 0.01  # within classes, in that of all samples: few samples may agree by chance
+MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides tell it
+CONSTANT = 1e-12  # deviation of a feature that is taken for constant, relative to its largest value
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianClasses:
+    """Gaussians with the covariance within the trained classes, wider for a class of which few slides are known.
+
+    The mean of n slides is uncertain: about it, a further slide has the variance of 1 + 1/n slides.
+
+    Parameters
+    ----------
+    centre : (n_features,)
+        Mean of the trained classes.
+    projection : (n_features, n_features) or (n_features,)
+        Makes the covariance within the trained classes the identity; a vector holds the diagonal of a diagonal one.
+    means : (n_classes, n_features)
+        Of the classes, less the centre, projected.
+    slides : (n_classes,)
+        Number of slides of each class.
+    uncertainty_exponent
+        Of 1 + 1/n in the variance of a class of n slides; 1 would suit slides that do not drift, 0 widens no class.
+    inverse_temperature
+        Of the log-densities: features are no Gaussians, and sessions drift.
+
+    Examples
+    --------
+    >>> samples = np.array([[-1.0], [1.0], [9.0], [11.0]])
+    >>> classes = GaussianClasses.fit(samples, np.array([0, 0, 1, 1]), np.array([2, 2]))
+    >>> with_third = classes.with_classes(np.array([[20.0]]), np.array([1]))
+    >>> with_third.log_probabilities(np.array([[0.0], [9.0], [20.0]])).argmax(axis=1).tolist()
+    [0, 1, 2]
+    """
+
+    centre: Array
+    projection: Array
+    means: Array
+    slides: Codes
+    uncertainty_exponent: float = 0.6
+    inverse_temperature: float = 0.2
+
+    @classmethod
+    def fit(cls, samples: Array, classes: Codes, slides: Codes) -> GaussianClasses:
+        """Return the Gaussians of labelled samples.
+
+        Parameters
+        ----------
+        samples : (n_samples, n_features)
+            Such as the mean features of slides.
+        classes : (n_samples,)
+            Number of the class of each, from 0, without gaps.
+        slides : (n_classes,)
+            Number of slides of each class.
+
+        Returns
+        -------
+        GaussianClasses
+            More than `MAX_CORRELATED` features are taken for uncorrelated.
+        """
+        means = group_means(samples, classes)
+        deviations = samples - means[classes]
+        freedom = len(samples) - len(means)
+        scale = _scale(samples, deviations, freedom)
+        centre = means.mean(axis=0)
+        projection = _projection(deviations / scale, freedom, scale)
+        return cls(centre, projection, _projected(means - centre, projection), slides)
+
+    def with_classes(self, means: Array, slides: Codes) -> GaussianClasses:
+        """Return the Gaussians with further classes, given by their means and numbers of slides.
+
+        Parameters
+        ----------
+        means : (n_further, n_features)
+        slides : (n_further,)
+        """
+        further = _projected(means - self.centre, self.projection)
+        return replace(self, means=np.concatenate([self.means, further]), slides=np.concatenate([self.slides, slides]))
+
+    def log_probabilities(self, samples: Array) -> Array:
+        """Return the log-probability of each class.
+
+        Parameters
+        ----------
+        samples : (..., n_features)
+
+        Returns
+        -------
+        (..., n_classes)
+        """
+        projected = _projected(samples - self.centre, self.projection)
+        squares = np.add.reduce(projected * projected, axis=-1, keepdims=True)
+        distances = squares - 2.0 * (projected @ self.means.T) + np.add.reduce(self.means * self.means, axis=1)
+        variances = (1.0 + 1.0 / self.slides) ** self.uncertainty_exponent
+        return log_softmax(-0.5 * self.inverse_temperature * distances / variances)
+
+
+def _scale(samples: Array, deviations: Array, freedom: int) -> Array:
+    """Return the standard deviation of each feature within classes; infinite for one that is constant."""
+    overall = samples.var(axis=0)
+    constant = np.sqrt(overall) <= CONSTANT * np.abs(samples).max(axis=0)
+    within = np.square(deviations).sum(axis=0) / max(freedom, 1)
+    scale: Array = np.sqrt(np.where(constant, np.inf, np.maximum(within, MIN_VARIANCE * overall)))
+    return scale
+
+
+def _projection(deviations: Array, freedom: int, scale: Array) -> Array:
+    """Return what makes the covariance of these scaled deviations within classes the identity."""
+    from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
+    if deviations.shape[1] > MAX_CORRELATED:
+        diagonal: Array = 1.0 / scale
+        return diagonal
+    covariance = freedom / (freedom + PRIOR_SAMPLES) * (deviations.T @ deviations) / max(freedom, 1)
+    np.fill_diagonal(covariance, 1.0)
+    variances, directions = eigh(covariance)
+    full: Array = directions / np.sqrt(variances) / scale[:, None]
+    return full
+
+
+def _projected(samples: Array, projection: Array) -> Array:
+    projected: Array = samples * projection if projection.ndim == 1 else samples @ projection
+    return projected
+
+
+# --------------------
+# Gaussians of whole slides: what tells added textures from the trained ones and from each other.
+
+# Lengths of the start of a slide that have Gaussians of their own, in windows that do not overlap: the start of a
+# slide is like no other part of it.
+LENGTHS = (1.0, 2.0, 3.0, 5.0, 9.0)
+WHOLE = 0.9  # of the typical length of the trained slides: from here on a slide is compared with whole ones
+# Chosen as the constants of the Gaussians. Short starts of slides decide little, and should not go to a new texture.
+SHORT_EXPONENT = 0.4
+WINDOW_EXPONENT, WINDOW_INVERSE_TEMPERATURE = 0.0, 0.5
+SPREAD_LENGTH = 9.0  # from here on, the logarithm of the deviation of the windows helps; of fewer windows it is noise
+SPREAD_FLOOR = 0.01  # of the mean variance of the windows within a slide, added to each: slides that are constant
+
+
+@dataclass(frozen=True, eq=False)
+class SlideGaussians:
+    """Share of each texture in a slide, by the mean and the deviation of its features so far.
+
+    The first classes are the trained textures. The further ones are the textures of the added slides, which may include
+    trained ones: slides that were added to a trained texture are a class of their own.
+
+    Parameters
+    ----------
+    windows
+        Gaussians of single windows, wherever they lie in a slide.
+    lengths
+        Lengths of slides that have Gaussians, in effective windows, rising.
+    starts
+        Gaussians of slides of each length; those of the last length are of whole slides.
+    spread_floor : (n_features,)
+        Added to the variance within a slide.
+    n_trained
+        Number of trained textures.
+    added : (n_added,)
+        Number of the label of each further class.
+
+    Examples
+    --------
+    >>> values = np.array([0.0, 0.2, 0.1, 0.3, 5.0, 5.2, 5.1, 5.3])[:, None]
+    >>> classes, slides = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
+    >>> gaussians = SlideGaussians.fit(values, classes, slides, overlap=1.0)
+    >>> three = gaussians.with_added([np.array([[9.0], [9.2]])], np.array([2]))
+    >>> three.combined(np.array([0.5, 0.5]), three.window_shares(np.array([9.1]))).round(2).tolist()
+    [0.0, 0.0, 1.0]
+    """
+
+    windows: GaussianClasses
+    lengths: tuple[float, ...]
+    starts: tuple[GaussianClasses, ...]
+    spread_floor: Array
+    n_trained: int
+    added: Codes
+
+    @classmethod
+    def fit(
+        cls, values: Array, codes: Codes, slides: Codes, overlap: float, compared: Array | float = 1.0
+    ) -> SlideGaussians:
+        """Return the Gaussians of the trained textures.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Features of windows, in temporal order within each slide.
+        codes, slides : (n,)
+            Number of the texture, from 0, and of the slide of each.
+        overlap
+            Distance of two windows of a slide over their length.
+        compared : (n_features,)
+            0 for features that are left out.
+
+        Returns
+        -------
+        SlideGaussians
+            Without added slides.
+        """
+        values = compared * values
+        order = np.argsort(slides, kind='stable')
+        first = np.unique(slides[order], return_index=True)[1]
+        parts = np.split(values[order], first[1:])
+        classes = codes[order][first]
+        counts = np.bincount(classes)
+        typical = 1.0 + (float(np.median([len(part) for part in parts])) - 1.0) * overlap
+        whole = max(WHOLE * typical, LENGTHS[0])
+        lengths = (*(length for length in LENGTHS if length < whole), whole)
+        variance = SPREAD_FLOOR * np.mean([part.var(axis=0) for part in parts], axis=0)
+        fitted = cls(
+            replace(
+                GaussianClasses.fit(values, codes, counts),
+                uncertainty_exponent=WINDOW_EXPONENT,
+                inverse_temperature=WINDOW_INVERSE_TEMPERATURE,
+            ),
+            lengths,
+            (),
+            np.where(variance > 0.0, variance, 1.0),
+            len(counts),
+            np.empty(0, dtype=np.intp),
+        )
+        described = [fitted._described(part, overlap) for part in parts]
+        starts = [GaussianClasses.fit(np.stack(rows), classes, counts) for rows in zip(*described, strict=True)]
+        return replace(fitted, starts=tuple(map(_of_length, starts, lengths)))
+
+    def with_added(self, slides: Sequence[Array], codes: Codes, overlap: float = 1.0) -> SlideGaussians:
+        """Return the Gaussians of the trained textures and of these added slides, in place of others added before.
+
+        Parameters
+        ----------
+        slides : each (n_windows, n_features)
+            Features of the windows of each added slide, in temporal order.
+        codes : (n_slides,)
+            Number of the label of each.
+        overlap
+            Distance of two windows of a slide over their length.
+
+        Returns
+        -------
+        SlideGaussians
+        """
+        added, groups = np.unique(codes, return_inverse=True)
+        counts = np.bincount(groups)
+        trained = self.trained
+        described = [self._described(values, overlap) for values in slides]
+        means = [group_means(np.stack(rows), groups) for rows in zip(*described, strict=True)]
+        starts = tuple(start.with_classes(mean, counts) for start, mean in zip(trained.starts, means, strict=True))
+        single = group_means(np.stack([values.mean(axis=0) for values in slides]), groups)
+        return replace(trained, windows=trained.windows.with_classes(single, counts), starts=starts, added=added)
+
+    @property
+    def trained(self) -> SlideGaussians:
+        """Those of the trained textures alone."""
+        windows, *starts = (
+            replace(classes, means=classes.means[: self.n_trained], slides=classes.slides[: self.n_trained])
+            for classes in (self.windows, *self.starts)
+        )
+        return replace(self, windows=windows, starts=tuple(starts), added=self.added[:0])
+
+    def shares(self, mean: Array, variance: Array, effective_windows: float) -> Array:
+        """Return the log-probability of each class for a slide so far.
+
+        Parameters
+        ----------
+        mean, variance : (n_features,)
+            Of the features of its windows.
+        effective_windows
+            Effective window count so far.
+
+        Returns
+        -------
+        (n_classes,)
+        """
+        place = max(bisect_right(self.lengths, effective_windows + 1e-9) - 1, 0)
+        return self.starts[place].log_probabilities(self._descriptor(mean, variance, self.lengths[place]))
+
+    def window_shares(self, X: Array) -> Array:
+        """Return the log-probability of each class for windows alone.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_classes)
+        """
+        return self.windows.log_probabilities(X)
+
+    def combined(self, trained: Array, shares: Array) -> Array:
+        """Return the probability of each label: the trained textures share what they have together as they were.
+
+        Parameters
+        ----------
+        trained : (..., n_trained)
+            Probabilities of the trained textures among themselves.
+        shares : (..., n_classes)
+            Log-probabilities of all classes.
+
+        Returns
+        -------
+        (..., n_labels)
+            They add up to 1.
+        """
+        own = np.exp(shares)
+        n_labels = max(self.n_trained, int(self.added.max(initial=-1)) + 1)
+        probabilities = np.zeros((*own.shape[:-1], n_labels))
+        together = np.add.reduce(own[..., : self.n_trained], axis=-1, keepdims=True)
+        probabilities[..., : self.n_trained] = together * trained
+        probabilities[..., self.added] += own[..., self.n_trained :]
+        return probabilities
+
+    def check(self, mean: Array) -> None:
+        """Raise ValueError unless the shares of a slide with this mean, (n_features,), are numbers at every length.
+
+        Parameters
+        ----------
+        mean : (n_features,)
+
+        Raises
+        ------
+        ValueError
+            If an added slide holds values so large that they overflow.
+        """
+        if not all(np.isfinite(self.shares(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
+            raise ValueError('its values are too large to be features')
+
+    def _described(self, values: Array, overlap: float) -> list[Array]:
+        """Return the descriptor of the start of a slide of each length; the last one is of the whole slide."""
+        ends = [*(window_count(length, overlap) for length in self.lengths[:-1]), len(values)]
+        parts = [values[:end] for end in ends]
+        return [
+            self._descriptor(part.mean(axis=0), part.var(axis=0), length)
+            for part, length in zip(parts, self.lengths, strict=True)
+        ]
+
+    def _descriptor(self, mean: Array, variance: Array, length: float) -> Array:
+        if length < SPREAD_LENGTH:
+            return mean
+        return np.concatenate([mean, 0.5 * np.log(variance + self.spread_floor)])
+
+
+def _of_length(start: GaussianClasses, length: float) -> GaussianClasses:
+    return start if length >= SPREAD_LENGTH else replace(start, uncertainty_exponent=SHORT_EXPONENT)
+
+
+# --------------------
+# Running mean and variance of the features of a slide.
+
+
+class SlideMoments:
+    """Mean and variance of the windows of one slide so far, updated in constant memory.
+
+    Source: Welford 1962 for the update without cancellation.
+
+    Parameters
+    ----------
+    n_features
+        Length of a feature vector.
+
+    Attributes
+    ----------
+    mean, variance : (n_features,)
+        Of the windows so far; zero before the first one.
+
+    Examples
+    --------
+    >>> moments = SlideMoments(n_features=1)
+    >>> for value in (1.0, 3.0):
+    ...     moments.add(np.array([value]))
+    >>> moments.mean.tolist(), moments.variance.tolist()
+    ([2.0], [1.0])
+    """
+
+    def __init__(self, n_features: int) -> None:
+        self.mean: Array = np.zeros(n_features)
+        self.variance: Array = np.zeros(n_features)
+        self._count = 0
+
+    def add(self, values: Array) -> None:
+        """Add a window.
+
+        Parameters
+        ----------
+        values : (n_features,)
+            Its features.
+        """
+        self._count += 1
+        before = values - self.mean
+        self.mean = self.mean + before / self._count
+        self.variance = self.variance + (before * (values - self.mean) - self.variance) / self._count
+
+
+# --------------------
+# Training examples that a model keeps for incremental training.
+
+# Windows of a texture that are kept; more cost time and memory, and hardly help.
+MAX_EXAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingExamples:
+    """Some of the windows that a model was trained on.
+
+    Parameters
+    ----------
+    values : (n, n_features) float32
+    codes, slides : (n,)
+        Number of the label, 0…, and of the slide of each.
+
+    Examples
+    --------
+    >>> examples = TrainingExamples.of(np.arange(4.0)[:, None], np.array([0, 0, 1, 1]), np.arange(4))
+    >>> examples.of_label(1).tolist()
+    [[2.0], [3.0]]
+    """
+
+    values: NDArray[np.float32]
+    codes: Codes
+    slides: Codes
+
+    @classmethod
+    def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
+        """Return what contributes keeping: of each label at most so many that more would hardly help.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Features of windows.
+        codes, slides : (n,)
+            Number of the label and of the slide of each.
+
+        Returns
+        -------
+        TrainingExamples
+            At most MAX_EXAMPLES of each label.
+        """
+        own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
+        kept = np.concatenate([rows[spread(len(rows))] for rows in own])
+        return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
+
+    def check(self, n_features: int, n_labels: int) -> None:
+        """Raise ValueError unless they are examples of so many features and labels.
+
+        Raises
+        ------
+        ValueError
+            If shapes or labels do not fit, or a value is not finite.
+        """
+        n = len(self.codes)
+        if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
+            raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
+        if not n or self.codes.min() < 0 or self.codes.max() >= n_labels or not np.isfinite(self.values).all():
+            raise ValueError('examples have labels that the model has not, or values that are not finite')
+
+    def of_label(self, code: int) -> Array:
+        """Return those of a label, (n, n_features); none of one that came later.
+
+        Returns
+        -------
+        (n, n_features)
+            float64.
+        """
+        rows: Array = self.values[self.codes == code].astype(np.float64)
+        return rows
+
+    def as_arrays(self) -> dict[str, AnyArray]:
+        """Return the arrays for the model file.
+
+        Returns
+        -------
+        dict
+            'values' (n, n_features) float32, 'codes' and 'slides' (n,) int32.
+        """
+        return {
+            'values': self.values,
+            'codes': self.codes.astype(np.int32),
+            'slides': self.slides.astype(np.int32),
+        }
+
+    @classmethod
+    def from_arrays(cls, parameters: Mapping[str, Any]) -> TrainingExamples:
+        """Return what `as_arrays` gave."""
+        codes, slides = (np.asarray(parameters[name], dtype=np.intp) for name in ('codes', 'slides'))
+        return cls(np.asarray(parameters['values'], dtype=np.float32), codes, slides)
+
+
+def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
+    """Return at most so many of the numbers 0 to count - 1, evenly spread."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))

@@ -1,0 +1,195 @@
+"""Incremental classification: add one slide to a model while it is used, and remove it again."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+
+from texture_core.config import unknown_name
+from texture_core.errors import InvalidData
+from texture_core.types import Array, FeatureVector, checked_label
+from texture_estimation.model import TextureModel
+from texture_estimation.model_files import AddedSlide, remove_added_slide, stored_numbers, write_added_slide
+from texture_features.examples import RunningConditions
+
+# Number of recent explorations that can be added, and of windows of each.
+EXPLORATIONS, WINDOWS = 20, 600
+
+
+class IncrementalClassifier:
+    """Hold a model and the most recent windows, and update the model with slides of them.
+
+    Parameters
+    ----------
+    model
+        Trained model, including the slides added to it before.
+    path
+        Path of the model, beside which added slides are stored; None keeps them in memory only.
+
+    Raises
+    ------
+    ModelMismatch
+        If the model holds no training examples.
+
+    Examples
+    --------
+    >>> from texture_estimation.training import train
+    >>> from texture_estimation.recipe import Recipe
+    >>> from texture_features.examples import LabelledFeatures
+    >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
+    >>> labels = np.repeat(['cork', 'felt'], 20)
+    >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
+    >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> model = train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
+    >>> classifier = IncrementalClassifier(model)
+    >>> classifier.observe(FeatureVector(0, 'new', 0.5, 0.1, ('mean',), np.array([3.0]), feature_set='a1'))
+    >>> classifier.add('oak'), classifier.model.labels
+    (1, ('cork', 'felt', 'oak'))
+    >>> classifier.remove_last().label, classifier.model.labels
+    ('oak', ('cork', 'felt'))
+    """
+
+    def __init__(self, model: TextureModel, path: str | Path | None = None) -> None:
+        self.model = model.with_added_slides(model.added_slides)  # which fits the Gaussians before a slide is added
+        self._path = path
+        self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
+        self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
+        self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
+
+    def observe(self, vector: FeatureVector) -> None:
+        """Keep a window, so that its exploration can be added."""
+        windows = self._recent_windows_of(vector.exploration_id)
+        if vector.last or vector.feature_set != self.model.feature_set or not np.isfinite(vector.values).all():
+            return
+        windows.append(vector.values)
+        del windows[:-WINDOWS]
+        self._conditions[vector.exploration_id].update(vector)
+
+    def add(self, label: str, exploration_id: str = '') -> int:
+        """Add the windows of an exploration, the last one if '', to a label; return the number of its windows now.
+
+        Raises
+        ------
+        InvalidData
+            If there is no label or a forbidden one, nothing usable was measured in that exploration, or it was added
+            before, under this label or another one.
+        OSError
+            If the slide cannot be stored; it has not been added then.
+        """
+        label = checked_label(label)
+        if not label:
+            raise InvalidData('no label was given; name the texture to add')
+        name = exploration_id or next(reversed(self._recent_windows), '')
+        self._refuse_without_window(name)
+        self._refuse_second_time(name, label)
+        added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
+        if self._path is not None:
+            self._store(self._path, added_slide)
+        self.model = self.model.with_added_slides((*self.model.added_slides, added_slide))
+        return len(self.model.examples_of(label))
+
+    def _recent_windows_of(self, exploration_id: str) -> list[Array]:
+        """Return the kept windows of an exploration, which counts as the newest one, also while it has none."""
+        windows = self._recent_windows.setdefault(exploration_id, [])
+        self._conditions.setdefault(exploration_id, RunningConditions())
+        self._recent_windows.move_to_end(exploration_id)
+        while len(self._recent_windows) > EXPLORATIONS:
+            oldest, _ = self._recent_windows.popitem(last=False)
+            del self._conditions[oldest]
+        return windows
+
+    def _refuse_without_window(self, exploration_id: str) -> None:
+        if self._recent_windows.get(exploration_id):
+            return
+        if not self._recent_windows:
+            raise InvalidData('no exploration was classified with this model; explore first')
+        reason = (
+            f"exploration '{exploration_id}' has no usable window: its slide was too short, its samples were lost, or "
+            'its features do not fit the model'
+            if exploration_id in self._recent_windows
+            else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
+        )
+        usable = ', '.join(name for name, windows in self._recent_windows.items() if windows) or 'none'
+        raise InvalidData(f'{reason}. Can be added: {usable}')
+
+    def _refuse_second_time(self, exploration_id: str, label: str) -> None:
+        """Refuse an exploration that was added before: counted twice, one slide would raise the confidence."""
+        others = [kept.label for kept in self.model.added_slides if kept.exploration_id == exploration_id != '']
+        if label in others:
+            raise InvalidData(
+                f"exploration '{exploration_id}' was added as '{label}' already; explore again, and add that slide"
+            )
+        if others:
+            raise InvalidData(
+                f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
+                'undo that first, or explore again'
+            )
+
+    def remove_last(self) -> AddedSlide:
+        """Remove the slide that was added last, and return it.
+
+        Raises
+        ------
+        InvalidData
+            If no slide was added.
+        """
+        if not self.model.added_slides:
+            raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
+        *before, last = self.model.added_slides
+        if self._path is not None:
+            remove_added_slide(self._path, self._numbers[-1])
+            del self._numbers[-1]
+        self.model = self.model.with_added_slides(tuple(before))
+        return last
+
+    def remove(self, label: str) -> tuple[AddedSlide, ...]:
+        """Remove all slides that were added as a label, from the model and from its folder, and return them.
+
+        A texture of the training stays as it was trained.
+
+        Raises
+        ------
+        InvalidData
+            If there is no label, no slide was added at all, or none to this texture of the training.
+        UnknownName
+            If no slide was added under this label, with the nearest label.
+        OSError
+            If a file cannot be removed; the slides whose files are still there stay in the model.
+        """
+        label = checked_label(label)
+        self._refuse_removal(label)
+        kept = list(self.model.added_slides)
+        removed = []
+        try:
+            for place in reversed([place for place, slide in enumerate(kept) if slide.label == label]):
+                if self._path is not None:
+                    remove_added_slide(self._path, self._numbers[place])
+                    del self._numbers[place]
+                removed.append(kept.pop(place))
+        finally:
+            self.model = self.model.with_added_slides(tuple(kept))
+        return tuple(reversed(removed))
+
+    def _store(self, path: str | Path, added_slide: AddedSlide) -> None:
+        number = self._numbers[-1] + 1 if self._numbers else 1
+        write_added_slide(path, number, added_slide, self.model.feature_set)
+        self._numbers.append(number)
+
+    def _refuse_removal(self, label: str) -> None:
+        added = sorted({slide.label for slide in self.model.added_slides})
+        if not added:
+            raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
+        allowed = f'Can be removed: {", ".join(added)}'
+        if not label:
+            raise InvalidData(f'no label was given; name the texture to remove. {allowed}')
+        if label in added:
+            return
+        if label in self.model.trained_labels:
+            raise InvalidData(
+                f"'{label}' is of the training, and no slide was added to it; to remove it, "
+                f'train the model again without it. {allowed}'
+            )
+        raise unknown_name(label, added, 'added texture')

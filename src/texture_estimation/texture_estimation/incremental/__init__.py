@@ -1,1 +1,0 @@
-"""Incremental classification: classes added after the training."""

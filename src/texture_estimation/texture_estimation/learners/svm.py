@@ -1,0 +1,498 @@
+"""Support vector machines with coupled pairs: training by scikit-learn, plain-array predictor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, ClassVar
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes, Fitted, assign_folds
+from texture_estimation.numerics import group_means, log_loss, log_softmax
+
+# --------------------
+# From decisions between two labels each to calibrated probabilities of all labels.
+
+# exp(500) is far from overflow, and no calibrated margin comes near.
+LARGEST = 500.0
+# Of the fit of a sigmoid. A line that fell would turn the machine's answer round.
+MAX_STEPS, MIN_SHARE, FLAT, RIDGE, MIN_SLOPE, TINY = 100, 1e-10, 1e-8, 1e-12, 1e-3, 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class PairCoupling:
+    """Sigmoids of the pairwise decision values, coupled in closed form.
+
+    With r_ij = 1 / (1 + exp(-(slope_ij f_ij + offset_ij))), the probability of label i among all is proportional to
+    (1 / (Σ_j 1/r_ij - (n - 2)))^(1/temperature) = (1 / (1 + Σ_j exp(-(slope_ij f_ij + offset_ij))))^(1/temperature).
+
+    Source: Platt 1999 for the sigmoids; Price, Knerr, Personnaz & Dreyfus 1995, eq. 5, for the coupling.
+
+    Parameters
+    ----------
+    slopes, offsets : (n_pairs,)
+        Pairs in the order (0, 1), (0, 2), …, (1, 2), …; a positive decision value speaks for the first.
+    temperature
+        Above 1: the probabilities are drawn together.
+
+    Examples
+    --------
+    >>> coupling = PairCoupling(2, slopes=np.array([2.0]), offsets=np.array([0.0]), temperature=1.0)
+    >>> np.exp(coupling(np.array([0.5]))).round(3).tolist()  # 1 / (1 + exp(-2 · 0.5))
+    [0.731, 0.269]
+    """
+
+    n_labels: int
+    slopes: Array
+    offsets: Array
+    temperature: float
+
+    def __post_init__(self) -> None:
+        pairs = np.array(list(combinations(range(self.n_labels), 2)))
+        sides = np.zeros((2 * len(pairs), self.n_labels))
+        sides[np.arange(len(pairs)), pairs[:, 0]] = 1.0
+        sides[np.arange(len(pairs)) + len(pairs), pairs[:, 1]] = 1.0
+        object.__setattr__(self, '_sides', sides)
+
+    def __call__(self, decisions: Array) -> Array:
+        """Return log-probabilities, (..., n_labels), of decision values, (..., n_pairs)."""
+        return log_softmax(self.scores(decisions) / self.temperature)
+
+    def scores(self, decisions: Array) -> Array:
+        """Return -log(1 + Σ_j exp(-margin)), (..., n_labels).
+
+        Parameters
+        ----------
+        decisions : (..., n_pairs)
+            Positive for the first label of a pair.
+
+        Returns
+        -------
+        (..., n_labels)
+            At most 0.
+        """
+        margins = decisions * self.slopes + self.offsets
+        n_pairs = margins.shape[-1]
+        against = np.empty((*margins.shape[:-1], 2 * n_pairs))
+        np.negative(margins, out=against[..., :n_pairs])
+        against[..., n_pairs:] = margins
+        np.minimum(against, LARGEST, out=against)
+        odds = np.exp(against, out=against)
+        scores: Array = -np.log1p(odds @ self._sides)  # type: ignore[attr-defined]
+        return scores
+
+
+def uncalibrated(n_labels: int) -> PairCoupling:
+    """Return the coupling with middling sigmoids, for when nothing can be held out."""
+    n_pairs = n_labels * (n_labels - 1) // 2
+    return PairCoupling(n_labels, np.full(n_pairs, 2.0), np.zeros(n_pairs), 1.0)
+
+
+def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
+    """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,).
+
+    Parameters
+    ----------
+    decisions : (n, n_pairs)
+        Decision values of held-out examples.
+    y : (n,)
+        Numbers of their labels.
+    n_labels
+        At least 2.
+
+    Returns
+    -------
+    PairCoupling
+        With a temperature that makes the labels most probable.
+    """
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
+    pairs = combinations(range(n_labels), 2)
+    sigmoids = np.array([_fit_sigmoid(decisions[:, number], y, *pair) for number, pair in enumerate(pairs)])
+    coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)
+    scores = coupling.scores(decisions)
+    best = minimize_scalar(
+        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
+    )
+    return PairCoupling(n_labels, coupling.slopes, coupling.offsets, float(np.exp(best.x)))
+
+
+def _fit_sigmoid(decisions: Array, y: Codes, first: int, second: int) -> Array:
+    """Return slope and offset of the sigmoid that gives the probability of `first` against `second`.
+
+    Newton's method with halved steps (Lin, Lin & Weng 2007).
+    """
+    chosen = (y == first) | (y == second)
+    size = math.sqrt(max(float(np.square(decisions[chosen]).mean()), TINY))
+    rows = np.stack([decisions[chosen] / size, np.ones(chosen.sum())])
+    is_first = y[chosen] == first
+    n_first, n_second = int(is_first.sum()), int((~is_first).sum())
+    # Platt's targets: never quite 0 or 1, so that separable pairs keep a finite slope.
+    targets = np.where(is_first, (n_first + 1.0) / (n_first + 2.0), 1.0 / (n_second + 2.0))
+
+    line, loss = np.array([0.0, math.log((n_first + 1.0) / (n_second + 1.0))]), math.inf
+    step, share = np.zeros(2), 1.0
+    for _ in range(MAX_STEPS):
+        margins = (line + share * step) @ rows
+        now = float(np.logaddexp(0.0, margins).sum() - targets @ margins)
+        if now > loss and share > MIN_SHARE:  # too far: the loss is convex, so a part of the step helps
+            share /= 2.0
+            continue
+        line, loss, share = line + share * step, now, 1.0
+        probability = 1.0 / (1.0 + np.exp(-np.clip(margins, -LARGEST, LARGEST)))
+        slope = rows @ (probability - targets)
+        if np.abs(slope).max() < FLAT:
+            break
+        bend = (rows * (probability * (1.0 - probability))) @ rows.T + RIDGE * np.eye(2)
+        step = -np.linalg.solve(bend, slope)
+    return np.array([max(line[0] / size, MIN_SLOPE), line[1]])
+
+
+# --------------------
+# A standardised RBF support vector machine, one against one, as plain arrays.
+
+
+@dataclass(frozen=True, eq=False)
+class SvmPredictor:
+    """The decisions of scikit-learn's StandardScaler and SVC, without its overhead for single windows.
+
+    The support vectors of each label are padded to the same number, so that every sum of all pairs is one product of
+    arrays: in pair (i, j), label i's vectors carry coefficient row j - 1 and label j's carry row i.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    vectors : (n_labels · width, n_features)
+        Standardised support vectors, label by label, times 2 gamma.
+    squares : (n_labels · width,)
+        Square of the length of each support vector, times gamma.
+    coefficients : (n_labels, n_labels - 1, width)
+        0 for padding.
+    intercepts : (n_pairs,)
+    gamma
+        Of the kernel exp(-gamma |x - s|²).
+    coupling
+        From decision values to probabilities.
+    projection : (n_features, n_features) or None
+        What features are multiplied with before the standardisation.
+
+    Examples
+    --------
+    >>> from sklearn.preprocessing import StandardScaler
+    >>> from sklearn.svm import SVC
+    >>> from texture_estimation.learners.svm import uncalibrated
+    >>> values, codes = np.random.default_rng(0).standard_normal((30, 2)), np.arange(30) % 3
+    >>> scaler = StandardScaler().fit(values)
+    >>> svc = SVC(gamma=0.5, decision_function_shape='ovo').fit(scaler.transform(values), codes)
+    >>> predictor = export(scaler, svc, uncalibrated(3))
+    >>> isinstance(predictor, SvmPredictor)
+    True
+    >>> np.allclose(predictor.decisions(values), svc.decision_function(scaler.transform(values)))
+    True
+    """
+
+    mean: Array
+    scale: Array
+    vectors: Array
+    squares: Array
+    coefficients: Array
+    intercepts: Array
+    gamma: float
+    coupling: PairCoupling
+    projection: Array | None = None
+
+    def __post_init__(self) -> None:
+        n_labels = len(self.coefficients)
+        first, second = np.triu_indices(n_labels, k=1)
+        # Where in the (n_labels, n_labels - 1) sums the two halves of each pair stand.
+        object.__setattr__(self, '_first', first * (n_labels - 1) + second - 1)
+        object.__setattr__(self, '_second', second * (n_labels - 1) + first)
+
+    def __call__(self, X: Array) -> Array:
+        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
+        return self.coupling(self.decisions(X))
+
+    def decisions(self, X: Array) -> Array:
+        """Return the decision value of each pair, (..., n_pairs); positive for its first label.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
+        kernel = self._kernel(X)
+        n_labels, rows, width = self.coefficients.shape
+        parameters = self.coefficients @ kernel.reshape(*kernel.shape[:-1], n_labels, width, 1)
+        sums = parameters.reshape(*kernel.shape[:-1], n_labels * rows)
+        decisions: Array = sums.take(self._first, axis=-1)  # type: ignore[assignment,attr-defined]
+        decisions += sums.take(self._second, axis=-1)  # type: ignore[attr-defined]
+        decisions += self.intercepts
+        return decisions
+
+    def _kernel(self, X: Array) -> Array:
+        """Return the kernel of each window with each support vector, (..., n_vectors)."""
+        projected = X if self.projection is None else X @ self.projection
+        standard = (projected - self.mean) / self.scale
+        # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
+        squares = self.gamma * np.add.reduce(standard * standard, axis=-1, keepdims=True)
+        exponents = self.vectors @ standard if standard.ndim == 1 else standard @ self.vectors.T
+        exponents -= self.squares + squares
+        return np.exp(exponents, out=exponents)
+
+
+def export(scaler: Any, svc: Any, coupling: PairCoupling, projection: Array | None = None) -> SvmPredictor:
+    """Return the exported predictor of a fitted StandardScaler and SVC(kernel='rbf').
+
+    Parameters
+    ----------
+    scaler
+        Fitted StandardScaler.
+    svc
+        Fitted SVC with an RBF kernel, one against one.
+    coupling
+        From decision values to probabilities.
+    projection : (n_features, n_features) or None
+        What the features were multiplied with before they were standardised.
+
+    Returns
+    -------
+    SvmPredictor
+        With the decisions of scikit-learn up to rounding.
+    """
+    counts = svc.n_support_
+    n_labels, width = len(counts), int(counts.max())
+    n_features = svc.support_vectors_.shape[1]
+    vectors = np.zeros((n_labels, width, n_features))
+    coefficients = np.zeros((n_labels, n_labels - 1, width))
+    # scikit-learn turns the sign round for two labels
+    sign = -1.0 if n_labels == 2 else 1.0
+    start = 0
+    for label, count in enumerate(counts):
+        vectors[label, :count] = svc.support_vectors_[start : start + count]
+        coefficients[label, :, :count] = sign * svc.dual_coef_[:, start : start + count]
+        start += count
+    flat = vectors.reshape(-1, n_features)
+    gamma = float(svc.gamma)
+    return SvmPredictor(
+        mean=np.asarray(scaler.mean_),
+        scale=np.asarray(scaler.scale_),
+        vectors=2.0 * gamma * flat,
+        squares=gamma * (flat * flat).sum(axis=1),
+        coefficients=coefficients,
+        intercepts=sign * np.asarray(svc.intercept_),
+        gamma=gamma,
+        coupling=coupling,
+        projection=projection,
+    )
+
+
+# --------------------
+# Within-class whitening: shrink the directions in which slides of one texture differ among themselves.
+
+
+def within_class_whitening(X: Array, y: Codes, groups: Codes, ridge: float, differences: Array | None = None) -> Array:
+    """Return the matrix that whitens what is no difference between textures, to be multiplied from the right.
+
+    Slides of one texture differ by force, speed and place. The covariance of their means about the mean of the texture
+    says in which directions; a difference along these tells little. `differences` add what else is known to matter
+    nothing, such as how the load moves when friction begins to shear a finger that was at rest: a slide in the other
+    direction shears it the other way.
+
+    Parameters
+    ----------
+    X : (n, n_features)
+        Features of windows.
+    y : (n,)
+        Number of the label of each.
+    groups : (n,)
+        Number of the slide of each.
+    ridge
+        Added to the eigenvalues of the covariance, whose mean is 1; a large one leaves the features as they are.
+    differences : (n_groups, n_features) or None
+        For the number of each slide a difference that is no difference of textures; NaN where it is not known.
+
+    Returns
+    -------
+    (n_features, n_features)
+        Symmetric; the identity if slides of one texture do not differ.
+
+    Source: within-class covariance normalisation, Hatch, Kajarekar & Stolcke 2006.
+
+    Examples
+    --------
+    >>> X = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 1.0], [9.0, 1.0]])  # the first feature varies within both textures
+    >>> whitening = within_class_whitening(X, np.array([0, 0, 1, 1]), np.arange(4), ridge=0.01)
+    >>> whitening.round(2).tolist()
+    [[0.71, 0.0], [0.0, 10.0]]
+    """
+    slides, first, rows = np.unique(groups, return_index=True, return_inverse=True)
+    means = group_means(X, rows)
+    _, labels = np.unique(y[first], return_inverse=True)
+    centres = group_means(means, labels)
+    covariance = _mean_square(means - centres[labels])
+    if differences is not None:
+        own = differences[slides]
+        covariance = covariance + _mean_square(own[np.isfinite(own).all(axis=1)])
+    mean_power = float(np.trace(covariance)) / X.shape[1]
+    if mean_power <= 0.0:
+        return np.eye(X.shape[1])
+    strengths, directions = np.linalg.eigh(covariance / mean_power)
+    return np.asarray((directions / np.sqrt(np.maximum(strengths, 0.0) + ridge)) @ directions.T)
+
+
+def _mean_square(deviations: Array) -> Array:
+    """Return the mean outer product, (n_features, n_features)."""
+    product: Array = deviations.T @ deviations / max(1, len(deviations))
+    return product
+
+
+# --------------------
+# RBF support vector machine, one against one, with calibrated probabilities.
+
+CACHE_MB = 500
+
+
+@dataclass(frozen=True)
+class SvmRbf:
+    """Standardised features, RBF kernel, one against one; probabilities calibrated on slides held out.
+
+    Not scikit-learn's SVC(probability=True): its inner cross-validation mixes the windows of one slide.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmRbf().fit(values, codes, groups)
+    >>> SvmRbf.predictor(fitted.parameters)(values).argmax(axis=1).tolist() == codes.tolist()
+    True
+    """
+
+    extras: ClassVar[tuple[str, ...]] = ('differences',)
+
+    c: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
+    gamma: float = param(
+        0.0,
+        'Gamma of the kernel exp(-gamma d²); 0: 1 / (n_features · variance). Larger is narrower.',
+        low=0.0,
+        high=1e9,
+    )
+    common_scale: bool = param(
+        False, 'Sets whether all features share one scale, for features of one kind such as taxel means.'
+    )
+    folds: int = param(
+        5,
+        'Sets the number of cross-validation folds for the calibration; more folds take longer to train.',
+        low=2,
+        high=50,
+    )
+
+    whitening: float = param(
+        0.0,
+        'Sets the ridge of the whitening of what differs within a texture, relative to its mean variance: a smaller '
+        'one leaves less of the directions in which slides of one texture differ; 0: no whitening.',
+        low=0.0,
+        high=1e6,
+    )
+
+    def fit(self, X: Array, y: Codes, groups: Codes, differences: Array | None = None) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
+
+        Parameters
+        ----------
+        X : (n, n_features)
+            Features of windows; finite.
+        y : (n,)
+            Number of the label of each, from 0, without gaps.
+        groups : (n,)
+            Number of the slide of each.
+        differences : (n_groups, n_features) or None
+            For the number of each slide a difference that is none of textures, for the whitening; NaN if not known.
+
+        Returns
+        -------
+        Fitted
+            Parameters, log-probabilities when held out, and a note on the calibration.
+        """
+        coupling, held_out, note = self._calibrate(X, y, groups, differences)
+        projection = self._projection(X, y, groups, differences)
+        scaler, svc = self._fit_svc(_projected(X, projection), y)
+        parameters = {
+            **({} if projection is None else {'projection': projection}),
+            'scaler': scaler,
+            'svc': svc,
+            'slopes': coupling.slopes,
+            'offsets': coupling.offsets,
+            'temperature': coupling.temperature,
+        }
+        return Fitted(parameters, held_out, note)
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> SvmPredictor:
+        """Return the predictor made from the stored parameters."""
+        coupling = PairCoupling(
+            len(parameters['svc'].n_support_),
+            parameters['slopes'],
+            parameters['offsets'],
+            float(parameters['temperature']),
+        )
+        return export(parameters['scaler'], parameters['svc'], coupling, parameters.get('projection'))
+
+    def _calibrate(
+        self, X: Array, y: Codes, groups: Codes, differences: Array | None
+    ) -> tuple[PairCoupling, Array | None, str]:
+        n_labels = int(y.max()) + 1
+        split = assign_folds(y, groups, self.folds)
+        if split is None:
+            return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
+        folds_of, note = split
+        decisions = self._held_out_decisions(X, y, groups, differences, folds_of)
+        coupling = fit_coupling(decisions, y, n_labels)
+        return coupling, coupling(decisions), note
+
+    def _held_out_decisions(
+        self, X: Array, y: Codes, groups: Codes, differences: Array | None, folds_of: Codes
+    ) -> Array:
+        """Return the decision values of each window, (n, n_pairs), by a fit without the fold that it is in."""
+        n_labels = int(y.max()) + 1
+        decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
+        for part in np.unique(folds_of):
+            held = folds_of == part
+            projection = self._projection(X[~held], y[~held], groups[~held], differences)
+            fitted = self._fit_svc(_projected(X[~held], projection), y[~held])
+            decisions[held] = export(*fitted, uncalibrated(n_labels), projection).decisions(X[held])
+        return decisions
+
+    def _projection(self, X: Array, y: Codes, groups: Codes, differences: Array | None) -> Array | None:
+        return within_class_whitening(X, y, groups, self.whitening, differences) if self.whitening else None
+
+    def _fit_svc(self, X: Array, y: Codes) -> tuple[Any, Any]:
+        # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        scaler = StandardScaler().fit(X)
+        if self.common_scale:
+            scaler.scale_ = np.full(X.shape[1], float(np.sqrt(scaler.var_.mean())) or 1.0)
+        gamma = self.gamma or 1.0 / (X.shape[1] * max(float(scaler.transform(X).var()), 1e-12))
+        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(X), y)
+        return scaler, svc
+
+
+def _projected(X: Array, projection: Array | None) -> Array:
+    return X if projection is None else X @ projection

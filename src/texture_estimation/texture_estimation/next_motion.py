@@ -1,0 +1,498 @@
+"""Choice of the next touch: the motion with the largest expected information gain about the texture."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.types import AnyArray, Array, FeatureVector, SlideMotion, group_similar
+from texture_estimation.numerics import group_means, log_loss, log_softmax
+from texture_estimation.recipe import fingerprint_difference
+
+SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
+SAME_NATS = 1e-9  # informations that differ by less are the same
+LEAST = 2  # slides of one kind over one texture that tell how much slides differ; kinds among which to choose
+PARTS = 5  # that are held out in turn, to learn how sure a slide makes
+MIN_TEMPER = 1e-3
+SAMPLES = 200  # of each texture; the error of the estimate is some hundredths of a nat
+
+
+class NextTouch(NamedTuple):
+    """A motion and its expected information gain in nats."""
+
+    motion: SlideMotion
+    information: float
+
+
+@dataclass(frozen=True, eq=False)
+class ClassConditionalGaussian:
+    """Class-conditional Gaussians under one motion, on axes that make the shared covariance the identity.
+
+    Parameters
+    ----------
+    means : (n_textures, n_axes)
+
+    Examples
+    --------
+    >>> alike, apart = (ClassConditionalGaussian(np.array([[0.0], [distance]])) for distance in (0.0, 100.0))
+    >>> prior = np.log([0.5, 0.5])
+    >>> round(alike.least_information(prior), 3), round(apart.least_information(prior), 3)  # nothing, and log 2
+    (0.0, 0.693)
+    """
+
+    means: Array
+
+    def log_likelihoods(self, places: Array) -> Array:
+        """Return those of slides (..., n_axes) by texture, (..., n_textures), less what all textures share.
+
+        Parameters
+        ----------
+        places : (..., n_axes)
+            Features of slides on the axes that separate textures.
+
+        Returns
+        -------
+        (..., n_textures)
+            In nats, up to a constant of each slide.
+        """
+        off = places[..., None, :] - self.means
+        return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
+
+    def least_information(self, log_prior: Array) -> float:
+        """Return a lower bound of the information about the texture that one slide gives, in nats.
+
+        From the distances between textures alone: nothing for equal ones, the entropy of the prior for ones far apart.
+
+        Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the
+        Bhattacharyya distance, which of all Chernoff distances bounds best where the covariance is shared.
+
+        Parameters
+        ----------
+        log_prior : (n_textures,)
+            What is known before the slide.
+        """
+        off = self.means[:, None, :] - self.means
+        distance = np.einsum('ijk,ijk->ij', off, off) / 8.0
+        prior = np.exp(log_prior)
+        possible = prior > 0.0
+        near = np.exp(-distance[possible][:, possible]) @ prior[possible]
+        return max(0.0, -float(prior[possible] @ np.log(near)))
+
+    def sampled_information(self, log_prior: Array, draws: Array) -> float:
+        """Return the same by simulated slides, without bias: `draws` are standard normal, (n_samples, n_axes).
+
+        Parameters
+        ----------
+        log_prior : (n_textures,)
+            What is known before the slide.
+        draws : (n_samples, n_axes)
+            Standard normal numbers.
+        """
+        prior = np.exp(log_prior)
+        information = 0.0
+        for texture in np.flatnonzero(prior > 0.0):
+            off = self.means[texture] + draws[:, None, :] - self.means
+            likelihoods = -0.5 * np.einsum('nti,nti->nt', off, off)
+            after = log_softmax(log_prior + likelihoods)[:, texture]
+            information += prior[texture] * float(np.mean(after - log_prior[texture]))
+        return max(0.0, information)
+
+
+@dataclass(frozen=True, eq=False)
+class NextTouchModel:
+    """Class-conditional Gaussians of each motion; updates the posterior and chooses the next touch.
+
+    Source: Fishel & Loeb 2012, "Bayesian exploration for intelligent identification of textures", who choose the motion
+    that confuses the candidates least; here by the expected information, which is in nats and has no free exponent.
+
+    Parameters
+    ----------
+    textures
+        Names.
+    projection : (n_features, n_axes)
+        From the mean features of a slide to axes along which textures differ, and on which what is uncertain about a
+        slide of one texture under one motion has the covariance 1.
+    gaussians
+        Class-conditional Gaussians of each motion.
+
+    Examples
+    --------
+    >>> across, along = (SlideMotion('linear_slide', angle_rad, 0.05, 1.0, 1.0) for angle_rad in (0.0, 1.57))
+    >>> rng = np.random.default_rng(0)
+    >>> textures, motions = ['cork', 'felt'] * 20, [across, across, along, along] * 10
+    >>> differs = np.array([t == 'felt' and m is across for t, m in zip(textures, motions)])  # only across the ridges
+    >>> values = 2.0 * differs[:, None] + 0.1 * rng.standard_normal((40, 1))
+    >>> model = NextTouchModel.fit(values, textures, motions)
+    >>> touch = model.best_motion(model.uniform_log_prior, [across, along])
+    >>> isinstance(touch, NextTouch), touch.motion.direction_rad
+    (True, 0.0)
+    """
+
+    textures: tuple[str, ...]
+    projection: Array
+    gaussians: Mapping[SlideMotion, ClassConditionalGaussian]
+
+    @classmethod
+    def fit(cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion]) -> NextTouchModel:
+        """Learn from slides.
+
+        Parameters
+        ----------
+        values : (n_slides, n_features)
+            Mean features of each slide.
+        textures, motions : (n_slides,)
+            What was slid over, and how.
+
+        Returns
+        -------
+        NextTouchModel
+
+        Raises
+        ------
+        InvalidData
+            If values are not finite, a motion lacks a texture, or no two slides are alike in texture and motion.
+        """
+        values = np.asarray(values, dtype=np.float64)
+        if values.ndim != 2 or not len(values) == len(textures) == len(motions) or not len(values):
+            raise InvalidData(
+                f'features of shape {values.shape} with {len(textures)} textures and {len(motions)} motions cannot be '
+                'trained on; give one row, one texture and one motion for each slide'
+            )
+        if not np.isfinite(values).all():
+            raise InvalidData('features of slides hold values that are not finite; leave these slides out')
+        names, codes = np.unique(np.asarray(textures), return_inverse=True)
+        made = list(dict.fromkeys(motions))
+        cells = np.array([made.index(motion) for motion in motions]) * len(names) + codes
+        counts = np.bincount(cells, minlength=len(made) * len(names))
+        _check(made, names, counts.reshape(len(made), -1) > 0)
+        if counts.max() < LEAST:
+            raise InvalidData(
+                'one slide over each texture with each motion does not tell how much slides differ; add some'
+            )
+        fit, sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
+        gaussians = {motion: ClassConditionalGaussian(sure * own) for motion, own in zip(made, fit.means, strict=True)}
+        return cls(tuple(names.tolist()), sure * fit.projection, gaussians)
+
+    @classmethod
+    def of_slides(
+        cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion | None]
+    ) -> NextTouchModel | None:
+        """Learn from slides as an arm made them: none is exactly like another, and some motions lack textures.
+
+        Parameters
+        ----------
+        values, textures, motions : (n_slides, n_features), (n_slides,), (n_slides,)
+            As for `training`; None where it is not known how a slide was made.
+
+        Returns
+        -------
+        Explorations or None
+            None if there are fewer than two kinds of motion with two slides over each texture.
+        """
+        known_motions = [number for number, motion in enumerate(motions) if motion]
+        made = dict(zip(known_motions, group_similar([motion for motion in motions if motion]), strict=True))
+        often = Counter((kind, textures[number]) for number, kind in made.items())
+        every = set(textures)
+        whole = {kind for kind in set(made.values()) if all(often[kind, texture] >= LEAST for texture in every)}
+        if len(whole) < LEAST or len(every) < LEAST:
+            return None
+        used = [number for number, kind in made.items() if kind in whole]
+        return cls.fit(values[used], [textures[number] for number in used], [made[number] for number in used])
+
+    @property
+    def uniform_log_prior(self) -> Array:
+        """The log-prior before the first slide, (n_textures,): all textures alike."""
+        return np.full(len(self.textures), -math.log(len(self.textures)))
+
+    def update(self, log_prior: Array, motion: SlideMotion, values: Array) -> Array:
+        """Return the log-posterior (n_textures,) after a slide with mean features (n_features,).
+
+        Parameters
+        ----------
+        log_prior : (n_textures,)
+            What was known before the slide.
+        motion
+            How it was made.
+        values : (n_features,)
+            Its mean features.
+
+        Returns
+        -------
+        (n_textures,)
+            Logarithms of probabilities that add up to 1.
+
+        Raises
+        ------
+        InvalidData
+            If the values have another shape or are not finite.
+        """
+        gaussians = self._gaussian(motion)
+        values = np.asarray(values, dtype=np.float64)
+        if values.shape != self.projection.shape[:1] or not np.isfinite(values).all():
+            raise InvalidData(
+                f'features of shape {values.shape} do not tell about a slide; give {len(self.projection)} finite '
+                'values, as the slides that were trained on have'
+            )
+        return log_softmax(self._checked(log_prior) + gaussians.log_likelihoods(values @ self.projection))
+
+    def information(
+        self, log_posterior: Array, motion: SlideMotion, rng: np.random.Generator | None = None, samples: int = SAMPLES
+    ) -> float:
+        """Return the information in nats that a slide is expected to give.
+
+        Parameters
+        ----------
+        log_posterior : (n_textures,)
+            What is known so far.
+        motion
+            How it would slide.
+        rng
+            Of simulated slides; without one, the lower bound in closed form.
+        samples
+            Simulated slides over each texture.
+
+        Returns
+        -------
+        float
+            At least 0, at most the entropy of what is known so far.
+        """
+        gaussians, log_posterior = self._gaussian(motion), self._checked(log_posterior)
+        if rng is None:
+            return gaussians.least_information(log_posterior)
+        return gaussians.sampled_information(log_posterior, rng.standard_normal((samples, gaussians.means.shape[1])))
+
+    def best_motion(
+        self, log_posterior: Array, motions: Sequence[SlideMotion], rng: np.random.Generator | None = None
+    ) -> NextTouch:
+        """Return the motion with the largest expected information gain; of equal ones the shortest.
+
+        Parameters
+        ----------
+        log_posterior : (n_textures,)
+            What is known so far.
+        motions
+            Those that may be made.
+        rng
+            For an estimate by simulated slides; without one, by the lower bound in closed form.
+
+        Returns
+        -------
+        NextTouch
+            The motion and its expected information, in nats.
+
+        Raises
+        ------
+        InvalidParameter
+            If there are no motions.
+        """
+        if not motions:
+            raise InvalidParameter('there is no motion to choose from; name at least one that was trained')
+        known_motions = [NextTouch(motion, self.information(log_posterior, motion, rng)) for motion in motions]
+        most = max(choice.information for choice in known_motions)
+        return min((c for c in known_motions if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
+
+    def check(self, values: Array) -> None:
+        """Raise InvalidData if the update with these mean features, (n_features,), is not finite.
+
+        Parameters
+        ----------
+        values : (n_features,)
+            Mean features of a slide.
+
+        Raises
+        ------
+        InvalidData
+            If it is not.
+        """
+        for motion in self.gaussians:
+            if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
+                raise InvalidData(f'what textures look like under {motion} is not finite')
+
+    def as_arrays(self) -> dict[str, Any]:
+        """Return plain values and arrays for the model file."""
+        return {
+            'textures': list(self.textures),
+            'projection': self.projection,
+            'motions': [asdict(motion) for motion in self.gaussians],
+            'means': np.stack([gaussians.means for gaussians in self.gaussians.values()]),
+        }
+
+    @classmethod
+    def from_arrays(cls, parameters: Mapping[str, Any]) -> NextTouchModel:
+        """Return what `as_arrays` gave.
+
+        Raises
+        ------
+        InvalidData
+            If the shapes of the arrays contradict each other.
+        """
+        projection, means = (np.asarray(parameters[name], dtype=np.float64) for name in ('projection', 'means'))
+        motions = [SlideMotion(**motion) for motion in parameters['motions']]
+        textures = tuple(map(str, parameters['textures']))
+        if means.shape != (len(motions), len(textures), *projection.shape[1:]):
+            raise InvalidData(
+                f'means of shape {means.shape} do not fit {len(motions)} motions and {len(textures)} textures'
+            )
+        return cls(
+            textures,
+            projection,
+            {motion: ClassConditionalGaussian(own) for motion, own in zip(motions, means, strict=True)},
+        )
+
+    def _gaussian(self, motion: SlideMotion) -> ClassConditionalGaussian:
+        if motion not in self.gaussians:
+            known = '; '.join(str(other) for other in self.gaussians)
+            raise InvalidParameter(f'{motion} is not in the training set; choose one of: {known}')
+        return self.gaussians[motion]
+
+    def _checked(self, log_prior: Array) -> Array:
+        log_prior = np.asarray(log_prior, dtype=np.float64)
+        if log_prior.shape != (len(self.textures),) or not np.isfinite(log_prior.max()):
+            raise InvalidData(
+                f'log-probabilities of shape {log_prior.shape} do not fit; give one for each of the '
+                f'{len(self.textures)} textures, of which at least one is possible'
+            )
+        return log_softmax(log_prior)
+
+
+def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:
+    """Return the mean features of a slide, (n_features,), from those of its windows.
+
+    Parameters
+    ----------
+    vectors
+        Windows of one slide; its end is ignored.
+    feature_set
+        Fingerprint of the features of the model.
+
+    Returns
+    -------
+    (n_features,)
+        In the units of the features.
+
+    Raises
+    ------
+    InvalidData
+        If it has no usable window.
+    ModelMismatch
+        If the features are not those that were trained on.
+    """
+    for vector in vectors:
+        if vector.feature_set != feature_set:
+            raise ModelMismatch(f'the model does not fit: {fingerprint_difference(vector.feature_set, feature_set)}')
+    usable = [vector.values for vector in vectors if np.isfinite(vector.values).all()]
+    if not usable:
+        raise InvalidData(f'none of the {len(vectors)} windows of the slide could be used; slide longer')
+    mean: Array = np.mean(usable, axis=0)
+    return mean
+
+
+def _check(made: Sequence[SlideMotion], names: AnyArray, slid: AnyArray) -> None:
+    """Refuse motions that lack a texture; `slid` tells which have which, (n_motions, n_textures)."""
+    for motion, over in zip(made, slid, strict=True):
+        if not over.all():
+            missing = ', '.join(names[~over])
+            raise InvalidData(f'{motion} has no slide over {missing}; slide over every texture with every motion')
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The axes, (n_features, n_axes), and on them the mean of each texture, (n_motions, n_textures, n_axes)."""
+
+    projection: Array
+    means: Array
+
+    def log_likelihoods(self, values: Array, cells: AnyArray) -> Array:
+        """Return those of slides by texture, (n_slides, n_textures)."""
+        off = (values @ self.projection)[:, None, :] - self.means[cells // self.means.shape[1]]
+        return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
+
+
+def _fit(values: Array, cells: AnyArray, n_textures: int) -> _Fit:
+    """Learn from the mean features of slides, (n_slides, n_features).
+
+    Slides share their covariance, whatever the texture and the motion. Means of few slides lie apart by chance: along
+    each axis they are drawn to the middle of their motion as far as their spread is not more than chance, and what
+    stays uncertain about them is added to what differs between slides.
+
+    Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with a covariance shrunk as Ledoit and Wolf do.
+
+    Parameters
+    ----------
+    cells : (n_slides,)
+        Number of the motion times the number of textures, and number of the texture.
+    """
+    from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who classifies does not need it
+
+    counts = np.bincount(cells)
+    means = group_means(values, cells)
+    off, freedom = values - means[cells], len(values) - len(counts)
+    scale = _scale(values, off, freedom)
+    # The shrinkage takes the number of slides for that of free deviations; means have used up some of them.
+    covariance = ledoit_wolf(off / scale, assume_centered=True)[0] * len(values) / freedom
+    by_motion = means.reshape(-1, n_textures, values.shape[1])
+    apart = (by_motion - by_motion.mean(axis=1, keepdims=True)).reshape(means.shape) / scale
+    between = apart.T @ apart / (len(by_motion) * max(n_textures - 1, 1))
+    untold = np.diag(covariance) <= 0.0
+    spread, axes = eigh(between, covariance + np.diag(untold * 1.0))
+    chance = float((1.0 / counts).mean())
+    spread -= chance
+    axes, spread = axes[:, spread > 0.0], spread[spread > 0.0]
+    drawn = spread / (spread + chance)
+    projection = axes / scale[:, None] / np.sqrt(1.0 + chance * drawn)
+    own = by_motion @ projection
+    middle = own.mean(axis=1, keepdims=True)
+    return _Fit(projection, middle + drawn * (own - middle))
+
+
+def _scale(values: Array, off: Array, freedom: int) -> Array:
+    """Return how much each feature differs between slides, (n_features,); infinite where it is constant."""
+    variance = values.var(axis=0)
+    constant = np.sqrt(variance) <= 1e-12 * np.abs(values).max(axis=0)
+    scale: Array = np.where(constant, np.inf, np.sqrt((off * off).sum(axis=0) / freedom + SMALLEST * variance))
+    return scale
+
+
+def _parts(cells: AnyArray) -> AnyArray:
+    """Return the part of each slide, those of one texture and motion in turn; -1 for one that is alone.
+
+    The first slide is in another part for the next texture, so that where there are two of each not all are missed at
+    once, and nothing showed how much they differ.
+    """
+    part = np.full(len(cells), -1)
+    for number, cell in enumerate(np.unique(cells)):
+        rows = np.flatnonzero(cells == cell)
+        if len(rows) >= LEAST:
+            part[rows] = (np.arange(len(rows)) + number) % PARTS
+    return part
+
+
+def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
+    """Return the exponent of the likelihoods that makes slides held out most probable: they are not quite Gaussian."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
+    parameters, least = _parts(cells), len(np.unique(cells))
+    known_motions: list[Array] = [np.zeros((0, n_textures))]
+    truths = [cells[:0]]
+    for part in range(PARTS):
+        own, others = parameters == part, parameters != part
+        if own.any() and np.count_nonzero(others) > least:
+            known_motions.append(
+                _fit(values[others], cells[others], n_textures).log_likelihoods(values[own], cells[own])
+            )
+            truths.append(cells[own] % n_textures)
+    log_likelihoods, truth = np.concatenate(known_motions), np.concatenate(truths)
+    if not len(truth):
+        return 1.0
+
+    def loss(logarithm: float) -> float:
+        return log_loss(log_softmax(math.exp(logarithm) * log_likelihoods), truth)
+
+    return math.exp(minimize_scalar(loss, bounds=(math.log(MIN_TEMPER), 0.0), method='bounded').x)

@@ -1,1 +1,0 @@
-"""Open-set recognition: novelty scores, prediction sets and early stopping."""

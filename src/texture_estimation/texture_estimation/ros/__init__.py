@@ -1,1 +1,0 @@
-"""ROS parts of the estimation that are not nodes."""

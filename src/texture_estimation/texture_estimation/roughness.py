@@ -1,0 +1,1220 @@
+"""Roughness: grades and ratings, regressors, recipe, training, evidence, model."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import t as student
+
+from texture_core.config import MB, find_file, from_mapping, param, read_text, unknown_name
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.types import NANOSECONDS, AnyArray, Array, FeatureVector, RoughnessEstimate
+from texture_estimation import model_files
+from texture_estimation.evidence import no_window
+from texture_estimation.learners.learner import Codes, standardisation
+from texture_estimation.recipe import TrainingParams, fingerprint_difference
+from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import FeatureSet, choose, read_recipe
+from texture_features.windows import WindowParams
+
+# --------------------
+# Whether a window can be graded at all, and if not, why.
+
+# Features that tell whether a window can be used; a regressor does not see them.
+STICK_SLIP, LEVEL = 'peak_to_median_power', 'log_variance'
+
+
+@dataclass(frozen=True)
+class CheckParams:
+    """What makes a window unusable; both margins are beyond what was met in the training.
+
+    Examples
+    --------
+    >>> checks = Checks(CheckParams(min_force_n=0.1), ('mean',), {})
+    >>> 'force' in checks.refusal(FeatureVector(0, 'a', 0.5, 0.1, ('mean',), np.zeros(1), force_n=0.01))
+    True
+    """
+
+    min_force_n: float = param(0.05, 'Smallest force that counts as contact.', unit='N', low=0.0, high=100.0)
+    stick_slip_margin: float = param(
+        1.0,
+        f'Sets the rise of `{STICK_SLIP}` over the training set that counts as stick-slip, as ln of power.',
+        low=0.0,
+        high=100.0,
+    )
+    quiet_margin: float = param(
+        0.7,
+        f'Sets the fall of `{LEVEL}` below the training set that counts as too quiet, as ln of power.',
+        low=0.0,
+        high=100.0,
+    )
+
+
+def checked_columns(names: Sequence[str], feature: str) -> NDArray[np.intp]:
+    """Return the columns that a feature fills, of values named 'input/feature/value/channel'.
+
+    Parameters
+    ----------
+    names
+        Name of each value.
+    feature
+        Name of the feature in the recipe.
+
+    Returns
+    -------
+    (n_columns,)
+        Indices, ascending.
+    """
+    return np.flatnonzero([name.split('/')[1:2] == [feature] for name in names])
+
+
+def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
+    """Return the columns that a regressor sees.
+
+    Returns
+    -------
+    (n_columns,)
+        Indices, ascending.
+    """
+    return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
+
+
+def limits_of(params: CheckParams, names: Sequence[str], values: Array) -> dict[str, float]:
+    """Return the largest `bursts` and the least `log_variance` to accept, from training windows (n, n_features).
+
+    Parameters
+    ----------
+    params
+        Which share of the training windows is accepted.
+    names
+        Name of each value.
+    values : (n, n_features)
+        Features of the training windows.
+
+    Returns
+    -------
+    dict
+        Limits by their names.
+    """
+    limits = {}
+    if (columns := checked_columns(names, STICK_SLIP)).size:
+        limits[STICK_SLIP] = float(values[:, columns].max()) + params.stick_slip_margin
+    if (columns := checked_columns(names, LEVEL)).size:
+        limits[LEVEL] = float(values[:, columns].max(axis=1).min()) - params.quiet_margin
+    return limits
+
+
+@dataclass(frozen=True, eq=False)
+class Checks:
+    """The checks of a model, on windows one by one.
+
+    Parameters
+    ----------
+    params
+        Of the recipe.
+    names
+        Of the features.
+    limits
+        As `limits_of` returns them.
+    """
+
+    params: CheckParams
+    names: tuple[str, ...]
+    limits: Mapping[str, float]
+    _columns: dict[str, NDArray[np.intp]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        self._columns.update({feature: checked_columns(self.names, feature) for feature in (STICK_SLIP, LEVEL)})
+
+    def refusal(self, vector: FeatureVector) -> str:
+        """Return why a window cannot be graded; '' if it can."""
+        if vector.force_n < self.params.min_force_n:  # an unknown force is NaN and says nothing
+            return f'no contact: the force is {vector.force_n:.2f} N'
+        finite = np.isfinite(vector.values)
+        if not finite.all():
+            bad = vector.names[int(finite.argmin())]
+            return f"its feature '{bad}' is not finite; is the speed known?"
+        if LEVEL in self.limits and self._highest(vector, LEVEL) < self.limits[LEVEL]:
+            return 'no contact: the signal is weaker than on the smoothest training surface'
+        if STICK_SLIP in self.limits and self._highest(vector, STICK_SLIP) > self.limits[STICK_SLIP]:
+            return 'the finger skids: stick-slip dominates the signal'
+        return ''
+
+    def _highest(self, vector: FeatureVector, name: str) -> float:
+        return float(vector.values[self._columns[name]].max())
+
+
+# --------------------
+# Protocol of roughness regressors: parameters that fit graded windows and export a predictor.
+
+REGRESSOR_GRADES: Array = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+SMOOTH, ROUGH = 1.0, 5.0
+
+
+class RegressorPredictor(Protocol):
+    """Predict grades of windows, as plain arrays."""
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Return grade and its standard deviation.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (...,), (...,)
+            NaN as the grade where the regressor has no answer; 0 as the deviation if the regressor does not know it.
+        """
+
+
+class RoughnessRegressor(Protocol):
+    """Frozen parameters of a regressor."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X`, grades `y` and texture numbers `groups`; return plain arrays.
+
+        Parameters
+        ----------
+        X : (n, n_features)
+            Features of windows; finite.
+        y : (n,)
+            Mean grade of the texture of each, 1 to 5.
+        groups : (n,)
+            Number of the texture of each.
+
+        Returns
+        -------
+        mapping
+            Arrays for `predictor` and for the model file.
+        """
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> RegressorPredictor:
+        """Return the predictor made from the stored parameters."""
+
+
+# --------------------
+# Gaussian-process regression of the grade, with one point a texture.
+
+MIDDLE = 3.0  # of the scale: the grade of a texture of which nothing is known
+# What is known beforehand of the logarithms of the hyperparameters, in grades and in distances between textures:
+# mean and standard deviation of slope, of what is not straight, of its length, and of people's disagreement.
+PRIOR_MEANS = np.log([0.5, 0.5, 2.0, 0.5])
+PRIOR_SPREAD = np.array([1.0, 1.0, 0.5, 0.5])
+JITTER = 1e-9
+
+
+@dataclass(frozen=True)
+class GaussianProcess:
+    """A straight line plus a smooth function of standardised features, plus noise for each texture.
+
+    The windows of a texture share its grade and its noise: they are one point, their mean. So three thousand windows of
+    fifteen textures are fifteen opinions, not three thousand, and the standard deviation says so. The hyperparameters
+    maximise the marginal likelihood times a wide prior.
+
+    Source: Rasmussen & Williams 2006, sections 2.2 and 5.4.1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = GaussianProcess.predictor(GaussianProcess().fit(values, grades, textures))
+    >>> isinstance(predictor, GaussianProcessPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
+    """
+
+    curved: bool = param(True, 'Whether a nonlinear (RBF) term is added; false: Bayesian linear regression.')
+
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,).
+
+        Raises
+        ------
+        InvalidData
+            If all windows are of one texture.
+        """
+        from scipy.optimize import minimize  # noqa: PLC0415
+
+        codes = np.unique(groups)
+        if len(codes) < 2:
+            raise InvalidData('all graded windows are of one texture; two or more are needed')
+        points = np.stack([X[groups == code].mean(axis=0) for code in codes])
+        targets = np.array([y[groups == code].mean() for code in codes]) - MIDDLE
+        mean, scale = standardisation(points)
+        # One unit is the distance of two typical textures, however many features tell of it.
+        places = (points - mean) / (scale * np.sqrt(points.shape[1]))
+        products, squares = places @ places.T, _squares(places, places)
+
+        def loss(logs: Array) -> float:
+            surprise = (logs - PRIOR_MEANS) / PRIOR_SPREAD
+            return _surprise(_covariance(self._hyper(logs), products, squares), targets) + 0.5 * float(
+                surprise @ surprise
+            )
+
+        hyper = self._hyper(minimize(loss, PRIOR_MEANS, method='L-BFGS-B').x)
+        covariance = _covariance(hyper, products, squares)
+        return {
+            'mean': mean,
+            'scale': scale * np.sqrt(points.shape[1]),
+            'places': places,
+            'weights': np.linalg.solve(covariance, targets),
+            'precision': np.linalg.inv(covariance),
+            'hyper': hyper,
+        }
+
+    def _hyper(self, logs: Array) -> Array:
+        hyper: Array = np.exp(logs)
+        if not self.curved:
+            hyper[1] = 0.0
+        return hyper
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> GaussianProcessPredictor:
+        """Return the predictor made from the stored parameters."""
+        return GaussianProcessPredictor(**parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class GaussianProcessPredictor:
+    """The posterior at a window's features.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    places : (n_textures, n_features)
+    weights : (n_textures,)
+    precision : (n_textures, n_textures)
+        Inverse of the covariance of the grades.
+    hyper : (4,)
+        Slope, size and length of what is not straight, and noise.
+    """
+
+    mean: Array
+    scale: Array
+    places: Array
+    weights: Array
+    precision: Array
+    hyper: Array
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Return grade, within 1 and 5, and standard deviation, noise between textures included."""
+        place = (X - self.mean) / self.scale
+        grade, variance = self._curved(place) if self.hyper[1] else self._straight(place)
+        return np.minimum(np.maximum(MIDDLE + grade, SMOOTH), ROUGH), np.sqrt(np.maximum(variance, 0.0))
+
+    def _curved(self, place: Array) -> tuple[Array, Array]:
+        slope, size, length, noise = self.hyper
+        own = slope**2 * (place * place).sum(axis=-1)
+        shared = slope**2 * (place @ self.places.T)
+        shared += size**2 * np.exp(-0.5 * _squares(place, self.places) / length**2)
+        return shared @ self.weights, own + size**2 + noise**2 - ((shared @ self.precision) * shared).sum(axis=-1)
+
+    def _straight(self, place: Array) -> tuple[Array, Array]:
+        line, spread = self._line
+        return place @ line, np.add.reduce((place @ spread) * place, axis=-1) + self.hyper[3] ** 2
+
+    @cached_property
+    def _line(self) -> tuple[Array, Array]:
+        """The posterior of a straight line: mean (n_features,) and covariance (n_features, n_features) of its slopes.
+
+        What `_curved` gives without its smooth function, multiplied out: a third of the time.
+        """
+        variance = float(self.hyper[0]) ** 2
+        line = variance * self.weights @ self.places
+        spread = np.eye(self.places.shape[1]) - variance * self.places.T @ self.precision @ self.places
+        return line, variance * spread
+
+
+def _covariance(hyper: Array, products: Array, squares: Array) -> Array:
+    """Return the covariance of the grades of textures with noise, (n, n)."""
+    slope, size, length, noise = hyper
+    smooth = slope**2 * products + size**2 * np.exp(-0.5 * squares / length**2)
+    covariance: Array = smooth + (noise**2 + JITTER) * np.eye(len(products))
+    return covariance
+
+
+def _surprise(covariance: Array, targets: Array) -> float:
+    """Return the negative logarithm of the marginal likelihood, less a constant."""
+    _, log_size = np.linalg.slogdet(covariance)
+    return 0.5 * float(targets @ np.linalg.solve(covariance, targets) + log_size)
+
+
+def _squares(left: Array, right: Array) -> Array:
+    """Return the squared distances, (..., n_right) of (..., n_features) and (n_right, n_features)."""
+    distances = (left * left).sum(axis=-1)[..., None] + (right * right).sum(axis=1) - 2.0 * left @ right.T
+    positive: Array = np.maximum(distances, 0.0)
+    return positive
+
+
+# --------------------
+# The regressors that a roughness recipe can name.
+
+REGRESSORS: Mapping[str, type[RoughnessRegressor]] = {
+    'gaussian_process': GaussianProcess,  # ours
+}
+
+
+# --------------------
+# Grades that people gave to textures: a table in a CSV file.
+
+MAX_BYTES = 1 * MB
+TRAIN, TEST = 'train', 'test'
+
+
+@dataclass(frozen=True)
+class Grades:
+    """The grade of each texture, and for which each is meant.
+
+    A grade is an opinion; the physical roughness of a surface stands elsewhere.
+
+    Parameters
+    ----------
+    grades
+        From 1 (smooth) to 5 (rough), by texture.
+    splits
+        'train' or 'test', by texture; empty if the table does not say.
+
+    Examples
+    --------
+    >>> grades = Grades({'silk': 1.2, 'jute': 4.6}, {'silk': 'train', 'jute': 'test'})
+    >>> grades.of('jute'), grades.used_for('train')
+    (4.6, ('silk',))
+    """
+
+    grades: Mapping[str, float]
+    splits: Mapping[str, str] = field(default_factory=dict)
+
+    def of(self, texture: str) -> float:
+        """Return a texture's grade; UnknownName with the nearest if it has none."""
+        if texture not in self.grades:
+            raise unknown_name(texture, self.grades, 'grade for the texture')
+        return self.grades[texture]
+
+    def used_for(self, split: str) -> tuple[str, ...]:
+        """Return the textures meant to 'train' or to 'test', in their order."""
+        return tuple(texture for texture in self.grades if self.splits.get(texture) == split)
+
+
+def read_grades(path: str | Path) -> Grades:
+    """Read a CSV file with the columns `texture` and `grade`, and if wanted `split`; others are left alone.
+
+    Parameters
+    ----------
+    path
+        Of the file, or the name of a table that the suite ships, such as 'ets_roughness'.
+
+    Raises
+    ------
+    InvalidData, UnknownName
+        If there is no such file, or with the line that cannot be used.
+    """
+    place = find_file(str(path), 'texture_simulation', 'config/grades', 'table of grades', '.csv')
+    try:
+        file = io.StringIO(read_text(place, MAX_BYTES, 'utf-8-sig'), newline='')
+        reader = csv.DictReader(line for line in file if not line.startswith('#'))
+        rows = list(enumerate(reader, 2))
+        columns = tuple(reader.fieldnames or ())
+    except (OSError, ValueError, csv.Error) as error:
+        raise InvalidData(f"'{place}' cannot be read: {error}; give a CSV file of grades") from error
+    if not {'texture', 'grade'} <= set(columns):
+        raise InvalidData(f"'{place}' has the columns {', '.join(columns) or 'none'}; texture and grade are needed")
+    grades: dict[str, float] = {}
+    splits: dict[str, str] = {}
+    for line, row in rows:
+        texture, where = row['texture'], f"'{place}', line {line}"
+        if not texture or texture in grades:
+            raise InvalidData(f"{where}: the texture is '{texture}'; name each once")
+        grades[texture] = _grade(row['grade'], where)
+        if row.get('split'):
+            splits[texture] = _split(row['split'], where)
+    if not grades:
+        raise InvalidData(f"'{place}' holds no grade; write one a line under texture,grade")
+    return Grades(grades, splits)
+
+
+def _grade(text: str | None, where: str) -> float:
+    try:
+        grade = float(text or '')
+    except ValueError:
+        grade = math.nan
+    if not SMOOTH <= grade <= ROUGH:
+        raise InvalidData(f"{where}: the grade is '{text}'; a number from 1 to 5 is needed")
+    return grade
+
+
+def _split(text: str, where: str) -> str:
+    if text not in (TRAIN, TEST):
+        raise InvalidData(f"{where}: the split is '{text}'; '{TRAIN}' or '{TEST}' is needed")
+    return text
+
+
+# --------------------
+# Grades from 1 (smooth) to 5 (rough) that people gave textures, and the table they are read from.
+
+RATINGS_GRADES = np.arange(1, 6)
+MAX_CELLS = 1_000_000  # people × textures
+COLUMNS = ('rater', 'texture', 'grade')
+SYNONYMS = {'rating': 'grade'}
+
+
+@dataclass(frozen=True, eq=False)
+class Ratings:
+    """What each person says of each texture.
+
+    Parameters
+    ----------
+    raters, textures
+        Names, in the order of their first appearance.
+    grades : (n_raters, n_textures)
+        1 to 5; NaN where a person did not grade a texture.
+    note
+        How the grades were made from what was read; '' if they stood there.
+
+    Examples
+    --------
+    >>> ratings = Ratings(('anna', 'ben'), ('silk', 'jute'), np.array([[1.0, 4.0], [2.0, 5.0]]))
+    >>> ratings.means.tolist(), ratings.votes[0].tolist()
+    ([1.5, 4.5], [1, 1, 0, 0, 0])
+    """
+
+    raters: tuple[str, ...]
+    textures: tuple[str, ...]
+    grades: Array
+    note: str = ''
+
+    @property
+    def means(self) -> Array:
+        """Mean grade of each texture, (n_textures,)."""
+        return np.asarray(np.nanmean(self.grades, axis=0))
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviation of the grades of each texture over the people, (n_textures,)."""
+        return np.asarray(np.nanstd(self.grades, axis=0, ddof=1))
+
+    @property
+    def votes(self) -> AnyArray:
+        """How many people gave each texture each grade, (n_textures, 5); what lies between is rounded."""
+        return np.asarray((np.rint(self.grades)[:, :, None] == RATINGS_GRADES).sum(axis=0))
+
+
+def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH)) -> Ratings:
+    """Read a CSV file with a line for each rating: columns `rater`, `texture` and `grade` (or `rating`).
+
+    Parameters
+    ----------
+    path
+        Of the file; other columns are left alone, and an empty grade means that there is none.
+    scale
+        Smoothest and roughest rating allowed; mapped linearly to 1 and 5.
+
+    Raises
+    ------
+    InvalidData
+        With the line, if the file cannot be read as such.
+    """
+    rows = _read_rows(Path(path))
+    raters = tuple(dict.fromkeys(row['rater'] for _, row in rows))
+    textures = tuple(dict.fromkeys(row['texture'] for _, row in rows))
+    if len(raters) * len(textures) > MAX_CELLS:
+        raise InvalidData(
+            f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MAX_CELLS}"
+        )
+    grades = _grades(rows, raters, textures, scale, path)
+    _check_filled(raters, textures, grades, path)
+    low, high = scale
+    note = '' if scale == (SMOOTH, ROUGH) else f'ratings from {low:g} to {high:g} were mapped linearly to 1 to 5'
+    return Ratings(raters, textures, grades, note)
+
+
+def _read_rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
+    """Return number and columns of each line."""
+    try:
+        reader = csv.DictReader(io.StringIO(read_text(path, MAX_BYTES, 'utf-8-sig'), newline=''))
+        names = [SYNONYMS.get(name.strip().lower(), name.strip().lower()) for name in reader.fieldnames or ()]
+        reader.fieldnames = names
+        rows: list[tuple[int, Mapping[str, str]]] = [(reader.line_num, row) for row in reader]
+    except (OSError, ValueError, csv.Error) as error:
+        raise InvalidData(f"'{path}' cannot be read: {error}; give a CSV file of ratings") from error
+    missing = [name for name in COLUMNS if name not in names]
+    if missing:
+        raise InvalidData(
+            f"'{path}' has the columns {', '.join(names) or 'none'} but no {', '.join(missing)}; "
+            'write one rating a line under rater,texture,grade'
+        )
+    if not rows:
+        raise InvalidData(f"'{path}' holds no rating; write one a line under rater,texture,grade")
+    for line, row in rows:
+        if any(row[name] is None for name in COLUMNS) or not row['rater'] or not row['texture']:
+            raise InvalidData(f"'{path}', line {line}: rater or texture is missing; write rater,texture,grade")
+    return rows
+
+
+def _grades(
+    rows: Sequence[tuple[int, Mapping[str, str]]],
+    raters: Sequence[str],
+    textures: Sequence[str],
+    scale: tuple[float, float],
+    path: str | Path,
+) -> Array:
+    """Return the grades, (n_raters, n_textures), NaN where there is none."""
+    rater_at = {name: index for index, name in enumerate(raters)}
+    texture_at = {name: index for index, name in enumerate(textures)}
+    grades = np.full((len(raters), len(textures)), np.nan)
+    for line, row in rows:
+        at = rater_at[row['rater']], texture_at[row['texture']]
+        if not np.isnan(grades[at]):
+            raise InvalidData(
+                f"'{path}', line {line}: rater '{row['rater']}' graded '{row['texture']}' before; give one grade each"
+            )
+        grades[at] = _rating(row['grade'], scale, f"'{path}', line {line}")
+    return grades
+
+
+def _rating(text: str, scale: tuple[float, float], where: str) -> float:
+    low, high = scale
+    if not low < high:
+        raise InvalidParameter(f'the scale goes from {low:g} to {high:g}; give the smooth end first, then a larger one')
+    if not text.strip():
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        needed = f'a number from {low:g} to {high:g} is needed, or name another scale with --scale'
+        raise InvalidData(f"{where}: the grade is '{text}'; {needed}")
+    return SMOOTH + (ROUGH - SMOOTH) * (value - low) / (high - low)
+
+
+def _check_filled(raters: Sequence[str], textures: Sequence[str], grades: Array, path: str | Path) -> None:
+    empty = np.isnan(grades).all(axis=0)
+    if empty.any():
+        raise InvalidData(f"'{path}': nobody graded '{textures[int(empty.argmax())]}'; leave it out or grade it")
+    if len(raters) < 2:
+        raise InvalidData(f"'{path}' has a single rater, '{raters[0]}'; a panel needs two or more")
+
+
+# --------------------
+# A roughness recipe: windows, inputs and features, head, checks and evidence, in one YAML file.
+
+KEYS = ('description', 'windows', 'inputs', 'regressor', 'checks', 'evidence', 'training')
+
+
+@dataclass(frozen=True)
+class EvidenceParams:
+    """When a grade is final before the slide ends."""
+
+    min_narrowing_grades: float = param(
+        0.1,
+        'The grade is final once more sliding would narrow its 90 % interval by less; 0: only at the end.',
+        low=0.0,
+        high=5.0,
+    )
+    min_windows: int = param(3, 'Smallest number of graded windows before a grade can be final.', low=1, high=10_000)
+
+
+@dataclass(frozen=True)
+class CalibrationParams(TrainingParams):
+    """How the examples for training are cut, and on what the interval is calibrated."""
+
+    folds: int = param(
+        15,
+        'Sets the number of folds of textures for the calibration; at most one per texture is possible.',
+        low=2,
+        high=1000,
+    )
+
+
+@dataclass(frozen=True)
+class RoughnessRecipe:
+    """What turns a signal into a grade, before any training.
+
+    Examples
+    --------
+    >>> recipe = RoughnessRecipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}}, 'mine')
+    >>> recipe.training == CalibrationParams(), recipe.evidence == EvidenceParams()
+    (True, True)
+    """
+
+    name: str
+    feature_set: FeatureSet
+    regressor_name: str
+    regressor: RoughnessRegressor
+    checks: CheckParams = field(default_factory=CheckParams)
+    evidence: EvidenceParams = field(default_factory=EvidenceParams)
+    training: CalibrationParams = field(default_factory=CalibrationParams)
+    description: str = ''
+
+    @property
+    def training_windows(self) -> WindowParams:
+        """How to cut the windows that are used for training."""
+        return dataclasses.replace(self.feature_set.windows, hop_s=self.training.hop_s)
+
+    @classmethod
+    def from_mapping(cls, content: Mapping[str, Any], name: str) -> RoughnessRecipe:
+        """Build from what a recipe file holds.
+
+        Raises
+        ------
+        InvalidParameter, UnknownName
+            With the place in the recipe and what is allowed there.
+        """
+        where = f"roughness recipe '{name}'"
+        for key in content:
+            if key not in KEYS:
+                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
+        return cls(
+            name,
+            FeatureSet.from_mapping(content, where),
+            *choose(REGRESSORS, content.get('regressor', 'gaussian_process'), 'regressor', where),
+            from_mapping(CheckParams, content.get('checks') or {}, f'{where}, checks'),
+            from_mapping(EvidenceParams, content.get('evidence') or {}, f'{where}, evidence'),
+            from_mapping(CalibrationParams, content.get('training') or {}, f'{where}, training'),
+            str(content.get('description', '')),
+        )
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return the recipe as a file writes it, every parameter spelt out."""
+        return {
+            'description': self.description,
+            **self.feature_set.as_mapping(),
+            'regressor': {self.regressor_name: dataclasses.asdict(self.regressor)},
+            'checks': dataclasses.asdict(self.checks),
+            'evidence': dataclasses.asdict(self.evidence),
+            'training': dataclasses.asdict(self.training),
+        }
+
+
+def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
+    """Read a recipe that the package ships in config/roughness, or any by path; a model's card holds one too.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        With one sentence that says what is wrong and what is allowed.
+    """
+    name, content = read_recipe(name_or_path, 'config/roughness', 'roughness recipe')
+    return RoughnessRecipe.from_mapping(content, name)
+
+
+# --------------------
+# A trained roughness model: NAME.skops, which holds plain arrays only, and its card NAME.json.
+
+NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What makes an honest standard deviation of the one that a regressor claims.
+
+    Parameters
+    ----------
+    scale
+        Factor on what is common to all windows of a texture.
+    base_std
+        Standard deviation, in grades, of what the regressor does not know of.
+    within_std
+        Standard deviation of the windows of one texture around their mean, in grades.
+
+    Examples
+    --------
+    >>> calibration = Calibration(scale=2.0, within_std=0.3)
+    >>> float(calibration.window_std(np.array(0.2))).__round__(2)  # √((2 · 0.2)² + 0.3²)
+    0.5
+    """
+
+    scale: float = 1.0
+    base_std: float = 0.0
+    within_std: float = 0.0
+
+    def shared_variance(self, regressor_std: Array | float) -> Array:
+        """Return the variance that more sliding over the texture does not lessen.
+
+        Parameters
+        ----------
+        regressor_std
+            Standard deviation that the regressor gives, grades.
+
+        Returns
+        -------
+        array of the same shape
+            Square of grades.
+        """
+        variance: Array = self.scale**2 * (np.square(regressor_std) + self.base_std**2)
+        return variance
+
+    def window_std(self, regressor_std: Array) -> Array:
+        """Return the standard deviation of the grade of a single window.
+
+        Parameters
+        ----------
+        regressor_std : (...)
+            Standard deviation that the regressor gives, grades.
+
+        Returns
+        -------
+        (...)
+            Grades.
+        """
+        return np.sqrt(self.shared_variance(regressor_std) + self.within_std**2)
+
+
+@dataclass(frozen=True, eq=False)
+class RoughnessModel:
+    """Fitted parameters, and what is needed to grade a feature vector and to refuse an incompatible one.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    names, feature_set
+        Features it expects, and their fingerprint.
+    recipe
+        By which it was made.
+    parameters
+        Fitted parameters of the regressor: plain arrays.
+    calibration
+        Of the standard deviation.
+    limits
+        Of the checks.
+    grades
+        Of the training textures.
+    training
+        Facts about the training, for the card.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texture_estimation.roughness import RoughnessRecipe
+    >>> from texture_estimation.roughness import train_grades
+    >>> from texture_estimation.roughness import Grades
+    >>> from texture_features.examples import LabelledFeatures
+    >>> inputs = {'signal': {'features': ['mean']}}
+    >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
+    >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
+    >>> values = np.repeat([1.0, 2.0, 3.0, 4.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
+    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 3.0, 'jute': 4.0}))
+    >>> abs(float(model.grade(np.array([2.0]))[0]) - 2.0) < 0.5
+    True
+    """
+
+    name: str
+    names: tuple[str, ...]
+    feature_set: str
+    recipe: RoughnessRecipe
+    parameters: Mapping[str, Any]
+    calibration: Calibration
+    limits: Mapping[str, float]
+    grades: Mapping[str, float]
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def predictor(self) -> RegressorPredictor:
+        """The head as plain arrays; it sees the features that are no checks."""
+        return self.recipe.regressor.predictor(self.parameters)
+
+    @cached_property
+    def checks(self) -> Checks:
+        """What tells whether a window can be graded."""
+        return Checks(self.recipe.checks, self.names, self.limits)
+
+    @cached_property
+    def _columns(self) -> NDArray[np.intp]:
+        return graded_columns(self.names)
+
+    def grade(self, X: Array) -> tuple[Array, Array]:
+        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features).
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (...)
+            Grade, 1 to 5.
+        (...)
+            Standard deviation, grades.
+        """
+        return self.predictor(X.take(self._columns, axis=-1))
+
+    @property
+    def card(self) -> dict[str, Any]:
+        """What the card says, in the form of JSON."""
+        return {
+            'format': model_files.FORMAT,
+            'name': self.name,
+            'target': 'roughness grade, 1 (smooth) to 5 (rough), as people give it: an opinion, not a depth',
+            'feature_set': self.feature_set,
+            'features': list(self.names),
+            'grades': dict(self.grades),
+            'calibration': asdict(self.calibration),
+            'limits': dict(self.limits),
+            'training': dict(self.training),
+            'recipe': self.recipe.as_mapping(),
+            'recipe_name': self.recipe.name,
+        }
+
+    def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
+        """Write NAME.skops and NAME.json; `facts` are added to the card. Return NAME.skops."""
+        return model_files.write(path, self.parameters, {**self.card, **(facts or {})})
+
+
+def load_roughness_model(path: str | Path) -> RoughnessModel:
+    """Read a model; `path` is that of either file, or of both without the ending. No code in the file is run.
+
+    Raises
+    ------
+    ModelMismatch
+        With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
+    """
+    target = model_files.model_stem(path)
+    card, content = model_files.read(path)
+    if 'regressor' not in card.get('recipe', {}):
+        raise ModelMismatch(f"model '{target}' classifies textures; load it in the classifier")
+    with model_files.usable(target):
+        model = RoughnessModel(
+            name=str(card['name']),
+            names=tuple(map(str, card['features'])),
+            feature_set=str(card['feature_set']),
+            recipe=RoughnessRecipe.from_mapping(card['recipe'], str(card['recipe_name'])),
+            parameters=model_files.load_parameters(content, ()),
+            calibration=Calibration(**card['calibration']),
+            limits=dict(card['limits']),
+            grades=dict(card['grades']),
+            training=dict(card['training']),
+        )
+        grade, std = model.grade(np.zeros(len(model.names)))
+    if np.shape(grade) or np.shape(std):
+        raise ModelMismatch(f"model '{target}' answers with more than one grade; train it again")
+    return model
+
+
+# --------------------
+# The grade of a surface, and how sure it is, growing window by window while the finger slides.
+
+NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
+SILENT = 'no grade: the surface resembles no training surface'
+# The scatter of the windows of a texture, known from the training, counts as so many windows.
+PRIOR_WINDOWS = 4.0
+
+
+class RoughnessAccumulator:
+    """Join the grades of the windows of one slide; the same code on the robot and on recordings.
+
+    A new exploration id, or a vector after the `last` one, starts again.
+
+    Parameters
+    ----------
+    model
+        What grades each window; None answers the end of every slide with a sentence that no model is loaded.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texture_estimation.roughness import RoughnessRecipe
+    >>> from texture_estimation.roughness import train_grades
+    >>> from texture_estimation.roughness import Grades
+    >>> from texture_features.examples import LabelledFeatures
+    >>> inputs = {'signal': {'features': ['mean']}}
+    >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
+    >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
+    >>> values = np.repeat([1.0, 2.0, 3.0, 4.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
+    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 3.0, 'jute': 4.0}))
+    >>> grader = RoughnessAccumulator(model)
+    >>> window = FeatureVector(0, 'slide', 0.5, 0.1, ('signal/mean',), np.array([2.0]), feature_set='a1')
+    >>> abs(grader.update(window).grade - 2.0) < 0.5
+    True
+    """
+
+    def __init__(self, model: RoughnessModel | None) -> None:
+        self.model = model
+        self.refused = 0  # vectors of another fingerprint
+        self.unusable = 0  # windows without contact, with skids or with values that are not finite
+        self.silent = 0  # windows to which the regressor gave no grade
+        self._over = True
+        self._final = False
+        self._exploration_id = ''
+
+    def update(self, vector: FeatureVector) -> RoughnessEstimate | None:
+        """Return the estimate after one more window, or the final one; None after that."""
+        if self._over or vector.exploration_id != self._exploration_id:
+            self._start(vector.exploration_id)
+        self._over = vector.last
+        if self._final:
+            return None
+        if self.model is not None and not vector.last:
+            self._take(vector, self.model)
+        estimate = self._estimate(vector)
+        self._final = estimate.final
+        return estimate
+
+    def _start(self, exploration_id: str) -> None:
+        self._exploration_id = exploration_id
+        self._final = False
+        self._windows = 0
+        self._sum = self._sum_squares = self._sum_variances = 0.0
+        self._evidence_ns = self._window_ns = self._end_ns = 0
+        self._message = '' if self.model else NO_MODEL
+
+    def _take(self, vector: FeatureVector, model: RoughnessModel) -> None:
+        if vector.feature_set != model.feature_set:
+            self.refused += 1
+            self._message = (
+                f"model '{model.name}' does not fit: {fingerprint_difference(vector.feature_set, model.feature_set)}"
+            )
+            return
+        refusal = model.checks.refusal(vector)
+        if refusal:
+            self.unusable += 1
+            self._message = f'a window was left out: {refusal}'
+            return
+        grade, std = (float(number) for number in model.grade(vector.values))
+        if math.isnan(grade):
+            self.silent += 1
+            self._message = SILENT
+            return
+        self._windows += 1
+        self._sum += grade
+        self._sum_squares += grade * grade
+        self._sum_variances += float(model.calibration.shared_variance(std))
+        self._window_ns = round(vector.window_s * NANOSECONDS)
+        end = vector.start_ns + self._window_ns
+        self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
+        self._end_ns = max(end, self._end_ns)
+
+    def _estimate(self, vector: FeatureVector) -> RoughnessEstimate:
+        model = self.model
+        if model is None or not self._windows:
+            return RoughnessEstimate(
+                stamp_ns=vector.start_ns,
+                exploration_id=vector.exploration_id,
+                frame_id=vector.frame_id,
+                final=vector.last,
+                model=model.name if model else '',
+                message=self._message or (no_window(model.recipe.feature_set.windows) if model and vector.last else ''),
+            )
+        shared, scatter = self._variances(model)
+        std = math.sqrt(shared + scatter)
+        to_gain = NORMAL_90 * (std - math.sqrt(shared))
+        params = model.recipe.evidence
+        narrow = self._windows >= params.min_windows and to_gain < params.min_narrowing_grades
+        return RoughnessEstimate(
+            stamp_ns=self._end_ns,
+            exploration_id=vector.exploration_id,
+            frame_id=vector.frame_id,
+            valid=True,
+            grade=min(max(self._sum / self._windows, SMOOTH), ROUGH),
+            grade_std=std,
+            windows=self._windows,
+            evidence_s=self._evidence_ns / NANOSECONDS,
+            final=vector.last or narrow,
+            model=model.name,
+            message=self._message,
+        )
+
+    def _variances(self, model: RoughnessModel) -> tuple[float, float]:
+        """Return the variance that more sliding does not lessen, and that of the mean of the windows so far."""
+        count = self._windows
+        around = max(0.0, self._sum_squares - self._sum * self._sum / count)
+        known = PRIOR_WINDOWS * model.calibration.within_std**2
+        scatter = (known + around) / (PRIOR_WINDOWS + count - 1.0)
+        # Windows that overlap contribute the sliding time that they cover together.
+        return self._sum_variances / count, scatter * self._window_ns / self._evidence_ns
+
+
+# --------------------
+# Learn to grade from windows of textures that people graded.
+
+MIN_TEXTURES = 4  # to hold one out and train on the others
+SCALES = (0.05, 20.0)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutGrades:
+    """What a regressor says of windows of textures that it has not seen, (n,) each; NaN where it gives no grade.
+
+    Examples
+    --------
+    >>> held = HeldOutGrades(np.array([1.0, 2.0, np.nan]), np.ones(3), np.ones(3), np.array([0, 0, 1]))
+    >>> held.graded.grades.tolist()
+    [1.0, 2.0]
+    """
+
+    grades: Array
+    stds: Array
+    true: Array
+    textures: Codes
+
+    @property
+    def graded(self) -> HeldOutGrades:
+        """Those windows that got a grade."""
+        rows = np.isfinite(self.grades)
+        return HeldOutGrades(self.grades[rows], self.stds[rows], self.true[rows], self.textures[rows])
+
+    def mean_over_textures(self, values: Array) -> float:
+        """Return the mean of values, (n,), in which each texture counts alike.
+
+        Parameters
+        ----------
+        values : (n,)
+            A number for each window.
+        """
+        return float(np.mean([values[self.textures == code].mean() for code in np.unique(self.textures)]))
+
+
+def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Grades, name: str = '') -> RoughnessModel:
+    """Return a model that grades as the people did who graded the textures of the examples.
+
+    The standard deviation is calibrated on textures held out in turn, of the training alone.
+
+    Parameters
+    ----------
+    recipe
+        Names the head.
+    examples
+        Cut with `recipe.training_windows`.
+    grades
+        Of every texture in the examples.
+    name
+        Of the model; that of the recipe if ''.
+
+    Returns
+    -------
+    RoughnessModel
+        Ready to grade and to be stored.
+
+    Raises
+    ------
+    InvalidData, UnknownName
+        If there are no examples, a value is not finite, or a texture has no grade.
+    """
+    labels, codes = np.unique(examples.labels, return_inverse=True)
+    table = {str(label): grades.of(str(label)) for label in labels}
+    true = np.array([table[str(label)] for label in labels])[codes]
+    _check(examples)
+    columns = graded_columns(examples.names)
+    values = examples.values[:, columns]
+    held_out = hold_out(recipe.regressor, values, true, codes, recipe.training.folds)
+    calibration, facts = calibrate(held_out)
+    return RoughnessModel(
+        name=name or recipe.name,
+        names=examples.names,
+        feature_set=examples.feature_set,
+        recipe=recipe,
+        parameters=recipe.regressor.fit(values, true, codes),
+        calibration=calibration,
+        limits=limits_of(recipe.checks, examples.names, examples.values),
+        grades=table,
+        training={
+            'windows': len(codes),
+            'slides': len(np.unique(examples.groups)),
+            'textures': len(labels),
+            'window_s': examples.window_s,
+            'hop_s': examples.hop_s,
+            **facts,
+        },
+    )
+
+
+def hold_out(
+    regressor: RoughnessRegressor, values: Array, true: Array, textures: Codes, folds: int
+) -> HeldOutGrades | None:
+    """Return what is said of each texture by a regressor that trained on the others; None if there are too few.
+
+    Parameters
+    ----------
+    regressor
+        Regressor of the recipe.
+    values : (n, n_features)
+        Features of windows.
+    true : (n,)
+        Grade that people gave the texture of each.
+    textures : (n,)
+        Number of the texture of each.
+    folds
+        Number of parts into which the textures are divided.
+
+    Returns
+    -------
+    HeldOutGrades or None
+    """
+    codes = np.unique(textures)
+    if len(codes) < MIN_TEXTURES:
+        return None
+    grades, stds = np.empty(len(true)), np.empty(len(true))
+    # Textures of like grade go to different parts, so that each part leaves some of every grade.
+    order = codes[np.argsort([true[textures == code][0] for code in codes], kind='stable')]
+    for part in range(min(folds, len(codes))):
+        held = np.isin(textures, order[part :: min(folds, len(codes))])
+        fitted = regressor.predictor(regressor.fit(values[~held], true[~held], textures[~held]))
+        grades[held], stds[held] = fitted(values[held])
+    return HeldOutGrades(grades, stds, true, textures)
+
+
+def calibrate(held_out: HeldOutGrades | None) -> tuple[Calibration, Mapping[str, object]]:
+    """Return the calibration, and facts for the card.
+
+    The scale makes the mean square of error over standard deviation, each texture counting alike, what it is for a
+    Student distribution with as many degrees of freedom as there are textures, whose 90 % interval ours then is.
+    """
+    if held_out is None:
+        return Calibration(), {'calibration': f'not calibrated: fewer than {MIN_TEXTURES} textures'}
+    graded = held_out.graded
+    if not len(graded.grades):
+        return Calibration(), {'calibration': 'not calibrated: no held-out window got a grade'}
+    errors = graded.grades - graded.true
+    codes = np.unique(graded.textures)
+    # np.unique sorts, so codes index these tables by search.
+    at = np.searchsorted(codes, graded.textures)
+    means = np.array([graded.grades[at == number].mean() for number in range(len(codes))])
+    within = np.sqrt(graded.mean_over_textures((graded.grades - means[at]) ** 2))
+    knows = bool((graded.stds > 0).any())
+    base = 0.0 if knows else np.sqrt(graded.mean_over_textures((means[at] - graded.true) ** 2))
+    wanted = (NORMAL_90 / float(student.ppf(0.95, len(codes)))) ** 2
+
+    def excess(log_scale: float) -> float:
+        spread = Calibration(float(np.exp(log_scale)), float(base), float(within)).window_std(graded.stds)
+        return graded.mean_over_textures((errors / np.maximum(spread, 1e-9)) ** 2) - wanted
+
+    low, high = np.log(SCALES)
+    if excess(low) <= 0.0:
+        scale = SCALES[0]
+    elif excess(high) >= 0.0:
+        scale = SCALES[1]
+    else:
+        scale = float(np.exp(brentq(excess, low, high)))
+    return Calibration(scale, float(base), float(within)), {
+        'calibration': f'{len(codes)} textures held out in turn',
+        'held_out_error': round(graded.mean_over_textures(np.abs(errors)), 4),
+        'held_out_without_grade': round(1.0 - len(graded.grades) / len(held_out.grades), 4),
+    }
+
+
+def _check(examples: LabelledFeatures) -> None:
+    bad = ~np.isfinite(examples.values).all(axis=0)
+    if bad.any():
+        name = examples.names[int(bad.argmax())]
+        raise InvalidData(
+            f"feature '{name}' and {int(bad.sum()) - 1} others are not finite; features of the surface need the speed "
+            'of every slide: record it, or leave these features out of the recipe'
+        )

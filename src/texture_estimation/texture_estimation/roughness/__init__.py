@@ -1,1 +1,0 @@
-"""Roughness as people grade it: regressors, recipes, models and evidence."""

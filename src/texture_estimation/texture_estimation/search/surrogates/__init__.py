@@ -1,1 +1,0 @@
-"""What classifies a half in a search, one learner a file; `catalogue` lists them."""

@@ -1,0 +1,748 @@
+"""Train a texture model from labelled features: the learner, its calibration, its decisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from texture_core.errors import InvalidData
+from texture_core.types import AnyArray, Array
+from texture_estimation import decisions as prediction_sets
+from texture_estimation import decisions as stopping_rule
+from texture_estimation.decisions import (
+    HIDDEN,
+    NOVELTY_WINDOWS,
+    SCORES,
+    ClassDistance,
+    ConfidenceFloor,
+    Domain,
+    ErrorBound,
+    NoveltyDetector,
+    SlideNovelty,
+    fit_confidence_floor,
+    space_means,
+)
+from texture_estimation.evidence_rules import EvidenceRule, deciding_rows, running_means
+from texture_estimation.gaussians import TrainingExamples
+from texture_estimation.learners.learner import (
+    Codes,
+    Fitted,
+    Learner,
+    Predictor,
+    assign_folds,
+    extras_of,
+    hidden_layer,
+    of_examples,
+)
+from texture_estimation.learners.mlp import AugmentedExamples
+from texture_estimation.model import TextureModel
+from texture_estimation.next_motion import NextTouchModel
+from texture_estimation.numerics import group_means, is_tied, log_loss
+from texture_estimation.recipe import DecisionParams, Recipe
+from texture_features.augmentation import NOISE, FeatureCopies
+from texture_features.examples import LabelledFeatures, SlideConditions
+from texture_features.features import temporal
+
+# --------------------
+# Fit the learner of a recipe to labelled windows, with what else the recipe trains it on.
+
+MIN_CALIBRATION_SLIDES = 2
+
+
+def fit_learner(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes) -> Fitted:
+    """Fit the learner; windows that begin within the length of the first one of their slide count more often.
+
+    Where a label has a single slide, its windows are held out one by one and must not be there twice: then every window
+    counts once, and nothing is drawn besides.
+
+    Parameters
+    ----------
+    recipe
+        Its learner fits the examples.
+    examples
+        Windows; those of other lengths train the learner, too, and are not held out.
+    codes, groups : (n,)
+        Numbers of the labels and of the slides.
+
+    Returns
+    -------
+    Fitted
+        With one row of held-out log-probabilities for each window.
+    """
+    if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_CALIBRATION_SLIDES:
+        return recipe.learner.fit(examples.values, codes, groups)
+    times = _times(groups, examples, recipe.training.start_weight)
+    rows = np.repeat(np.arange(len(codes)), times)
+    extras = {name: EXTRAS[name](recipe, examples, codes, groups) for name in extras_of(recipe.learner)}
+    fit: Callable[..., Fitted] = recipe.learner.fit  # which takes the extras that the learner declares
+    fitted = fit(*_with_resized(examples, codes, groups, rows), **extras)
+    if fitted.held_out is None:
+        return fitted
+    return replace(fitted, held_out=fitted.held_out[np.cumsum(times) - times])
+
+
+def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows: Codes) -> tuple[Array, Codes, Codes]:
+    """Return features, labels and slides of these windows, and behind them those of the windows of other lengths."""
+    taken = examples.values[rows], codes[rows], groups[rows]
+    if examples.resized is None:
+        return taken
+    names, first = np.unique(examples.groups, return_index=True)
+    own = np.isin(examples.resized.groups, names)
+    slides = np.searchsorted(names, examples.resized.groups[own])
+    further = examples.resized.values[own], codes[first][slides], slides
+    return (
+        np.concatenate([taken[0], further[0]]),
+        np.concatenate([taken[1], further[1]]),
+        np.concatenate([taken[2], further[2]]),
+    )
+
+
+def _touch_differences(_recipe: Recipe, examples: LabelledFeatures, _codes: Codes, groups: Codes) -> Array | None:
+    """Return by number of the slide how it differs from its touch before the finger moved; NaN where there is none."""
+    if not examples.touches:
+        return None
+    means = group_means(examples.values, groups)
+    unknown = np.full(means.shape[1], np.nan)
+    touches = [examples.touches.get(slide, unknown) for slide in np.unique(examples.groups).tolist()]
+    differences: Array = means - np.stack(touches)
+    return differences
+
+
+def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
+    """Return how often each window counts, (n,): more often those that begin within the length of the first one.
+
+    `runs` are the numbers of the slides or copies to which the windows belong, (n,).
+    """
+    starting = max(1, round(examples.window_s / examples.hop_s))
+    times = np.ones(len(runs), dtype=np.intp)
+    for run in np.unique(runs):
+        times[np.flatnonzero(runs == run)[:starting]] = start_weight
+    return times
+
+
+def _augmented_examples(
+    recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
+) -> AugmentedExamples | None:
+    """Return what the learner draws besides the examples; None without augmentation or without copies of the slides."""
+    if examples.augmented is None or not recipe.augmentation.copies:
+        return None
+    copies = examples.augmented.copies
+    names, first = np.unique(examples.groups, return_index=True)
+    own = np.isin(copies.groups, names)
+    copied = np.searchsorted(names, copies.groups[own])
+    runs = np.unique(np.stack([copied, copies.copies[own]]), axis=1, return_inverse=True)[1].reshape(-1)
+    means = group_means(examples.values, groups)
+    classes = codes[first]
+    centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
+    return AugmentedExamples(
+        values=copies.values if own.all() else copies.values[own],  # a copy of all takes as much memory again
+        codes=classes[copied],
+        groups=copied,
+        rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
+        gain_response=examples.augmented.gain_response,
+        slide_deviations=means - centres[classes],
+        slides=np.arange(len(names)),
+        augmentation=recipe.augmentation,
+    )
+
+
+# What learners may declare as their `extras`: keyword arguments of `fit` besides the examples.
+EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
+    'augmented': _augmented_examples,
+    'differences': _touch_differences,
+}
+
+
+# --------------------
+# Fit novelty detection on slides held out of the training, and follow these slides window by window.
+
+MIN_NOVELTY_SLIDES = 3  # of a class: with one held out, two tell how much slides differ
+MIN_ALL_SLIDES = 20
+FOLDS = 5
+# Of the copies of each slide, so many are among the slides to which the distance is measured, at random gains, if they
+# have no noise: what is tolerated as noise would let strong noise pass. Chosen on slides 21-30, trained on 1-20.
+REFERENCE_COPIES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class SlideTrace:
+    """One held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it.
+
+    Parameters
+    ----------
+    truth
+        Number of its label.
+    means : (n_windows, n_labels)
+        Mean evidence after each window.
+    effective_windows : (n_windows,)
+        Length of the evidence.
+    scores : (n_windows, n_scores)
+        Of its novelty; (n_windows, 0) where none were computed.
+    disturbance
+        Kind of the disturbance; '' for none.
+
+    Examples
+    --------
+    >>> trace = SlideTrace(0, np.log([[0.7, 0.3], [0.8, 0.2]]), np.array([1.0, 1.2]), np.zeros((2, 0)))
+    >>> bool((trace.means.argmax(axis=1) == trace.truth).all())
+    True
+    """
+
+    truth: int
+    means: Array
+    effective_windows: Array
+    scores: Array
+    disturbance: str = ''
+
+
+@dataclass(frozen=True, eq=False)
+class _Slide:
+    """A slide or a copy of one, whose windows are rows of examples; only as numbers of double precision when asked for.
+
+    Parameters
+    ----------
+    group, truth
+        Number of the slide, and of its label.
+    examples : (n, n_features)
+        Of all slides.
+    rows
+        Those of this slide.
+    shift : (n_features,) or a number
+        Added to the features.
+    disturbance
+        Kind of the disturbance; '' for none.
+    """
+
+    group: int
+    truth: int
+    examples: AnyArray
+    rows: slice | Codes
+    shift: Array | float = 0.0
+    disturbance: str = ''
+
+    @property
+    def values(self) -> Array:
+        """Features of the windows, (n_windows, n_features)."""
+        values: Array = self.examples[self.rows].astype(np.float64)
+        values += self.shift
+        return values
+
+
+def fit_novelty(
+    learner: Learner,
+    fitted: Fitted,
+    examples: LabelledFeatures,
+    rule: EvidenceRule,
+    false_rejection_rate: float,
+    *,
+    gain_range: float = 1.0,
+    scores: Collection[str] = SCORES,
+) -> tuple[NoveltyDetector, Sequence[SlideTrace]] | None:
+    """Return the detector, and the held-out slides and disturbed copies by which it was fitted.
+
+    Returns None if there are too few slides: MIN_SLIDES of each class are needed, and in all MIN_ALL_SLIDES or one over
+    the rate of false rejections.
+
+    Parameters
+    ----------
+    learner
+        Learner of the recipe.
+    fitted
+        What was fitted to the examples.
+    examples
+        Windows of known surfaces.
+    rule
+        Combines the windows of a slide.
+    false_rejection_rate
+        Fraction of slides over known surfaces that may be rejected, above 0.
+    gain_range
+        Largest factor by which copies of the slides are amplified or attenuated.
+    scores
+        Names of the scores that count, of SCORES.
+
+    Returns
+    -------
+    (NoveltyDetector, sequence of SlideTrace), or None
+    """
+    classes = np.unique(examples.labels, return_inverse=True)[1]
+    names, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
+    counts = np.bincount(classes[first])
+    enough = len(names) >= MIN_ALL_SLIDES or (len(names) + 1) * false_rejection_rate >= 1.0
+    if fitted.held_out is None or len(counts) < 2 or counts.min() < MIN_NOVELTY_SLIDES or not enough:
+        return None
+    overlap = min(examples.hop_s / examples.window_s, 1.0)
+    slides = [
+        _Slide(number, int(classes[first[number]]), examples.values, np.flatnonzero(groups == number))
+        for number in range(len(names))
+    ]
+    disturbed = _disturbed_slides(examples, names, classes[first])
+    copies = _reference_copies(examples, names, classes[first], gain_range)
+    compared = np.array([name.rsplit('/', 1)[-1] != temporal.SLIDE_ONSET for name in examples.names], dtype=np.float64)
+    traces: list[SlideTrace] = []
+    for held_out, predictor in _folds(learner, fitted, classes, groups):
+        distances = _fit_distances(
+            [slide for slide in slides if slide.group not in held_out],
+            [copy for copy in copies if copy.group not in held_out],
+            predictor,
+            overlap,
+            compared=compared,
+            scores=scores,
+        )
+        for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
+            values = slide.values
+            if predictor is not None:
+                log_probabilities = predictor(values)
+            elif not slide.disturbance:
+                log_probabilities = fitted.held_out[groups == slide.group]
+            else:
+                continue
+            evidence = rule.window_evidence(log_probabilities)
+            effective_windows = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
+            means = running_means(rule, evidence, effective_windows)
+            followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
+            traces.append(_with_scores(followed, values, evidence, predictor, distances))
+    final = learner.predictor(fitted.parameters)
+    layered = final if hidden_layer(final) else None
+    distances = _fit_distances(slides, copies, layered, overlap, compared=compared, scores=scores)
+    held_out_scores = [_scores_at(traces, level) for level in NOVELTY_WINDOWS]
+    if min(map(len, held_out_scores)) < MIN_NOVELTY_SLIDES:
+        return None
+    return NoveltyDetector.fit(distances, held_out_scores, false_rejection_rate, scores), traces
+
+
+def _folds(
+    learner: Learner, fitted: Fitted, classes: Codes, groups: Codes
+) -> Iterator[tuple[frozenset[int], Predictor | None]]:
+    """Yield the slides that are held out together, and what was fitted without them, if the learner keeps it."""
+    if fitted.folds:
+        for fold in fitted.folds:
+            yield frozenset(fold.held_out.tolist()), learner.predictor(fold.parameters)
+        return
+    split = assign_folds(classes, groups, FOLDS)
+    parts = split[0] if split else np.zeros(len(groups), np.intp)
+    for part in np.unique(parts):
+        yield frozenset(groups[parts == part].tolist()), None
+
+
+def _disturbed_slides(examples: LabelledFeatures, names: Any, classes: Codes) -> list[_Slide]:
+    return list(_copied_slides(examples.augmented.disturbed, names, classes)) if examples.augmented else []
+
+
+def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, gain_range: float) -> list[_Slide]:
+    """Return copies of the slides at other speeds and random gains, to which slides may be as near as to the slides."""
+    if examples.augmented is None:
+        return []
+    rng = np.random.default_rng(0)
+    widest, copies = math.log(gain_range), examples.augmented.copies
+    quiet = (copies.copies < REFERENCE_COPIES) & (copies.kinds != NOISE)
+    return [
+        replace(copy, shift=rng.uniform(-widest, widest) * examples.augmented.gain_response)
+        for copy in _copied_slides(copies.select(quiet), names, classes)
+    ]
+
+
+def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterator[_Slide]:
+    number = {name: place for place, name in enumerate(names.tolist())}
+    changes = (copies.groups[1:] != copies.groups[:-1]) | (copies.copies[1:] != copies.copies[:-1])
+    starts = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(copies.groups)]])
+    for start, stop in pairwise(starts.tolist()):
+        group = number.get(str(copies.groups[start])) if stop > start else None
+        if group is not None:
+            kind = str(copies.kinds[start])
+            yield _Slide(group, int(classes[group]), copies.values, slice(start, stop), disturbance=kind)
+
+
+def _fit_distances(
+    slides: Sequence[_Slide],
+    copies: Sequence[_Slide],
+    predictor: Predictor | None,
+    overlap: float,
+    *,
+    compared: Array,
+    scores: Collection[str],
+) -> Mapping[str, ClassDistance]:
+    """Return the distances that count, with the metric of undisturbed slides and references among the copies, too.
+
+    `compared` is 0 for features that only say when a window was, which slides cut in another way have otherwise.
+    """
+    hidden = hidden_layer(predictor) if predictor is not None and HIDDEN in scores else None
+    means, more = (
+        [_space_means(slide.values, hidden, overlap, compared) for slide in those] for those in (slides, copies)
+    )
+    classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
+    spaces = [space for space in means[0] if space in scores]
+    found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in spaces}
+    if not more:
+        return found
+    return {
+        space: distance.with_slides(np.stack([own[space] for own in more]), more_classes)
+        for space, distance in found.items()
+    }
+
+
+def _space_means(
+    values: Array, hidden: Callable[[Array], Array] | None, overlap: float, compared: Array
+) -> dict[str, Array]:
+    return space_means(compared * values, hidden(values) if hidden else None, overlap)
+
+
+def _with_scores(
+    trace: SlideTrace,
+    values: Array,
+    evidence: Array,
+    predictor: Predictor | None,
+    distances: Mapping[str, ClassDistance],
+) -> SlideTrace:
+    """Return the trace of a slide, whose windows have these features and gave this evidence, with its scores."""
+    hidden = hidden_layer(predictor) if predictor is not None else None
+    activations = hidden(values) if hidden else [None] * len(values)
+    highest = np.sort(trace.means, axis=1)[:, -2:]
+    novelty = SlideNovelty(distances, evidence.shape[1])
+    scores = []
+    for number, label in enumerate(trace.means.argmax(axis=1).tolist()):
+        effective_windows = float(trace.effective_windows[number])
+        novelty.add(values[number], activations[number], int(evidence[number].argmax()), effective_windows)
+        scores.append(novelty.scores(label, float(highest[number, 1] - highest[number, 0])))
+    return replace(trace, scores=np.array(scores))
+
+
+def _scores_at(traces: Sequence[SlideTrace], effective_windows: float) -> Array:
+    """Return the scores of undisturbed slides with the right label after so many windows, (n_slides, n_scores)."""
+    found = []
+    for trace in traces:
+        place = int(np.abs(trace.effective_windows - effective_windows).argmin())
+        if not trace.disturbance and int(trace.means[place].argmax()) == trace.truth:
+            found.append(trace.scores[place])
+    return np.array(found)
+
+
+# --------------------
+# Fit when a slide may end, which textures stay candidates and how fast evidence grows, on held-out slides.
+
+# Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
+DEFAULT_TEMPERING_EXPONENT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutSlide:
+    """A held-out slide: mean log-evidence and effective window count after each window.
+
+    Examples
+    --------
+    >>> means = np.log([[0.6, 0.4], [0.8, 0.2]])
+    >>> slide = HeldOutSlide(truth=0, means=means, effective_window_counts=np.array([1.0, 1.5]))
+    >>> slide.means.argmax(axis=1).tolist()
+    [0, 0]
+    """
+
+    truth: int
+    means: Array
+    effective_window_counts: Array
+
+    def posterior(self, rule: EvidenceRule, tempering_exponent: float) -> Array:
+        """Return the log-probabilities after each window.
+
+        Returns
+        -------
+        (n_windows, n_labels)
+        """
+        return rule.log_posterior(self.means, self.effective_window_counts[:, None], tempering_exponent)
+
+
+def held_out_slides(
+    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, overlap: float
+) -> Sequence[HeldOutSlide]:
+    """Return the slides, as evaluated when they were held out; none if nothing was.
+
+    Parameters
+    ----------
+    fitted
+        What was fitted, with the held-out log-probabilities of the windows.
+    codes, groups : (n,)
+        Numbers of the labels and of the slides.
+    rule
+        Combines the windows of a slide.
+    overlap
+        Time between the starts of two windows over their length, at most 1.
+
+    Returns
+    -------
+    sequence of HeldOutSlide
+    """
+    if fitted.held_out is None:
+        return []
+    window_evidence_rows = rule.window_evidence(fitted.held_out)
+    slides = []
+    for group in np.unique(groups):
+        rows = np.flatnonzero(groups == group)
+        follow = _follow_group if rule.group else _follow
+        slides.append(HeldOutSlide(int(codes[rows[0]]), *follow(rule, window_evidence_rows[rows], overlap)))
+    return slides
+
+
+def _follow(rule: EvidenceRule, evidence: Array, overlap: float) -> tuple[Array, Array]:
+    """Return mean log-evidence and effective window count after each window of a slide."""
+    effective_window_counts = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
+    return running_means(rule, evidence, effective_window_counts), effective_window_counts
+
+
+def _follow_group(rule: EvidenceRule, evidence: Array, overlap: float) -> tuple[Array, Array]:
+    """Return the same for a rule by which only some of the windows decide."""
+    parts = [deciding_rows(number, rule.group) for number in range(1, len(evidence) + 1)]
+    deciding = np.array([len(evidence[part]) for part in parts], dtype=np.float64)
+    return np.stack([evidence[part].mean(axis=0) for part in parts]), 1.0 + (deciding - 1.0) * overlap
+
+
+def fit_tempering_exponent(slides: Sequence[HeldOutSlide], rule: EvidenceRule) -> float:
+    """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
+    if not slides:
+        return DEFAULT_TEMPERING_EXPONENT
+    mean = np.concatenate([slide.means for slide in slides])
+    effective_window_counts = np.concatenate([slide.effective_window_counts for slide in slides])[:, None]
+    truth = np.concatenate([np.full(len(slide.effective_window_counts), slide.truth) for slide in slides])
+
+    def loss(tempering_exponent: float) -> float:
+        return log_loss(rule.log_posterior(mean, effective_window_counts, tempering_exponent), truth)
+
+    return float(minimize_scalar(loss, bounds=(0.0, 1.0), method='bounded').x)
+
+
+def fit_open_set(
+    recipe: Recipe,
+    fitted: Fitted,
+    examples: LabelledFeatures,
+    slides: Sequence[HeldOutSlide],
+    tempering_exponent: float,
+) -> tuple[stopping_rule.StoppingRule, NoveltyDetector | None, ConfidenceFloor]:
+    """Return when a slide may end, the novelty detector, and the smallest confidence of known surfaces.
+
+    Without a novelty detector, as none is asked for or there are too few slides, there is no smallest confidence.
+
+    Parameters
+    ----------
+    recipe
+        Names the learner, the evidence rule and the rates of error that are allowed.
+    fitted
+        What was fitted to the examples.
+    examples
+        Windows of known surfaces.
+    slides
+        Held-out slides of the same windows.
+    tempering_exponent
+        How fast evidence grows.
+
+    Returns
+    -------
+    (StoppingRule, NoveltyDetector or None, ConfidenceFloor)
+    """
+    decisions = recipe.training
+    found = None
+    if decisions.false_rejection_rate:
+        found = fit_novelty(
+            recipe.learner,
+            fitted,
+            examples,
+            recipe.evidence,
+            decisions.false_rejection_rate,
+            gain_range=recipe.augmentation.gain_range,
+            scores=decisions.novelty_scores,
+        )
+    if found is None:
+        rule = _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate)
+        return rule, None, ConfidenceFloor()
+    detector, traces = found
+    courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
+    floor = _fit_floor(courses, decisions.low_confidence_rejection_rate)
+    courses = [_with_floor(course, floor) for course in courses]
+    rule = stopping_rule.fit_open_set_rule(
+        courses, decisions.max_error_rate, decisions.max_disturbed_error_rate, decisions.early_novelty_score
+    )
+    return rule, detector, floor
+
+
+def _course(
+    trace: SlideTrace, detector: NoveltyDetector, rule: EvidenceRule, tempering_exponent: float
+) -> stopping_rule.SlideCourse:
+    posterior = rule.log_posterior(trace.means, trace.effective_windows[:, None], tempering_exponent)
+    steps = list(zip(trace.scores.tolist(), trace.effective_windows.tolist(), strict=True))
+    novelty_scores, thresholds = np.array([detector.score_and_threshold(*step) for step in steps]).T
+    return stopping_rule.SlideCourse(
+        confidences=np.exp(posterior.max(axis=1)),
+        right=(posterior.argmax(axis=1) == trace.truth) & ~is_tied(posterior),
+        effective_windows=trace.effective_windows,
+        known=novelty_scores <= thresholds,
+        novelty_scores=novelty_scores,
+        disturbance=trace.disturbance,
+    )
+
+
+def _fit_floor(courses: Sequence[stopping_rule.SlideCourse], rate: float) -> ConfidenceFloor:
+    """Return the smallest confidence of undisturbed slides that end with the right label, but for this fraction."""
+    right = [course for course in courses if course.right[-1] and not course.disturbance]
+    return fit_confidence_floor(
+        [course.confidences for course in right], [course.effective_windows for course in right], rate
+    )
+
+
+def _with_floor(course: stopping_rule.SlideCourse, floor: ConfidenceFloor) -> stopping_rule.SlideCourse:
+    """Return a course that is known only where its confidence reaches the floor, too."""
+    steps = zip(course.confidences.tolist(), course.effective_windows.tolist(), strict=True)
+    return replace(course, known=course.known & np.array([floor.reached(*step) for step in steps]))
+
+
+def _fit_stopping(
+    slides: Sequence[HeldOutSlide], rule: EvidenceRule, tempering_exponent: float, wrong: float
+) -> stopping_rule.StoppingRule:
+    """Return when a slide may end."""
+    if not slides:
+        return stopping_rule.StoppingRule()
+    posteriors = [slide.posterior(rule, tempering_exponent) for slide in slides]
+    right: list[NDArray[np.bool_]] = [
+        (posterior.argmax(axis=1) == slide.truth) & ~is_tied(posterior)
+        for slide, posterior in zip(slides, posteriors, strict=True)
+    ]
+    confidences = [np.exp(posterior.max(axis=1)) for posterior in posteriors]
+    return stopping_rule.fit_stopping_rule(
+        confidences, right, [slide.effective_window_counts for slide in slides], wrong
+    )
+
+
+def fit_prediction_sets(
+    slides: Sequence[HeldOutSlide], rule: EvidenceRule, tempering_exponent: float, coverage: float
+) -> prediction_sets.PredictionSets:
+    """Return which textures are candidates.
+
+    Parameters
+    ----------
+    slides
+        Held-out slides.
+    rule
+        Combines the windows of a slide.
+    tempering_exponent
+        How fast evidence grows.
+    coverage
+        Share of slides whose texture is among the candidates.
+
+    Returns
+    -------
+    PredictionSets
+    """
+    if not slides:
+        return prediction_sets.PredictionSets(coverage)
+    posteriors = [slide.posterior(rule, tempering_exponent) for slide in slides]
+    return prediction_sets.fit_prediction_sets(
+        posteriors, [slide.truth for slide in slides], [slide.effective_window_counts for slide in slides], coverage
+    )
+
+
+# --------------------
+# Learn a model from labelled windows.
+
+
+def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> TextureModel:
+    """Return a model that knows the labels of the examples.
+
+    Probabilities, how fast evidence grows within a slide, when a slide may end and which textures are candidates are
+    trained on slides held out of the training in turn. With a single slide of a label, windows of that slide are held
+    out instead, and the confidence comes out too high; with a single window nothing is calibrated. The model's card
+    says which.
+
+    Parameters
+    ----------
+    recipe
+        Names learner and evidence rule.
+    examples
+        Cut with `recipe.training_windows`.
+    name
+        Of the model; that of the recipe if ''.
+
+    Returns
+    -------
+    TextureModel
+        Ready to classify and to be stored.
+
+    Raises
+    ------
+    InvalidData
+        If there are no examples, only one label, or a value that is not finite.
+    """
+    _check(examples)
+    labels, codes = np.unique(examples.labels, return_inverse=True)
+    slides, groups = np.unique(examples.groups, return_inverse=True)
+    trained = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
+    fitted = fit_learner(trained, examples, codes, groups)
+    overlap = min(examples.hop_s / examples.window_s, 1.0)
+    slides_held_out = held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
+    tempering_exponent = fit_tempering_exponent(slides_held_out, recipe.evidence)
+    decisions = recipe.training
+    rule, novelty_detector, floor = fit_open_set(trained, fitted, examples, slides_held_out, tempering_exponent)
+    return TextureModel(
+        name=name or recipe.name,
+        labels=tuple(labels.tolist()),
+        names=examples.names,
+        feature_set=examples.feature_set,
+        recipe=recipe,
+        parameters=fitted.parameters,
+        tempering_exponent=tempering_exponent,
+        stopping_rule=rule,
+        prediction_sets=fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
+        novelty_detector=novelty_detector,
+        confidence_floor=floor,
+        next_touch_model=_fit_next_touch_model(examples),
+        training={
+            'windows': len(codes),
+            'slides': len(slides),
+            'window_s': examples.window_s,
+            'hop_s': examples.hop_s,
+            'calibration': fitted.note,
+            'held_out_window_accuracy': _held_out_accuracy(fitted, codes),
+        },
+        examples=TrainingExamples.of(examples.values, codes, groups),
+        domain=_domain(examples, recipe.training),
+        error_bound=ErrorBound(len(slides_held_out), decisions.max_error_rate),
+    )
+
+
+def _check(examples: LabelledFeatures) -> None:
+    if not len(examples.labels):
+        raise InvalidData('there are no windows for training; record slides of at least two surfaces')
+    labels = np.unique(examples.labels)
+    if len(labels) < 2:
+        raise InvalidData(f"all windows are of '{labels[0]}'; at least two surfaces are needed to distinguish them")
+    bad = ~np.isfinite(examples.values).all(axis=0)
+    if bad.any():
+        name = examples.names[int(bad.argmax())]
+        windows = int((~np.isfinite(examples.values)).any(axis=1).sum())
+        raise InvalidData(
+            f"feature '{name}' and {int(bad.sum()) - 1} others are not finite in {windows} of {len(examples.labels)} "
+            'windows; leave these features out of the recipe, or these windows out of the examples'
+        )
+
+
+def _fit_next_touch_model(examples: LabelledFeatures) -> NextTouchModel | None:
+    """Return what textures look like under each motion, from the mean features of slides."""
+    slides, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
+    means = group_means(examples.values, groups)
+    made = [examples.motions.get(slide) for slide in slides.tolist()]
+    return NextTouchModel.of_slides(means, examples.labels[first].tolist(), made)
+
+
+def _domain(examples: LabelledFeatures, params: DecisionParams) -> Domain:
+    """Return the conditions under which the slides were made."""
+    slides, first = np.unique(examples.groups, return_index=True)
+    conditions = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
+    return Domain.of_slides(conditions, examples.labels[first].tolist(), params.domain_margins)
+
+
+def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:
+    if fitted.held_out is None:
+        return None
+    right = (fitted.held_out.argmax(axis=1) == codes) & ~is_tied(fitted.held_out)
+    return round(float(right.mean()), 4)

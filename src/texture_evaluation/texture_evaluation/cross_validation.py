@@ -1,0 +1,789 @@
+"""Cross-validate recipes on a data set: splits by slide and condition, figures, comparison."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+
+from texture_core.config import unknown_name
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import AnyArray, Array
+from texture_estimation.evidence import EvidenceAccumulator, single_decisions
+from texture_estimation.model import TextureModel
+from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
+from texture_evaluation import metrics
+from texture_evaluation.charts import COLOURS, chart, line_styles
+from texture_evaluation.metrics import SlideResult, curve
+from texture_evaluation.train import training_examples
+from texture_features.examples import LabelledFeatures
+from texture_recordings.dataset import CONDITIONS, SlideDataset
+
+# --------------------
+# Shares of windows and slides that are right, with 95 % intervals by bootstrap over slides; exact at 0 and 100 %.
+
+RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
+
+
+def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
+    """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are.
+
+    Parameters
+    ----------
+    results
+        Of the test slides.
+
+    Returns
+    -------
+    dict
+        A share is None where no slide is long enough, and so is its interval.
+    """
+    return {
+        'n_slides': len(results),
+        'n_windows': sum(len(result.window_labels) for result in results),
+        'window_accuracy': metrics.window_accuracy(results) if results else None,
+        'slide_accuracy': metrics.accuracy_at_end(results) if results else None,
+        'accuracy_at_s': dict(metrics.accuracy_at_times(results)),
+        'window_accuracy_interval': interval(window_counts(results)) if results else None,
+        'slide_accuracy_interval': interval(slide_counts(results)) if results else None,
+        'accuracy_at_s_interval': {f'{seconds:.1f}': _interval_at(results, seconds) for seconds in metrics.TIMES_S},
+    }
+
+
+def _interval_at(results: Sequence[SlideResult], seconds: float) -> list[float] | None:
+    """Return the interval of `metrics.accuracy_at`, over the slides that are long enough; None without any."""
+    ends = [(result.surface, result.after(seconds)) for result in results]
+    right = [(end.label == surface, 1) for surface, end in ends if end is not None]
+    return interval(np.array(right, dtype=np.float64)) if right else None
+
+
+def interval(counts: Array) -> list[float]:
+    """Return the 95 % interval of a share by bootstrap over slides: windows of a slide are not independent.
+
+    Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
+    the share of slides, about 3/n wide.
+
+    Parameters
+    ----------
+    counts : (n_slides, 2)
+        Number of right answers and of all answers of each slide, see `window_counts` and `slide_counts`.
+
+    Sources: Efron & Tibshirani 1993, chapter 13 (percentile interval); Clopper & Pearson 1934, at 0 and n of n.
+    """
+    right, answers = counts.sum(axis=0)
+    if right in (0.0, answers):
+        edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
+        return [edge, 1.0] if right else [0.0, 1.0 - edge]
+    drawn = np.random.default_rng(0).integers(len(counts), size=(RESAMPLES, len(counts)))
+    sums = counts[drawn].sum(axis=1)
+    edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
+    return [float(edge) for edge in edges]
+
+
+def window_counts(results: Sequence[SlideResult]) -> Array:
+    """Return right and all windows of each slide, (n_slides, 2).
+
+    Returns
+    -------
+    (n_slides, 2)
+        Whole numbers.
+    """
+    counts = [(sum(label == one.surface for label in one.window_labels), len(one.window_labels)) for one in results]
+    return np.array(counts, dtype=np.float64)
+
+
+def slide_counts(results: Sequence[SlideResult]) -> Array:
+    """Return whether each slide is right, and 1, (n_slides, 2).
+
+    Returns
+    -------
+    (n_slides, 2)
+        0 or 1, and 1.
+    """
+    return np.array([(one.estimates[-1].label == one.surface, 1) for one in results], dtype=np.float64)
+
+
+# --------------------
+# Split in the order of time: the first slides of each label train, the later ones test.
+
+
+class ChronologicalSplit:
+    """One split per label in the order of time, with the interface of scikit-learn's splitters.
+
+    Sensors wear and drift: slides that were recorded later are harder than slides drawn at random from the same hours.
+
+    Parameters
+    ----------
+    train_size
+        Fraction of the groups of each label that train, above 0 and below 1. At least one group of each label trains
+        and at least one tests.
+
+    Raises
+    ------
+    InvalidParameter
+        If `train_size` is not between 0 and 1.
+
+    Examples
+    --------
+    >>> labels = ['cork'] * 4 + ['felt'] * 4
+    >>> [(train, test)] = ChronologicalSplit(0.75).split(labels, labels)
+    >>> train.tolist(), test.tolist()
+    ([0, 1, 2, 4, 5, 6], [3, 7])
+    """
+
+    def __init__(self, train_size: float = 0.75) -> None:
+        if not 0.0 < train_size < 1.0:
+            raise InvalidParameter(f'train_size is {train_size}; a fraction above 0 and below 1 is needed')
+        self.train_size = train_size
+
+    def get_n_splits(self, *_args: object, **_named: object) -> int:
+        """Return 1, whatever else scikit-learn's splitters take."""
+        return 1
+
+    def split(  # X is there because scikit-learn's splitters have it
+        self,
+        X: object,
+        y: AnyArray,
+        groups: AnyArray | None = None,
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield the rows that train and those that test; rows are in the order of time, those of a group stay together.
+
+        Raises
+        ------
+        InvalidData
+            If a label has a single group.
+        """
+        labels = np.asarray(y)
+        slides = np.arange(len(labels)) if groups is None else np.asarray(groups)
+        tests = np.zeros(len(labels), dtype=bool)
+        for label in np.unique(labels):
+            rows = np.flatnonzero(labels == label)
+            order = list(dict.fromkeys(slides[rows].tolist()))
+            if len(order) < 2:
+                raise InvalidData(
+                    f"'{label}' has a single slide; a chronological split needs two or more slides of each surface"
+                )
+            count = min(max(round(self.train_size * len(order)), 1), len(order) - 1)
+            tests[rows] = np.isin(slides[rows], order[count:])
+        yield np.flatnonzero(~tests), np.flatnonzero(tests)
+
+
+# --------------------
+# The outcome of a cross-validation.
+
+
+@dataclass(frozen=True, eq=False)
+class FoldResult:
+    """What came out of one split.
+
+    Parameters
+    ----------
+    name
+        Number of the fold from 1, or the condition left out.
+    trained_on
+        Names of the training slides.
+    results
+        By the name of the test slide.
+    model
+        Trained on the training slides.
+    train_s
+        Processor time of the training, from features to the model, s.
+    """
+
+    name: str
+    trained_on: tuple[str, ...]
+    results: Mapping[str, SlideResult]
+    model: TextureModel
+    train_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """Results of all folds, and pooled over them.
+
+    Parameters
+    ----------
+    recipe
+        Name of the recipe.
+    labels
+        All surfaces of the data set.
+    folds
+        In their order.
+    unusable
+        Names of test slides without a whole window, which count nowhere.
+    """
+
+    recipe: str
+    labels: tuple[str, ...]
+    folds: tuple[FoldResult, ...]
+    unusable: tuple[str, ...] = ()
+
+    @property
+    def pooled(self) -> list[SlideResult]:
+        """Results of all test slides of all folds."""
+        return [result for fold in self.folds for result in fold.results.values()]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide.
+
+        `feature_set` is the fingerprint of the features, as in the card of a model, and `version` that of the suite.
+        """
+        return {
+            'recipe': self.recipe,
+            'feature_set': self.folds[0].model.feature_set,
+            'version': version('texture_evaluation'),
+            **figures(self.pooled),
+            'labels': list(self.labels),
+            'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
+            'folds': [
+                {
+                    'name': fold.name,
+                    'trained_on': list(fold.trained_on),
+                    **figures(list(fold.results.values())),
+                    'slides': {name: result.estimates[-1].label for name, result in fold.results.items()},
+                }
+                for fold in self.folds
+            ],
+            'unusable': list(self.unusable),
+        }
+
+
+# --------------------
+# Compare two recipes on the same test slides: an exact test, and the difference with an interval.
+
+
+@dataclass(frozen=True)
+class PairedComparison:
+    """Two recipes on the same test slides.
+
+    Parameters
+    ----------
+    first, second
+        Names of the recipes.
+    n_slides
+        Number of slides that both were tested on.
+    only_first, only_second
+        Number of slides that the one alone recognises. A slide that is tested in several folds is recognised if it is
+        in more than half of them.
+    p_value
+        Probability of at least such a difference if both were equally good: exact McNemar test, two-sided.
+    p_value_adjusted
+        The same, adjusted for all comparisons that were made together (Holm).
+    slide_difference, window_difference
+        Second minus first share that is right.
+    slide_interval, window_interval
+        Their 95 % intervals by bootstrap over slides.
+    """
+
+    first: str
+    second: str
+    n_slides: int
+    only_first: int
+    only_second: int
+    p_value: float
+    p_value_adjusted: float
+    slide_difference: float
+    slide_interval: tuple[float, float]
+    window_difference: float
+    window_interval: tuple[float, float]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures."""
+        return dict(vars(self))
+
+
+def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison:
+    """Compare two recipes that were cross-validated on the same splits.
+
+    Parameters
+    ----------
+    first, second
+        Results of `cross_validate` with the same data set and splitter.
+
+    Returns
+    -------
+    PairedComparison
+        Positive differences mean that the second is better.
+
+    Raises
+    ------
+    InvalidData
+        If no slide was tested by both.
+
+    Notes
+    -----
+    Sources: McNemar 1947, the exact form by the binomial distribution; Efron & Tibshirani 1993, chapter 13.
+    """
+    slides = sorted(_tested(first) & _tested(second))
+    if not slides:
+        raise InvalidData(f"no slide was tested by '{first.recipe}' and by '{second.recipe}'; use the same split")
+    right, windows = (
+        np.stack([_counts(result, slides, of_windows=of_windows) for result in (first, second)])
+        for of_windows in (False, True)
+    )
+    recognised = right[..., 0] > 0.5 * right[..., 1]
+    only_first, only_second = (int((recognised[a] & ~recognised[b]).sum()) for a, b in ((0, 1), (1, 0)))
+    p_value = mcnemar(only_first, only_second)
+    slide_difference, slide_interval = _difference(right)
+    window_difference, window_interval = _difference(windows)
+    return PairedComparison(
+        first.recipe, second.recipe, len(slides), only_first, only_second, p_value, p_value,
+        slide_difference, slide_interval, window_difference, window_interval,
+    )  # fmt: skip
+
+
+def compare_all(results: Sequence[CrossValidation]) -> list[PairedComparison]:
+    """Compare each recipe with the first, the p values adjusted for their number.
+
+    Returns
+    -------
+    list of PairedComparison
+        In the order of the recipes.
+
+    Notes
+    -----
+    Source: Holm 1979, "A simple sequentially rejective multiple test procedure".
+    """
+    compared = [compare(results[0], other) for other in results[1:]]
+    order = np.argsort([one.p_value for one in compared], kind='stable')
+    adjusted, least = [1.0] * len(compared), 0.0
+    for rank, index in enumerate(order.tolist()):
+        least = max(least, min(1.0, (len(compared) - rank) * compared[index].p_value))
+        adjusted[index] = least
+    return [replace(one, p_value_adjusted=p_value) for one, p_value in zip(compared, adjusted, strict=True)]
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """Return the exact two-sided p value of the McNemar test, 1 if the two never differ.
+
+    Parameters
+    ----------
+    only_first, only_second
+        Number of cases that the one alone gets right.
+
+    Examples
+    --------
+    >>> round(mcnemar(1, 7), 4)
+    0.0703
+    """
+    differing = only_first + only_second
+    return float(binomtest(only_first, differing).pvalue) if differing else 1.0
+
+
+def _tested(result: CrossValidation) -> set[str]:
+    return {name for fold in result.folds for name in fold.results}
+
+
+def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool) -> Array:
+    """Return right and all answers of each slide over all folds, (n_slides, 2)."""
+    place = {name: row for row, name in enumerate(slides)}
+    counts = np.zeros((len(slides), 2))
+    for fold in result.folds:
+        kept = {name: one for name, one in fold.results.items() if name in place}
+        if kept:
+            own = (window_counts if of_windows else slide_counts)(list(kept.values()))
+            counts[[place[name] for name in kept]] += own
+    return counts
+
+
+def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
+    """Return second minus first share, and its interval; `counts` is (2, n_slides, 2)."""
+    shares = counts.sum(axis=1)
+    rows = np.random.default_rng(0).integers(counts.shape[1], size=(RESAMPLES, counts.shape[1]))
+    sums = counts[:, rows].sum(axis=2)
+    drawn = sums[..., 0] / sums[..., 1]
+    low, high = np.quantile(drawn[1] - drawn[0], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
+    return float(shares[1, 0] / shares[1, 1] - shares[0, 0] / shares[0, 1]), (float(low), float(high))
+
+
+# --------------------
+# Draw cross-validated recipes beside each other: shares with their intervals, and slides over sliding time.
+
+KINDS = (('window', 'single windows', 'o'), ('slide', 'whole slides', 's'))
+
+
+def comparison_chart(results: Sequence[CrossValidation], title: str, path: str | Path) -> Path:
+    """Draw the shares of windows and slides that are right with 95 % intervals, and how slides do over their time.
+
+    Parameters
+    ----------
+    results
+        One for each recipe.
+    title
+        What was split, and how.
+    path
+        File of the picture.
+
+    Returns
+    -------
+    Path
+    """
+    with chart(path, (10.0, 2.4 + 0.5 * len(results)), title) as figure:
+        shares, times = figure.subplots(1, 2)
+        _draw_shares(shares, results)
+        for result, style in zip(results, line_styles(), strict=False):
+            seconds, accuracy = curve(result.pooled)
+            times.plot(seconds, 100 * accuracy, label=result.recipe, marker='.', **style)
+        times.set(xlabel='sliding time used (s)', ylabel='slides recognised (%)', xlim=(0, None), ylim=(None, 101))
+        times.legend(loc='best')
+    return Path(path)
+
+
+def _draw_shares(axes: Any, results: Sequence[CrossValidation]) -> None:
+    figures = [result.as_json() for result in results]
+    rows = np.arange(len(results))
+    for (kind, name, marker), colour, offset in zip(KINDS, COLOURS, (-0.12, 0.12), strict=False):
+        shares = 100 * np.array([one[f'{kind}_accuracy'] for one in figures])
+        edges = 100 * np.array([one[f'{kind}_accuracy_interval'] for one in figures]).T
+        errors = np.maximum([shares - edges[0], edges[1] - shares], 0.0)
+        axes.errorbar(
+            shares, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
+        )
+    axes.set_yticks(rows, [result.recipe for result in results])
+    axes.set(xlabel='right (%)', xlim=(None, 101), ylim=(len(results) - 0.5, -0.5))
+    axes.legend(loc='best')
+
+
+# --------------------
+# What `--cross-validate` names: a splitter, and what must not be on both sides of a split.
+
+TEST_SIZE = 0.25  # of a random split
+
+
+class Splitter(Protocol):
+    """Interface of scikit-learn's splitters."""
+
+    def split(self, X: Any, y: Any, groups: Any) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Yield train and test rows.
+
+        Parameters
+        ----------
+        X : (n, ...)
+            One row for each slide; only their number matters.
+        y, groups : (n,)
+            Label and group of each row.
+
+        Yields
+        ------
+        ((n_train,), (n_test,))
+            Indices.
+        """
+
+
+@dataclass(frozen=True)
+class Split:
+    """A splitter by name.
+
+    Parameters
+    ----------
+    name
+        As the user writes it, such as 'leave-one-out:speed'.
+    splitter
+        Divides slides.
+    groups
+        What must not be on both sides: 'slide', a condition of `SlideDataset`, such as 'speed', or an array,
+        (n_slides,).
+    """
+
+    name: str
+    splitter: Splitter
+    groups: str | AnyArray = 'slide'
+
+
+def parse_split(text: str, seed: int = 0) -> Split:
+    """Return what a text such as 'stratified:5', 'leave-one-out:speed', 'chronological:0.75' or 'random:20' names.
+
+    Parameters
+    ----------
+    text
+        Name of a split, and after a colon its number or condition.
+    seed
+        Seed of the splits that draw slides.
+
+    Raises
+    ------
+    InvalidParameter
+        With what is allowed.
+    """
+    name, _, argument = text.partition(':')
+    if name not in SPLITS:
+        raise InvalidParameter(f"the split is '{text}': {unknown_name(name, SPLITS, 'split')}; {ALLOWED}")
+    try:
+        return SPLITS[name](text, argument, seed)
+    except ValueError as error:
+        raise InvalidParameter(f"the split is '{text}': {error}; {ALLOWED}") from error
+
+
+def _stratified(name: str, argument: str, seed: int) -> Split:
+    return Split(name, StratifiedGroupKFold(int(argument or 5), shuffle=True, random_state=seed))
+
+
+def _leave_one_out(name: str, argument: str, seed: int) -> Split:
+    if argument not in (*CONDITIONS, 'slide'):
+        raise InvalidParameter(f"the split is '{name}'; leave one of {', '.join(CONDITIONS)} or slide out")
+    return Split(name, LeaveOneGroupOut(), argument)
+
+
+def _chronological(name: str, argument: str, seed: int) -> Split:
+    return Split(name, ChronologicalSplit(float(argument or 0.75)))
+
+
+def _random(name: str, argument: str, seed: int) -> Split:
+    return Split(name, GroupShuffleSplit(int(argument or 20), test_size=TEST_SIZE, random_state=seed))
+
+
+SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
+    'stratified': _stratified,
+    'leave-one-out': _leave_one_out,
+    'chronological': _chronological,
+    'random': _random,
+}
+ALLOWED = (
+    f'write stratified:FOLDS, leave-one-out:CONDITION ({", ".join(CONDITIONS)}), '
+    'chronological:TRAINING_FRACTION or random:SPLITS'
+)
+
+
+# --------------------
+# Split labelled slides into folds of training and test slides.
+
+SPLIT_ADVICE = 'if each session holds one surface, set `session` in the mapping or use the split stratified'
+
+
+def split_slides(
+    dataset: SlideDataset, splitter: Splitter, groups: str | AnyArray = 'slide'
+) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return the training and test slides of each split, by their place in the data set.
+
+    Parameters
+    ----------
+    dataset
+        The slides.
+    splitter
+        One of scikit-learn's, or a `ChronologicalSplit`.
+    groups
+        As in `cross_validate`.
+
+    Returns
+    -------
+    list of ((n_train,), (n_test,))
+        Indices of slides.
+
+    Raises
+    ------
+    InvalidData
+        If the slides cannot be split so.
+    """
+    labels, columns = dataset.labels, slide_groups(dataset, groups)
+    if type(splitter).__name__.startswith('Stratified'):
+        _check_folds(labels, getattr(splitter, 'n_splits', 1))
+    try:
+        return list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
+    except ValueError as error:
+        raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
+
+
+def refuse_untrained(labels: AnyArray, splits: Sequence[tuple[NDArray[np.intp], NDArray[np.intp]]]) -> None:
+    """Refuse splits in which a surface is never trained where it is tested: its slides could not be right.
+
+    Parameters
+    ----------
+    labels : (n_slides,)
+        Surface of each slide.
+    splits
+        As `split_slides` returns them. One that trains on a single surface is left to the training, which refuses it.
+
+    Raises
+    ------
+    InvalidData
+        With the surfaces.
+    """
+    sides = [(set(labels[train].tolist()), set(labels[test].tolist())) for train, test in splits]
+    if any(len(trained) < 2 for trained, _ in sides):
+        return
+    possible = {label for trained, tested in sides for label in trained & tested}
+    untrained = sorted({label for _, tested in sides for label in tested} - possible)
+    if untrained:
+        names = ', '.join(f"'{label}'" for label in untrained)
+        raise InvalidData(f'tested but never trained in the same fold: {names}; {SPLIT_ADVICE}')
+
+
+def _check_folds(labels: AnyArray, folds: int) -> None:
+    names, counts = np.unique(labels, return_counts=True)
+    if counts.min() < folds:
+        raise InvalidData(
+            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
+            'use fewer folds or record more slides'
+        )
+
+
+def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
+    """Return the group of each slide.
+
+    Parameters
+    ----------
+    groups
+        'slide', the name of a condition, or one value for each slide.
+
+    Returns
+    -------
+    (n_slides,)
+
+    Raises
+    ------
+    InvalidData
+        If there are not as many values as slides.
+    """
+    if isinstance(groups, str):
+        return dataset.names if groups == 'slide' else dataset.condition(groups)
+    columns = np.asarray(groups)
+    if columns.shape != (len(dataset),):
+        raise InvalidData(
+            f'groups have the shape {columns.shape}; one value for each of {len(dataset)} slides is needed'
+        )
+    return columns
+
+
+# --------------------
+# Cross-validate a recipe on labelled slides: the one loop of training and testing.
+
+
+@dataclass(frozen=True, eq=False)
+class FoldFeatures:
+    """Features of all slides, computed once for all folds, and for all recipes of the same windows and features.
+
+    Parameters
+    ----------
+    trained
+        Windows as the recipe is trained on, with its augmentation.
+    tested
+        Windows as the recipe classifies them.
+    """
+
+    trained: LabelledFeatures
+    tested: LabelledFeatures
+
+    @classmethod
+    def of(cls, recipe: Recipe, dataset: SlideDataset) -> FoldFeatures:
+        """Return the features of a recipe; raise InvalidData if no slide has a window."""
+        tested = dataset.features(recipe.feature_set)
+        further = recipe.augmentation.copies or recipe.training.touch_s or recipe.training.slowest_m_s
+        if recipe.training_windows == recipe.feature_set.windows and not further:
+            return cls(tested, tested)
+        return cls(training_examples(recipe, dataset), tested)
+
+
+def cross_validate(
+    recipe: Recipe,
+    dataset: SlideDataset,
+    splitter: Splitter,
+    n_jobs: int | None = None,
+    *,
+    groups: str | AnyArray = 'slide',
+    features: FoldFeatures | None = None,
+) -> CrossValidation:
+    """Train a recipe on some slides and test it on others, for each split of the slides.
+
+    Features are computed once for all folds. The splitter divides slides, so no slide is ever on both sides. A slide
+    is tested as on the robot: window by window, from the accumulated evidence.
+
+    Parameters
+    ----------
+    recipe
+        Trained again for each fold.
+    dataset
+        The slides.
+    splitter
+        One of scikit-learn's, such as `StratifiedGroupKFold(5)`, or a `ChronologicalSplit`; it is called with one row
+        for each slide.
+    n_jobs
+        Number of folds computed at once, as joblib counts (-1: one per core). None: 1, or what a surrounding
+        `joblib.parallel_config` says, such as the workers of a Dask cluster.
+    groups
+        What must not be on both sides: 'slide', a condition of the data set, such as 'speed', or an array (n_slides,).
+    features
+        Those of the recipe, if they were computed already.
+
+    Returns
+    -------
+    CrossValidation
+        Results of every slide of every fold.
+
+    Raises
+    ------
+    InvalidData
+        If a split is impossible, no slide has a window, a fold has fewer than two surfaces to train on, or a surface is
+        tested but never trained.
+
+    Examples
+    --------
+    Cross-validate the default recipe by leaving one speed out::
+
+        dataset = SlideDataset.from_bags(['recordings'])
+        result = cross_validate(load_recipe('default'), dataset, LeaveOneGroupOut(), groups='speed')
+        print(result.as_json()['window_accuracy'])
+    """
+    columns = slide_groups(dataset, groups)
+    splits = split_slides(dataset, splitter, columns)
+    refuse_untrained(dataset.labels, splits)
+    features = features or FoldFeatures.of(recipe, dataset)
+    names = dataset.names
+    folds = Parallel(n_jobs=n_jobs)(
+        delayed(_fold)(
+            recipe,
+            features.trained.of_slides(names[train_rows]),
+            features.tested.of_slides(names[test_rows]),
+            tuple(names[train_rows].tolist()),
+            _fold_name(number, columns, test_rows),
+        )
+        for number, (train_rows, test_rows) in enumerate(splits, 1)
+    )
+    usable = set(features.tested.groups.tolist())
+    return CrossValidation(
+        recipe.name,
+        tuple(np.unique(dataset.labels).tolist()),
+        tuple(folds),
+        tuple(name for name in names.tolist() if name not in usable),
+    )
+
+
+def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str, SlideResult]:
+    """Return what a model says of each slide, by its name, window by window as on the robot."""
+    results = {}
+    for slide in dict.fromkeys(features.groups.tolist()):
+        *windows, end = features.vectors(slide)
+        evidence = EvidenceAccumulator(model)
+        estimates = [evidence.update(vector) for vector in windows]
+        alone = single_decisions(model, np.stack([vector.values for vector in windows]))
+        surface = str(features.labels[features.groups == slide][0])
+        results[slide] = SlideResult(surface, alone, estimates, evidence.update(end), model.recipe.evidence.group)
+    return results
+
+
+def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> str:
+    left_out = np.unique(groups[test_rows])
+    if len(left_out) != 1 or len(test_rows) < 2:
+        return str(number)
+    return f'{left_out[0]:g}' if np.issubdtype(left_out.dtype, np.number) else str(left_out[0])
+
+
+def _fold(
+    recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: tuple[str, ...], name: str
+) -> FoldResult:
+    start = time.process_time()
+    try:
+        model = train(recipe, trained)
+    except InvalidData as error:
+        raise InvalidData(f"fold '{name}' cannot be trained: {error}; {SPLIT_ADVICE}") from error
+    taken_s = time.process_time() - start
+    return FoldResult(name, trained_on, predict_slides(model, tested), model, taken_s)

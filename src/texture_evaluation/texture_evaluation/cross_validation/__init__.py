@@ -1,1 +1,0 @@
-"""Cross-validation of recipes on labelled slides, with scikit-learn's splitters and one in the order of time."""

@@ -1,0 +1,684 @@
+"""What an arm is to the explorer: commands, states, limits of commands, the surface's frame, zeroing of forces."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.errors import CommandRefused
+from texture_core.types import Array, rotation_matrix
+from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
+
+# --------------------
+# What every arm that carries the finger can do, whatever it is made of.
+
+Vector = tuple[float, float, float]  # x, y in the surface, z away from it
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """Position, velocity and normal force of the fingertip in the frame of the surface.
+
+    `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
+    force normal to the surface, positive when pressing; `along_n` that of the surroundings on the finger along x and y
+    of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
+    the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
+    cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
+    more; 0 if it does not say. `unsafe` says why it must not go on although it obeys: it is to be lifted; '' if it may.
+    """
+
+    time_ns: int
+    position: Vector
+    velocity: Vector
+    force_n: float
+    fault: str = ''
+    watchdog_s: float = 0.0
+    tangential_force_n: float = math.nan
+    along_n: tuple[float, float] = (math.nan, math.nan)
+    unsafe: str = ''
+
+    @property
+    def force_vector_n(self) -> Vector:
+        """The whole force on the finger, as far as the arm measures it."""
+        x, y = (0.0, 0.0) if all(map(math.isnan, self.along_n)) else self.along_n
+        return x, y, self.force_n
+
+    @property
+    def force_size_n(self) -> float:
+        """The size of the whole force, as far as the arm measures it."""
+        return math.hypot(*self.force_vector_n)
+
+
+@dataclass(frozen=True)
+class ArmCommand:
+    """What the finger shall do from now on: a velocity along the surface, and a velocity or a force normal to it.
+
+    `normal_m_s` is positive away from the surface. If `force_n` is given, the arm controls that pressing force instead
+    and ignores `normal_m_s`: above the surface it comes down until it presses.
+    """
+
+    tangential_m_s: tuple[float, float] = (0.0, 0.0)
+    normal_m_s: float = 0.0
+    force_n: float | None = None
+
+
+class Arm(Protocol):
+    """An arm under hybrid control: velocity along the surface, velocity or force along its normal.
+
+    A command holds until the next one, but at most for a fraction of a second: an arm without commands stops by itself.
+    Any method but `close` raises DeviceError if the arm cannot be reached.
+    """
+
+    def connect(self) -> None:
+        """Reach the arm and clear its faults; may be called again after `close`."""
+
+    def close(self) -> None:
+        """Stop, and let the arm go; never raises, may be called twice."""
+
+    def state(self) -> ArmState:
+        """Return the newest measured state at once; its age tells whether the arm still answers."""
+
+    def command(self, command: ArmCommand) -> None:
+        """Take over a command at once; it does not wait for the arm to follow."""
+
+    def stop(self) -> None:
+        """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
+
+
+class ForceReading(enum.Enum):
+    """What the measured force of an arm does by itself; decides what counts as a frozen reading.
+
+    An arm says it by an attribute `force_reading`; one that has none counts as `CONTROLLED`, which asks least.
+    """
+
+    NOISY = enum.auto()  # never twice the same to the last bit: a force sensor finer than its noise
+    MEASURED = enum.auto()  # may stay the same, but not while the finger moves along the normal in contact
+    CONTROLLED = enum.auto()  # the arm may keep it the same while it follows a surface: motor currents, own force mode
+
+
+@runtime_checkable
+class Recoverable(Protocol):
+    """An arm that knows how to come free from a fault without being connected again."""
+
+    def recover(self) -> None:
+        """Clear the fault; DeviceError if that is not possible. Whoever calls it sees that the arm may move."""
+
+
+@runtime_checkable
+class Checkable(Protocol):
+    """An arm that can be asked whether it is there without taking control of it."""
+
+    def check(self) -> None:
+        """Return if it answers and could move; raise DeviceError, with what stands in the way, if not."""
+
+
+@runtime_checkable
+class Rebootable(Protocol):
+    """An arm of motors that latch an error until they are rebooted."""
+
+    def reboot(self) -> str:
+        """Let go, reboot what reports an error, stay unconnected; return what was done, or raise DeviceError."""
+
+
+@runtime_checkable
+class Warns(Protocol):
+    """An arm that tells what is not as it should be although it moves."""
+
+    def warning(self) -> str:
+        """Return it in a sentence, '' if there is nothing."""
+
+
+@runtime_checkable
+class Doubting(Protocol):
+    """An arm that tells why a motion must end although it obeys: then the finger can still be lifted."""
+
+    def doubt(self) -> str:
+        """Return it in a sentence, '' if there is no reason."""
+
+
+@runtime_checkable
+class Zeroing(Protocol):
+    """An arm that zeroes its force sensor itself: at rest in free air, which a rise must have shown it."""
+
+    @property
+    def zeroed(self) -> bool:
+        """Whether it did since it was connected, or recovered; before, its force is no measure of contact."""
+
+
+@runtime_checkable
+class SurfaceBound(Protocol):
+    """An arm with a base frame, in which the surface has a pose."""
+
+    @property
+    def base_frame_id(self) -> str:
+        """Name of the base frame on tf."""
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
+
+    def move_surface(self, pose: Sequence[float]) -> None:
+        """Let go, and take over another pose of the surface, (6,); it holds from the next connection on."""
+
+
+@runtime_checkable
+class Counting(Protocol):
+    """An arm that counts what its operator should know."""
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals by name; DeviceError if it is not connected."""
+
+
+class ArmClass(Protocol):
+    """A class of arms: its parameter dataclass, and how to make one from it."""
+
+    Params: type[Any]
+
+    def __call__(self, params: Any) -> Arm:
+        """Return an arm that is not yet connected."""
+
+
+# --------------------
+# What an arm or a hand does not carry out, whoever commands it.
+
+
+@dataclass(frozen=True)
+class CommandLimits:
+    """Limits of every single command; a base of the parameters of each arm.
+
+    The explorer has tighter limits of its own for what may be asked for. These hold also for programs that use an arm
+    without the explorer, and for a motion with an error in its arithmetic.
+    """
+
+    command_speed_m_s: float = param(
+        1.0,
+        'Sets the highest tangential speed that one command may ask for; faster commands are refused.',
+        unit='m/s',
+        low=0.001,
+        high=2.0,
+    )
+    command_normal_m_s: float = param(
+        0.5,
+        'Sets the highest normal speed that one command may ask for; faster commands are refused.',
+        unit='m/s',
+        low=0.001,
+        high=1.0,
+    )
+    command_force_n: float = param(
+        50.0,
+        'Sets the highest normal force that one command may ask for; larger forces are refused.',
+        unit='N',
+        low=0.1,
+        high=200.0,
+    )
+
+    def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:
+        """Return if the command may be carried out.
+
+        Parameters
+        ----------
+        command
+            What the arm was asked for.
+        stop
+            Called before the error is raised: brings the arm to a standstill, as the command before may still hold.
+
+        Raises
+        ------
+        CommandRefused
+            If a number is not finite or out of its range, with the range.
+        """
+        reason = self._excess(command)
+        if not reason:
+            return
+        if stop is not None:
+            stop()
+        raise CommandRefused(f'the command was refused and the arm stopped: {reason}')
+
+    def _excess(self, command: ArmCommand) -> str:
+        # Written so that NaN is too much too.
+        speed = math.hypot(*command.tangential_m_s)
+        if not speed <= self.command_speed_m_s:
+            return _range('the speed along the surface', speed, 0.0, self.command_speed_m_s, 'm/s')
+        if not abs(command.normal_m_s) <= self.command_normal_m_s:
+            highest = self.command_normal_m_s
+            return _range('the speed along the normal', command.normal_m_s, -highest, highest, 'm/s')
+        if command.force_n is not None and not 0.0 <= command.force_n <= self.command_force_n:
+            return _range('the force', command.force_n, 0.0, self.command_force_n, 'N')
+        return ''
+
+
+def _range(what: str, value: float, low: float, high: float, unit: str) -> str:
+    return f'{what} is {value:g} {unit}; allowed is {low:g} to {high:g} {unit}'
+
+
+# --------------------
+# The frame of the surface, as an arm with a base frame of its own sees it.
+
+PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
+
+
+@dataclass(frozen=True)
+class SurfacePoseParams:
+    """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
+
+    surface_x_m: float = param(
+        0.4, 'Sets the x coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+    )
+    surface_y_m: float = param(
+        0.0, 'Sets the y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+    )
+    surface_z_m: float = param(
+        0.1, 'Sets the z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+    )
+    surface_rx_rad: float = param(
+        0.0,
+        'Sets the x component of the rotation vector of the surface frame; its z axis points away from the surface.',
+        unit='rad',
+        low=-7.0,
+        high=7.0,
+    )
+    surface_ry_rad: float = param(
+        0.0, 'Sets the y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
+    )
+    surface_rz_rad: float = param(
+        0.0, 'Sets the z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
+    )
+
+    def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
+        """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""
+        names = ('surface_x_m', 'surface_y_m', 'surface_z_m', 'surface_rx_rad', 'surface_ry_rad', 'surface_rz_rad')
+        return replace(self, **dict(zip(names, map(float, pose), strict=True)))
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
+        origin = (self.surface_x_m, self.surface_y_m, self.surface_z_m)
+        return (*origin, self.surface_rx_rad, self.surface_ry_rad, self.surface_rz_rad)
+
+
+class SurfaceFrame:
+    """Turn places and directions from the base frame of an arm to the frame of the surface and back.
+
+    Parameters
+    ----------
+    pose : (6,)
+        Of the surface in the base frame: x, y, z in m of a point in it, then a rotation vector in rad. The z axis
+        points away from the surface.
+    """
+
+    def __init__(self, pose: Sequence[float]) -> None:
+        self._origin = np.array(pose[:3])
+        self._axes = rotation_matrix(pose[3:])
+
+    def place(self, in_base_m: Sequence[float]) -> Vector:
+        """Return a place in the frame of the surface."""
+        return _vector(self._axes.T @ (np.array(in_base_m) - self._origin))
+
+    def direction(self, in_base: Sequence[float]) -> Vector:
+        """Return a velocity or a force in the frame of the surface."""
+        return _vector(self._axes.T @ np.array(in_base))
+
+    def place_to_base(self, place_m: Sequence[float]) -> Vector:
+        """Return a place of the frame of the surface in the base frame."""
+        return _vector(self._axes @ np.array(place_m) + self._origin)
+
+    def to_base(self, direction: Sequence[float]) -> Vector:
+        """Return a velocity or a force of the frame of the surface in the base frame."""
+        return _vector(self._axes @ np.array(direction))
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+# --------------------
+# Tangential force of a sliding finger, from the force vector of a wrist sensor.
+
+SLIDING_M_S = 1e-3  # a slower finger has no direction of travel that its noise does not turn
+
+
+def tangential_force_n(force_n: Vector, velocity_m_s: Vector) -> float:
+    """Return the force of the surface against the direction of travel, N; NaN for a finger that does not slide.
+
+    Parameters
+    ----------
+    force_n : (3,)
+        Force of the surface on the finger, N, in the frame of the surface: z is the normal.
+    velocity_m_s : (3,)
+        Velocity of the finger, m/s, in the same frame.
+
+    Returns
+    -------
+    float
+        −F·v / |v| of the components along the surface: positive where the surface drags the finger, μ N under Coulomb
+        friction.
+
+    Examples
+    --------
+    >>> tangential_force_n((-0.6, 0.0, 2.0), (0.05, 0.0, 0.001))  # a coefficient of 0.3 under 2 N
+    0.6
+    >>> tangential_force_n((-0.6, 0.0, 2.0), (0.0, 0.0, 0.0))
+    nan
+    """
+    speed_m_s = math.hypot(*velocity_m_s[:2])
+    if not speed_m_s >= SLIDING_M_S:
+        return math.nan
+    return -(force_n[0] * velocity_m_s[0] + force_n[1] * velocity_m_s[1]) / speed_m_s
+
+
+# --------------------
+# An arm that knows velocities alone and follows them late, with a force loop of ours around it.
+
+HOLDS_S = 0.02  # so long an arm keeps a velocity when nobody asks for another
+
+
+class CommandedVelocity:
+    """Choose the velocity that carries out a command: a wanted force by the force loop, a velocity as it is.
+
+    Towards the surface a commanded velocity is limited to what the force loop can still stop in time.
+
+    Parameters
+    ----------
+    params
+        The force loop.
+    period_s
+        How often `choose` is called.
+    """
+
+    def __init__(self, params: ForceLoopParams, period_s: float) -> None:
+        self._loop = ForceLoop(params, period_s)
+        self._travelled_m = 0.0
+
+    @property
+    def lag_s(self) -> float:
+        """How late the arm follows, as measured while it came down; NaN until it is measured."""
+        return self._loop.lag.value_s
+
+    def doubt(self) -> str:
+        """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
+        return self._loop.doubt()
+
+    def travelled(self, distance_m: float) -> None:
+        """Take note of how far the finger has gone along the surface since the last call."""
+        self._travelled_m += distance_m
+
+    def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
+        """Return the velocity to ask for, m/s.
+
+        Parameters
+        ----------
+        command
+            What the arm shall do.
+        state
+            The newest state of the arm.
+        held_s
+            For how long the velocity of the last call was asked for.
+
+        Returns
+        -------
+        (3,)
+            Along the surface and its normal, m/s.
+        """
+        normal_m_s = self._normal_m_s(command, state, held_s)
+        self._loop.asked(state.position[2], normal_m_s, held_s)
+        return (*command.tangential_m_s, normal_m_s)
+
+    def _normal_m_s(self, command: ArmCommand, state: ArmState, held_s: float) -> float:
+        contact = ContactState(state.position[2], self._travelled_m, state.force_n)
+        speed_m_s = math.hypot(*command.tangential_m_s)
+        self._loop.observe(contact, speed_m_s)
+        if command.force_n is None:
+            self._loop.restart()
+            return max(command.normal_m_s, -self._loop.approach_m_s(contact.height_m))
+        return self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s)
+
+
+class VelocityForceControl:
+    """Ask for velocities that press as wanted, and move by what was asked a delay ago.
+
+    Parameters
+    ----------
+    params
+        The force loop, and its delay.
+    period_s
+        How often it asks.
+    now_ns
+        The time.
+    delay_s
+        After which a velocity really comes into effect; the loop is only told that of `params`.
+    """
+
+    def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int, delay_s: float) -> None:
+        self._velocity = CommandedVelocity(params, period_s)
+        self._delayed = DelayedVelocity(delay_s, now_ns)
+
+    def doubt(self) -> str:
+        """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
+        return self._velocity.doubt()
+
+    def moved_m(self, now_ns: int) -> Vector:
+        """Return how far the finger has gone since this was asked last."""
+        moved = self._delayed.moved_m(now_ns)
+        self._velocity.travelled(math.hypot(*moved[:2]))
+        return moved
+
+    def ask(self, command: ArmCommand, state: ArmState, dt_s: float) -> None:
+        """Ask for the velocity that a command needs, `dt_s` after the last time.
+
+        Parameters
+        ----------
+        command
+            What the arm is to do.
+        state
+            What the arm measured last.
+        dt_s
+            Time since the last call.
+        """
+        self._delayed.ask(state.time_ns, self._velocity.choose(command, state, min(dt_s, HOLDS_S)))
+
+
+class DelayedVelocity:
+    """A velocity that comes into effect late, and holds for a short time only."""
+
+    def __init__(self, delay_s: float, now_ns: int) -> None:
+        self._delay_ns = round(delay_s * 1e9)
+        self._coming: deque[tuple[int, Vector]] = deque()
+        self._now: Vector = (0.0, 0.0, 0.0)
+        self._since_ns = self._done_ns = now_ns
+
+    def ask(self, now_ns: int, velocity: Vector) -> None:
+        """Ask for a velocity, m/s."""
+        self._coming.append((now_ns + self._delay_ns, velocity))
+
+    def moved_m(self, until_ns: int) -> Vector:
+        """Return how far it goes from the last time asked until now."""
+        travelled: Vector = (0.0, 0.0, 0.0)
+        while self._coming and self._coming[0][0] <= until_ns:
+            begin_ns, velocity = self._coming.popleft()
+            travelled = self._go(travelled, begin_ns)
+            self._now, self._since_ns = velocity, begin_ns
+        return self._go(travelled, until_ns)
+
+    def _go(self, travelled: Vector, until_ns: int) -> Vector:
+        held_s = max(0, min(until_ns, self._since_ns + round(HOLDS_S * 1e9)) - self._done_ns) * 1e-9
+        self._done_ns = max(self._done_ns, until_ns)
+        x, y, z = (at + speed * held_s for at, speed in zip(travelled, self._now, strict=True))
+        return x, y, z
+
+
+# --------------------
+# Find out whether the finger is in free air, from the force while it rises.
+
+SMOOTHING_S = 0.02  # time constant over which the force is averaged: noise is no contact
+
+
+class FreeAir:
+    """Tell whether nothing touches the finger, whatever the offset of its force sensor.
+
+    In contact the force changes while the finger rises: a stiffness k times the rise. Free air is proven by a rise
+    through which the force stays the same, and until the force changes again. So a contact of at least
+    `steady_n / rise_m` is noticed. A force sensor that was never zeroed does not matter, as only changes count.
+
+    Parameters
+    ----------
+    rise_m
+        The rise that proves it, m.
+    steady_n
+        A change of the force by more than this is contact, N.
+    """
+
+    def __init__(self, rise_m: float, steady_n: float) -> None:
+        self._rise_m = rise_m
+        self._steady_n = steady_n
+        self._force_n = math.nan  # smoothed
+        self._time_ns = 0
+        self._start: Vector | None = None  # from where the rise counts
+        self._start_n = math.nan
+        self.proven = False
+
+    def presume_contact(self) -> None:
+        """Forget the proof: the finger was pressed on something, or nobody looked."""
+        self._start = None
+        self._force_n = math.nan
+        self.proven = False
+
+    def update(self, time_ns: int, position: Vector, force_n: float) -> bool:
+        """Take note of a state of the arm in the frame of the surface, and return whether free air is proven.
+
+        Parameters
+        ----------
+        time_ns
+            When it was measured.
+        position : (3,)
+            m, z away from the surface.
+        force_n
+            Along the normal, N.
+
+        Returns
+        -------
+        bool
+            Whether free air is proven.
+        """
+        self._smooth(time_ns, force_n)
+        start = self._start
+        # Written so that NaN is a change too.
+        if start is None or not abs(self._force_n - self._start_n) <= self._steady_n:
+            self._restart(position)
+        elif not self.proven:
+            self._rise(start, position)
+        return self.proven
+
+    def _smooth(self, time_ns: int, force_n: float) -> None:
+        passed_s, self._time_ns = (time_ns - self._time_ns) * 1e-9, time_ns
+        if math.isfinite(self._force_n):
+            force_n = self._force_n - (force_n - self._force_n) * math.expm1(-max(0.0, passed_s) / SMOOTHING_S)
+        self._force_n = force_n
+
+    def _restart(self, position: Vector) -> None:
+        self._start, self._start_n = position, self._force_n
+        self.proven = False
+
+    def _rise(self, start: Vector, position: Vector) -> None:
+        """Count the rise from the lowest place; a finger that goes sideways may follow a slope."""
+        x, y, z = (at - begin for at, begin in zip(position, start, strict=True))
+        if z < 0.0 or math.hypot(x, y) > self._rise_m:
+            self._start = position
+        self.proven = z >= self._rise_m
+
+
+# --------------------
+# Zero a force sensor that cannot do so itself: in free air, at rest.
+
+CALM_NS = 100_000_000  # an arm with lag may still move so long after it was told to stand still
+AVERAGED_NS = 100_000_000  # of readings whose mean becomes the zero
+READINGS = 200
+
+
+class ForceZero:
+    """Remember what the sensor shows in free air.
+
+    Free air is proven by a rise through which the force stays the same (`texture_exploration.arms.arm`). At rest after
+    such a rise the mean of the readings becomes the new zero; any contact, and any command to press, asks for a new
+    rise first.
+
+    Parameters
+    ----------
+    rise_m, steady_n
+        See `FreeAir`.
+
+    Attributes
+    ----------
+    zeroed : bool
+        Whether there is a zero.
+    offset_n : (3,)
+        What the sensor shows in free air, in its own frame; zeros before.
+    zeroings : int
+        How often the sensor was zeroed.
+    """
+
+    def __init__(self, rise_m: float, steady_n: float) -> None:
+        self._air = FreeAir(rise_m, steady_n)
+        self._readings: deque[Array] = deque(maxlen=READINGS)
+        self._rest_ns: int | None = None
+        self.zeroed = False
+        self.offset_n: Array = np.zeros(3)
+        self.zeroings = 0
+
+    @property
+    def in_free_air(self) -> bool:
+        """Whether nothing touches the finger, as far as is proven."""
+        return self._air.proven
+
+    def forget(self) -> None:
+        """The sensor or the arm was lost for a while: nothing is known any more."""
+        self.zeroed = False
+        self.presume_contact()
+
+    def presume_contact(self) -> None:
+        """The finger presses, or was told to: the next zero needs another rise."""
+        self._air.presume_contact()
+        self._rest_ns = None
+        self._readings.clear()
+
+    def update(self, time_ns: int, position: Vector, normal_n: float, reading_n: Array, *, moving: bool) -> None:
+        """Take a reading.
+
+        Parameters
+        ----------
+        time_ns
+            When it came.
+        position : (3,)
+            Of the finger in the surface frame, m.
+        normal_n
+            Its component along the normal, zeroed or not: only changes count.
+        reading_n : (3,)
+            Without the weight of the tool, in the frame of the sensor, not zeroed.
+        moving
+            Whether the arm is commanded to move.
+        """
+        if not self._air.update(time_ns, position, normal_n) or moving:
+            self._rest_ns = None
+            self._readings.clear()
+            return
+        if self._rest_ns is None:
+            self._rest_ns = time_ns
+        rested_ns = time_ns - self._rest_ns
+        if rested_ns >= CALM_NS:
+            self._readings.append(reading_n)
+        if rested_ns >= CALM_NS + AVERAGED_NS:
+            self._take_zero()
+
+    def _take_zero(self) -> None:
+        self.offset_n = np.mean(np.array(self._readings), axis=0)
+        self.zeroed = True
+        self.zeroings += 1
+        self.presume_contact()

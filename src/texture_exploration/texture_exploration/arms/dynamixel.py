@@ -1,0 +1,925 @@
+"""Hands with Dynamixel motors: the bus, the hand, and the process that takes torque off when its parent dies."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import importlib
+import math
+import os
+import signal
+import subprocess
+import sys
+import termios
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import serial
+
+from texture_core.errors import CommandRefused, DeviceError
+from texture_exploration.arms.arm import ArmCommand, CommandLimits
+from texture_exploration.arms.hand import (
+    FingerSet,
+    Fingertip,
+    HandState,
+    Joint,
+    Profile,
+    describe,
+    goes_on,
+    load_profile,
+)
+
+# --------------------
+# Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
+#
+# Its calls leave `is_using` set when they fail: one thread alone may use a bus, and after an error the port is made
+# again. Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock
+# to
+# others.
+
+# An unplugged port raises termios.error from tcflush, which is no OSError.
+LINE_FAULTS = (serial.SerialException, OSError, termios.error, TypeError, AttributeError)
+PROTOCOL = 2.0
+SUCCESS = 0
+TRIES = 3
+WAIT_S = 0.001
+# A status packet: `FF FF FD 00 | id | length | 55 | error | parameters | CRC`; its length counts from the 55 on.
+PACKET_ID, PACKET_LENGTH, PACKET_PARAMETERS = 4, 5, 9
+NO_PARAMETERS = 4  # length of a status packet without parameters
+FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
+TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
+RESTART_S = 3.0  # a motor has rebooted within
+SILENT = 'does not answer'
+GARBLED = 'answers with what cannot be read: is its id given to two motors, or the cable damaged?'
+RESET = 'has lost its torque: it was reset, as by a dip of its supply'
+REMEDY = "; when it has cooled and nothing blocks it, reboot it (service 'reboot') or switch its power off and on"
+HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
+
+
+@dataclass(frozen=True)
+class MotorState:
+    """What a motor measures."""
+
+    current_a: float
+    velocity_rad_s: float
+    position_rad: float
+
+
+class NoAnswer(DeviceError):
+    """A motor that fell silent while it was told something."""
+
+
+class _Lock:
+    """A lock on a serial device, held by a descriptor of its own, from its making until it is closed.
+
+    Two programs on one bus would take each other's answers, and let each other's motors go. The SDK empties the input
+    buffer as it opens the port, answers to another program included; so the lock is taken before.
+
+    Parameters
+    ----------
+    device
+        Path of the device.
+
+    Raises
+    ------
+    OSError
+        If the device cannot be opened, or another program has the lock.
+    """
+
+    def __init__(self, device: str) -> None:
+        self._descriptor: int | None = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self.close()
+            raise
+
+    def __enter__(self) -> _Lock:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the lock; again without effect."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+class DynamixelBus:
+    """All motors of a profile.
+
+    Attributes
+    ----------
+    missing : set of int
+        Motors that do not answer, or not as they should; they are left out until `look_for` finds them.
+    limits_a : dict of int to float
+        Highest current that each motor takes.
+    """
+
+    def __init__(self, device: str, profile: Profile) -> None:
+        try:
+            self._sdk: Any = importlib.import_module('dynamixel_sdk')
+        except ImportError as error:
+            raise DeviceError(
+                "a Dynamixel hand needs the package dynamixel-sdk, which is not installed here: 'pip install "
+                "dynamixel-sdk==4.1.0'"
+            ) from error
+        self.missing: set[int] = set()
+        self.limits_a: dict[int, float] = {}
+        self.deaf: set[int] = set()  # motors whose watchdog may not stop them
+        self._reasons: dict[int, str] = {}  # why a motor is missing, where that is not silence
+        self._energised: set[int] = set()
+        self._goal_currents: dict[int, int] = {}  # as sent last
+        self._device = device
+        self._profile = profile
+        self._port: Any = self._sdk.PortHandler(device)
+        self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
+        with self._line(), contextlib.ExitStack() as on_error:
+            self._lock = on_error.enter_context(_Lock(device))
+            on_error.callback(self.close)
+            opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
+            if opened:
+                on_error.pop_all()
+        if not opened:
+            raise DeviceError(f"device '{device}' refuses {profile.baud} baud; correct the profile '{profile.name}'")
+        self._port.ser.timeout = WAIT_S
+        first, last = profile.table['present_current'], profile.table['present_position']
+        self._block = (first[0], last[0] + last[1] - first[0])
+        first, last = profile.table['torque_enable'], profile.table['goal_current']
+        self._health = (first[0], last[0] + last[1] - first[0])
+        self._turn = 0
+        self._garbled = False  # the last answer
+
+    def close(self) -> None:
+        """Close the port; never raises."""
+        with contextlib.suppress(*LINE_FAULTS):
+            self._port.closePort()
+        self._lock.close()
+
+    def start(self) -> None:
+        """Find and check the motors, set mode and gains; only when all is well, let them hold where they are.
+
+        Raises
+        ------
+        DeviceError
+            If none answers, one is of another model, reports a hardware error, or does not take what it is told.
+        """
+        self.torque_off(self._profile.ids)  # a program before may have left it on
+        self.missing = set(self._profile.ids)
+        found = [motor for motor in self._profile.ids if any(self._prepare(motor) for _ in range(TRIES))]
+        if not found:
+            raise DeviceError(
+                f"no motor answers on '{self._device}' at {self._profile.baud} baud; check power, baud rate and the "
+                f"ids of the profile '{self._profile.name}'"
+            )
+        if errors := [error for motor in found if (error := self.hardware_error(motor))]:
+            raise DeviceError('; '.join(errors))
+        for motor in found:
+            self._energise(motor)
+
+    def look_for(self, motor: int) -> bool:
+        """Take a motor in if it answers and is well; return whether that is so."""
+        try:
+            if not self._prepare(motor):
+                return False
+            if error := self.hardware_error(motor):
+                self._reasons[motor] = error
+                return False
+            self._energise(motor)
+        except NoAnswer:  # a loose contact: no reason to let the others go
+            return False
+        return True
+
+    def why_missing(self, motor: int) -> str:
+        """Return in words why a motor is missing."""
+        return self._reasons.get(motor) or f'{self._profile.owner(motor)} {SILENT}'
+
+    def _prepare(self, motor: int) -> bool:
+        """Set mode, limits and goals of a motor without torque; return whether it answers."""
+        profile = self._profile
+        self._reasons.pop(motor, None)
+        with self._line():
+            model, result, _ = self._packets.ping(self._port, motor)
+        self._garbled = result == self._sdk.COMM_RX_CORRUPT
+        position = self.read_register(motor, 'present_position') if result == SUCCESS else None
+        if position is None:
+            if self._garbled:
+                self._reasons[motor] = f'{profile.owner(motor)} {GARBLED}'
+            return False
+        if model not in profile.models:
+            raise DeviceError(
+                f"{profile.owner(motor)} is of model {describe(model)}; the profile '{profile.name}' is for "
+                f'{", ".join(map(describe, profile.models))}, and with another its forces would be wrong; use a '
+                'profile for this model'
+            )
+        self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
+        if self.read_register(motor, 'bus_watchdog'):  # old firmware has none and refuses to write it
+            self.write(motor, 'bus_watchdog', 0)  # or no goal is taken after it has stopped the motor
+        self._arm(motor, 'operating_mode', profile.operating_mode)
+        for register, value in profile.gains.items():
+            self.write(motor, register, value)
+        with self._line():
+            firmware, result, _ = self._packets.read1ByteTxRx(self._port, motor, FIRMWARE)
+        if result == SUCCESS and goes_on(model, firmware):
+            self.deaf.add(motor)
+        limit = self.read_register(motor, 'current_limit')
+        if limit is None:
+            return False
+        if limit <= 0:
+            raise DeviceError(
+                f'{profile.owner(motor)} has a Current Limit of {limit}; above 0 is needed, set it with DYNAMIXEL '
+                f"Wizard, or correct the table of the profile '{profile.name}'"
+            )
+        self.limits_a[motor] = limit * profile.current_a
+        self._goal_currents[motor] = self._counts(motor, profile.move_a)
+        self._arm(motor, 'goal_current', self._goal_currents[motor])
+        self.write(motor, 'goal_position', position)
+        return True
+
+    def _energise(self, motor: int) -> None:
+        """Arm the motor's watchdog, then switch its torque on: it holds where it is."""
+        if self._profile.watchdog:
+            self._arm(motor, 'bus_watchdog', self._profile.watchdog)
+        self.write(motor, 'torque_enable', 1)
+        self._energised.add(motor)
+        self.missing.discard(motor)
+
+    def _arm(self, motor: int, register: str, value: int) -> None:
+        """Write a register that bounds the force, and read it back: a motor may confirm what it does not keep."""
+        self.write(motor, register, value)
+        kept = self.read_register(motor, register)
+        if kept is None:
+            raise NoAnswer(f"{self._profile.owner(motor)} did not tell '{register}': it {SILENT}")
+        if kept != value:
+            raise DeviceError(
+                f"{self._profile.owner(motor)} was told {value} for '{register}' and holds {kept}: what bounds its "
+                f"force is not armed; update its firmware, or correct the table of the profile '{self._profile.name}'"
+            )
+
+    def reboot(self) -> list[int]:
+        """Reboot the motors that report a hardware error, all without torque; return which.
+
+        Raises
+        ------
+        DeviceError
+            If one does not come back, or still reports an error.
+        """
+        self.torque_off(self._profile.ids)
+        latched = [motor for motor in self._profile.ids if self.read_register(motor, 'hardware_error')]
+        for motor in latched:
+            with self._line():
+                self._packets.reboot(self._port, motor)
+        for motor in latched:
+            self._wait_for_restart(motor)
+        return latched
+
+    def _wait_for_restart(self, motor: int) -> None:
+        end_s = time.monotonic() + RESTART_S
+        while (bits := self.read_register(motor, 'hardware_error')) != 0:
+            if time.monotonic() > end_s:
+                found = f'still reports {_reasons(bits)}' if bits else SILENT
+                raise DeviceError(
+                    f'{self._profile.owner(motor)} {found} after a reboot; let it cool, look for what blocks it, and '
+                    'switch its power off and on'
+                )
+
+    def read(self) -> dict[int, MotorState]:
+        """Return what all motors measure, {} if a cycle is lost; who does not answer is moved to `missing`."""
+        asked = [motor for motor in self._profile.ids if motor not in self.missing]
+        group = self._sdk.GroupSyncRead(self._port, self._packets, *self._block)
+        for motor in asked:
+            group.addParam(motor)
+        with self._line():
+            result = group.txRxPacket() if asked else SUCCESS
+        if result != SUCCESS:
+            # They answer in turn: the first that is silent hides all that come after it.
+            silent = next(motor for motor in asked if not group.data_dict[motor])
+            if not self._answers(silent):
+                self.missing.add(silent)
+            return {}
+        # An answer that came too late for an earlier question is taken for one to this: it is shorter.
+        if any(len(group.data_dict[motor]) != group.data_length for motor in asked):
+            return {}
+        return {motor: self._measured(group, motor) for motor in asked}
+
+    def write_goals(self, goals: Mapping[int, tuple[float, float]]) -> None:
+        """Send highest current (A; no more than the motor's limit) and position (rad) of motors."""
+        present = {motor: goal for motor, goal in goals.items() if motor not in self.missing}
+        profile = self._profile
+        currents = {motor: self._counts(motor, current_a) for motor, (current_a, _) in present.items()}
+        self._goal_currents.update(currents)
+        self._sync_write('goal_current', currents)
+        self._sync_write(
+            'goal_position', {m: round(p / profile.position_rad) + profile.zero for m, (_, p) in present.items()}
+        )
+
+    def torque_off(self, motors: Iterable[int]) -> None:
+        """Let motors go, also those that do not answer: they may hear."""
+        self._energised.difference_update(motors)
+        self._sync_write('torque_enable', dict.fromkeys(motors, 0))
+
+    def let_go(self) -> None:
+        """Let all motors go and see that they did, as far as they can be reached; raises nothing that a line does."""
+        self._port.is_using = False  # whatever was interrupted
+        with contextlib.suppress(DeviceError):
+            for _ in range(TRIES):
+                self.torque_off(self._profile.ids)
+                here = [motor for motor in self._profile.ids if motor not in self.missing]
+                if not any(self.read_register(motor, 'torque_enable') for motor in here):
+                    return
+
+    def check_next(self) -> str:
+        """Look after one motor, another one with each call; return in words what it reports, '' if nothing.
+
+        Raises
+        ------
+        DeviceError
+            If its watchdog has stopped it, or it refuses what it is told.
+        """
+        present = [motor for motor in self._profile.ids if motor not in self.missing]
+        if not present:
+            return ''
+        motor = present[self._turn % len(present)]
+        self._turn += 1
+        data, result = self._read_block(motor, *self._health)
+        if result != SUCCESS:
+            return ''  # that it is silent is noticed elsewhere
+
+        def value(register: str) -> int:
+            address, size = self._profile.table[register]
+            at = address - self._health[0]
+            return int.from_bytes(data[at : at + size], 'little')
+
+        owner, watchdog = self._profile.owner(motor), self._profile.watchdog
+        if bits := value('hardware_error'):
+            return f'{owner} reports {_reasons(bits)}{REMEDY}'
+        if motor not in self._energised:
+            return ''
+        if value('bus_watchdog') == TRIPPED:
+            raise DeviceError(
+                f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
+                'or the bus was held up; all motors were let go'
+            )
+        if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
+            self._reasons[motor] = f'{owner} {RESET}'
+            self._energised.discard(motor)
+            self.missing.add(motor)
+        elif signed(value('goal_current'), 2) != self._goal_currents[motor]:
+            # Nobody answers to what is sent to all motors at once. Lost on the way, or refused: then this tells why.
+            self.write(motor, 'goal_current', self._goal_currents[motor])
+        return ''
+
+    def hardware_error(self, motor: int) -> str:
+        """Return in words which hardware error a motor reports and what to do, '' if none."""
+        bits = self.read_register(motor, 'hardware_error')
+        return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}' if bits else ''
+
+    def _counts(self, motor: int, current_a: float) -> int:
+        """Return a current in counts, no more than the motor takes: it would refuse the whole command."""
+        limit_a = self.limits_a[motor]
+        return round(min(limit_a, max(-limit_a, current_a)) / self._profile.current_a)
+
+    def write(self, motor: int, register: str, value: int) -> None:
+        """Write one register, and see that it was taken.
+
+        Parameters
+        ----------
+        motor
+            Id of the motor on the bus.
+        register
+            Name of the register in the table of the profile.
+        value
+            Signed number in the unit of the register.
+
+        Raises
+        ------
+        NoAnswer
+            If the motor does not answer after some tries.
+        DeviceError
+            If the motor refuses the value.
+        """
+        address, size = self._profile.table[register]
+        send = {1: 'write1ByteTxRx', 2: 'write2ByteTxRx', 4: 'write4ByteTxRx'}[size]
+        for _ in range(TRIES):
+            with self._line():
+                result, error = getattr(self._packets, send)(self._port, motor, address, value % (1 << 8 * size))
+            if result == SUCCESS:
+                break
+        if result != SUCCESS:
+            why = self._packets.getTxRxResult(result)
+            raise NoAnswer(f"{self._profile.owner(motor)} did not take '{register}': {why}")
+        # The highest bit only tells that there is a hardware error, which is asked for by itself.
+        if error & 0x7F:
+            why = self._packets.getRxPacketError(error & 0x7F)
+            raise DeviceError(f"{self._profile.owner(motor)} did not take '{register}': {why}")
+
+    def read_register(self, motor: int, register: str) -> int | None:
+        """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
+        address, size = self._profile.table[register]
+        for _ in range(TRIES):
+            data, result = self._read_block(motor, address, size)
+            self._garbled = result == self._sdk.COMM_RX_CORRUPT
+            if result == SUCCESS:
+                value = int.from_bytes(data, 'little')
+                return signed(value, size) if size > 1 else value
+        return None
+
+    def _read_block(self, motor: int, address: int, size: int) -> tuple[bytes, int]:
+        """Return `size` bytes of a motor's table, and the result of the SDK.
+
+        The SDK cuts its data out of any packet of the motor, and out of the checksum if the packet is too short. The
+        late answer to an earlier question, such as a ping, would be taken for a position or a current limit.
+        """
+        with self._line():
+            result = self._packets.readTx(self._port, motor, address, size)
+            while result == SUCCESS:
+                packet, result = self._packets.rxPacket(self._port, False)
+                if result == SUCCESS and packet[PACKET_ID] == motor:
+                    length = packet[PACKET_LENGTH] + (packet[PACKET_LENGTH + 1] << 8)
+                    if length == size + NO_PARAMETERS:
+                        return bytes(packet[PACKET_PARAMETERS : PACKET_PARAMETERS + size]), result
+        return b'', result
+
+    def _answers(self, motor: int) -> bool:
+        with self._line():
+            # That all were asked at once was the first try.
+            return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES - 1))
+
+    def _measured(self, group: Any, motor: int) -> MotorState:
+        profile = self._profile
+
+        def value(register: str) -> int:
+            address, size = profile.table[register]
+            return signed(group.getData(motor, address, size), size)
+
+        return MotorState(
+            current_a=value('present_current') * profile.current_a,
+            velocity_rad_s=value('present_velocity') * profile.velocity_rad_s,
+            position_rad=(value('present_position') - profile.zero) * profile.position_rad,
+        )
+
+    def _sync_write(self, register: str, values: Mapping[int, int]) -> None:
+        address, size = self._profile.table[register]
+        group = self._sdk.GroupSyncWrite(self._port, self._packets, address, size)
+        for motor, value in values.items():
+            group.addParam(motor, list((value % (1 << 8 * size)).to_bytes(size, 'little')))
+        with self._line():
+            if values and group.txPacket() != SUCCESS:
+                raise DeviceError(f"device '{self._device}' did not take an order; no other program may use it")
+
+    @contextlib.contextmanager
+    def _line(self) -> Iterator[None]:
+        try:
+            yield
+        except LINE_FAULTS as error:
+            self._port.is_using = False
+            raise DeviceError(
+                f"the hand on '{self._device}' cannot be reached ({error}); check that it is plugged in, that you may "
+                'open the device, and that no other program has it open'
+            ) from error
+
+
+def _reasons(bits: int) -> str:
+    """Return the bits of the register Hardware Error Status in words."""
+    known = [text for bit, text in HARDWARE_ERRORS.items() if bits >> bit & 1]
+    return ' and '.join(known) or f'hardware error {bits:#04x}'
+
+
+def signed(value: int, size: int) -> int:
+    """Return a register of `size` bytes as a signed number: the SDK gives all as unsigned."""
+    return value - (1 << 8 * size) if value >> (8 * size - 1) & 1 else value
+
+
+# --------------------
+# A process that switches the torque of the motors off when the process that commanded them is gone.
+#
+# It waits at a pipe whose other end only the commanding process holds. The kernel closes that end however the process
+# ends, also by SIGKILL; whoever ends in order says so first.
+
+DONE = b'.'
+SYNC_WRITE, BROADCAST = 0x83, 0xFE
+REPEATS = 5  # nobody answers a sync write; one may meet what was still on the line
+PAUSE_S = 0.02
+LEAVE_S = 2.0
+
+
+class TorqueGuard:
+    """The guard of one hand; start it before the torque is switched on.
+
+    Parameters
+    ----------
+    device, baud
+        Line of the motors.
+    packet
+        What to write to it, see `torque_off_packet`.
+    """
+
+    def __init__(self, device: str, baud: int, packet: bytes) -> None:
+        command = [sys.executable, '-m', __name__, device, str(baud), packet.hex()]
+        # A session of its own: what ends all processes of a terminal or a launch file must not end the guard first.
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def dismiss(self) -> None:
+        """End the guard: the torque has been switched off, or the line is gone."""
+        with contextlib.suppress(OSError):  # of a guard that has ended
+            self._process.communicate(DONE, timeout=LEAVE_S)
+        self._process.kill()
+        self._process.wait()
+
+
+def torque_off_packet(address: int, motors: Iterable[int]) -> bytes:
+    """Return the instruction packet (sync write, protocol 2.0) that writes 0 to one byte at `address` of motors."""
+    params = address.to_bytes(2, 'little') + b'\x01\x00' + b''.join(bytes([motor, 0]) for motor in motors)
+    body = bytes([SYNC_WRITE]) + params
+    packet = b'\xff\xff\xfd\x00' + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, 'little') + body
+    return packet + crc16(packet).to_bytes(2, 'little')
+
+
+def crc16(data: bytes) -> int:
+    """Return the checksum of protocol 2.0: polynomial 8005, start 0, not reflected."""
+    value = 0
+    for byte in data:
+        value ^= byte << 8
+        for _ in range(8):
+            value = ((value << 1) ^ 0x8005 if value & 0x8000 else value << 1) & 0xFFFF
+    return value
+
+
+def main() -> None:
+    """Run as `python -m texture_exploration.arms.dynamixel DEVICE BAUD PACKET`; the hand starts it."""
+    device, baud, packet = sys.argv[1:]
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    if sys.stdin.buffer.read() == DONE:
+        return
+    with contextlib.suppress(serial.SerialException, OSError), serial.Serial(device, int(baud), timeout=0) as line:
+        for _ in range(REPEATS):
+            line.write(bytes.fromhex(packet))
+            line.flush()
+            time.sleep(PAUSE_S)
+
+
+if __name__ == '__main__':
+    main()
+
+
+# --------------------
+# A hand of Dynamixel motors in current-based position mode: the position leads, the current bounds the force.
+
+FIRST_STATE_S = 15.0  # some 15 questions to each motor, which take 16 ms each with a USB adapter as delivered
+COMMAND_S = 0.2  # a command holds so long
+CLOSING_M_S = 0.02  # a finger that shall press comes down so fast
+REACH_RAD = 0.3  # the goal of a pressing motor lies at most so far within the object
+SLACK_RAD = 0.2  # a goal runs away from a motor that is held up by at most so much
+SEARCH_S = 2.0  # one missing motor is looked for so often: it costs 34 ms of silence
+LONGEST_STEP_S = 0.05
+RATE_CYCLES = 40  # the rate is measured over so many
+SLOW_SHARE = 0.7  # of the rate of the profile; a bus that makes less is told
+LATENCY_FILE = '/sys/class/tty/{}/device/latency_timer'  # of adapters by FTDI, ms
+STANDSTILL = ArmCommand()
+LIMITS = CommandLimits()
+NOT_CONNECTED = 'the hand is not connected; connect it first'
+
+
+class DynamixelHand:
+    """See `texture_exploration.arms.hand.Hand`. One thread owns the bus.
+
+    A motor that is missing or reports an error is named in the fault of the state; the others go on. However the thread
+    or the process ends, the torque is switched off: by the thread itself, by a `TorqueGuard` when the process is gone;
+    and if nobody speaks to the motors for the time in the profile, their Bus Watchdog stops them.
+
+    Parameters
+    ----------
+    profile
+        Name or path of a profile.
+    device
+        Serial device.
+    torque_off_on_fault
+        Let go when a motor reports an error or is missing.
+    limits
+        Of every single command.
+    """
+
+    def __init__(
+        self, profile: str, device: str, torque_off_on_fault: bool = False, limits: CommandLimits = LIMITS
+    ) -> None:
+        self.profile: Profile = load_profile(profile)
+        self.finger_sets: Mapping[str, FingerSet] = self.profile.finger_sets
+        self._device = device
+        self._torque_off = torque_off_on_fault
+        self._limits = limits
+        self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
+        self._state: HandState | None = None
+        self._failure = NOT_CONNECTED
+        self._warning = self._doubt = ''
+        self._highest_a: Mapping[int, float] = {}
+        self._grip: Mapping[str, float] = {}
+        self._commands: dict[str, tuple[ArmCommand, float]] = {}
+        self._fresh = threading.Event()
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def connect(self) -> None:
+        """Open the bus and find the motors; the pose now is where the fingers begin.
+
+        Raises
+        ------
+        DeviceError
+            If the bus cannot be opened, or motors are missing, of another model or silent.
+        """
+        self.close()
+        self._closing.clear()
+        self._fresh.clear()
+        self._failure = self._warning = self._doubt = ''
+        self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
+        self._thread.start()
+        if not self._fresh.wait(FIRST_STATE_S) or self._failure:
+            failure = self._failure or f"the motors on '{self._device}' answer only in part; check the cables"
+            self.close()
+            raise DeviceError(failure)
+
+    def close(self) -> None:
+        """Let go: torque off, and close the bus."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        self._grip, self._commands = {}, {}
+        self._failure = self._failure or NOT_CONNECTED
+
+    def state(self) -> HandState:
+        """Return the newest state.
+
+        Raises
+        ------
+        DeviceError
+            If the hand is not connected, or the bus has failed.
+        """
+        if self._failure or self._state is None:
+            raise DeviceError(self._failure)
+        return self._state
+
+    def warning(self) -> str:
+        """Return what is not as it should be although the hand moves, '' if nothing."""
+        return '; '.join(filter(None, (self._doubt, self._warning)))
+
+    def grip(self, forces_n: Mapping[str, float]) -> None:
+        """Press from the next cycle on."""
+        for name, force_n in forces_n.items():
+            self._check(name, ArmCommand(force_n=force_n))
+        self._grip = dict(forces_n)
+
+    def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
+        """Follow from the next cycle on; what is refused makes these fingers stand still.
+
+        Raises
+        ------
+        DeviceError
+            If the bus has failed.
+        CommandRefused
+            If the command is out of the limits of a finger.
+        """
+        if self._failure:
+            raise DeviceError(self._failure)
+        for name in fingers:
+            self._check(name, command)
+        self._order(fingers, command)
+
+    def reboot(self) -> str:
+        """Let go, reboot the motors that report a hardware error, and stay unconnected; return in words what was done.
+
+        Raises
+        ------
+        DeviceError
+            If the bus cannot be reached, or a motor still reports an error.
+        """
+        self.close()
+        bus = DynamixelBus(self._device, self.profile)
+        try:
+            rebooted = bus.reboot()
+        finally:
+            bus.close()
+        self._failure = NOT_CONNECTED
+        if not rebooted:
+            return 'no motor that answers reports an error; none was rebooted, and the hand let go'
+        return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; the hand let go, the next request connects'
+
+    def _order(self, fingers: Sequence[str], command: ArmCommand) -> None:
+        for name in fingers:
+            self._commands[name] = (command, time.monotonic())
+
+    def _check(self, name: str, command: ArmCommand) -> None:
+        """Refuse what exceeds the limits of commands or the current that the motor takes."""
+        self._limits.check(command, lambda: self._order([name], STANDSTILL))
+        highest_n = self._highest_n(name)
+        if command.force_n is not None and command.force_n > highest_n:
+            self._order([name], STANDSTILL)
+            raise CommandRefused(
+                f'the command was refused and {name} stopped: the force is {command.force_n:g} N, and the Current '
+                f'Limit of its motor allows {highest_n:.3g} N; ask for less, or raise that limit with DYNAMIXEL Wizard'
+            )
+
+    def _highest_n(self, name: str) -> float:
+        joint = self.profile.fingers[name]['press']
+        highest_a = self._highest_a.get(joint.id, math.inf)
+        return (highest_a - self.profile.idle_a) * self.profile.torque_nm_a / abs(joint.lever_m)
+
+    def _run(self) -> None:
+        bus = guard = None
+        try:
+            bus = DynamixelBus(self._device, self.profile)
+            off = torque_off_packet(self.profile.table['torque_enable'][0], self.profile.ids)
+            guard = TorqueGuard(self._device, self.profile.baud, off)
+            self._highest_a = bus.limits_a
+            bus.start()
+            self._doubt = self._doubtful(bus.deaf)
+            self._control_loop(bus)
+        except DeviceError as error:
+            self._failure = str(error)
+        except BaseException as error:
+            # Also an error of this program must neither leave the motors pressing nor pass in silence.
+            self._failure = f'the hand was let go after an error in its program ({type(error).__name__}: {error})'
+            raise
+        finally:
+            if bus is not None:
+                bus.let_go()
+                bus.close()
+            if guard is not None:
+                guard.dismiss()
+            self._fresh.set()
+
+    def _control_loop(self, bus: DynamixelBus) -> None:
+        """Read, decide and write, in one cycle after the other."""
+        period_s = 1.0 / self.profile.rate_hz
+        for finger in self._fingers.values():
+            finger.restart()
+        now_s = stepped_s = searched_s = time.monotonic()
+        errors: dict[str, None] = {}
+        cycles: deque[float] = deque(maxlen=RATE_CYCLES)
+        let_go = ''
+        while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
+            now_s = time.monotonic()
+            if bus.missing and not let_go and now_s - searched_s > SEARCH_S:
+                searched_s = now_s
+                bus.look_for(min(bus.missing))
+            motors = bus.read()
+            if not motors:
+                if bus.missing and self._fresh.is_set():
+                    self._publish(let_go or self._fault(bus, errors))  # at once: before the others have been read again
+                continue
+            if error := bus.check_next():
+                errors[error] = None
+            fault = let_go or self._fault(bus, errors)
+            goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
+            stepped_s = now_s
+            self._publish(fault)
+            if fault and self._torque_off:
+                let_go = fault  # stays: motors without torque follow nothing, even when the missing one is back
+                bus.torque_off(self.profile.ids)
+            else:
+                bus.write_goals(goals)
+            cycles.append(now_s)
+            self._warning = self._slowness(cycles)
+
+    def _doubtful(self, deaf: Iterable[int]) -> str:
+        """Return what to say of motors whose watchdog may not stop them, '' if there are none."""
+        numbers = ', '.join(map(str, sorted(deaf)))
+        if not numbers or not self.profile.watchdog:
+            return ''
+        return (
+            f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
+            'firmware is known to go on; update it with DYNAMIXEL Wizard'
+        )
+
+    def _slowness(self, cycles: Sequence[float]) -> str:
+        """Return what to say of the rate of the cycles that began at these times, '' if they are fast enough."""
+        if len(cycles) < RATE_CYCLES:
+            return self._warning
+        rate_hz = (len(cycles) - 1) / (cycles[-1] - cycles[0])
+        if rate_hz >= SLOW_SHARE * self.profile.rate_hz:
+            return ''
+        latency = Path(LATENCY_FILE.format(Path(self._device).resolve().name))
+        adapter = f' (now {latency.read_text().strip()} ms)' if latency.is_file() else ''
+        return (
+            f'the bus makes {rate_hz:.0f} of {self.profile.rate_hz:g} cycles a second: set the latency timer of '
+            f"the USB adapter to 1 ms{adapter}, raise the baud rate ({self.profile.baud}) or lower 'rate_hz' of the "
+            f"profile '{self.profile.name}'"
+        )
+
+    def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
+        goals: dict[int, tuple[float, float]] = {}
+        for name, finger in self._fingers.items():
+            finger.measure(motors)
+            command, given_s = self._commands.get(name, (STANDSTILL, now_s))
+            if name in self._grip:
+                command = ArmCommand(force_n=self._grip[name])
+            elif now_s - given_s > COMMAND_S:
+                command = STANDSTILL
+            goals.update(finger.goals(command, dt_s))
+        return goals
+
+    def _fault(self, bus: DynamixelBus, errors: Iterable[str]) -> str:
+        return '; '.join(dict.fromkeys([*map(bus.why_missing, sorted(bus.missing)), *errors]))
+
+    def _publish(self, fault: str) -> None:
+        tips = {name: finger.tip for name, finger in self._fingers.items()}
+        self._state = HandState(time.monotonic_ns(), tips, fault)
+        self._fresh.set()
+
+
+class DynamixelFinger:
+    """Angles and currents of a finger's motors, as a fingertip and back.
+
+    The levers turn angles into ways around the pose at the start; across and along are arcs that are taken as straight.
+    """
+
+    def __init__(self, joints: Mapping[str, Joint], profile: Profile) -> None:
+        self._joints = joints
+        self._profile = profile
+        self.restart()
+
+    def restart(self) -> None:
+        """The next measurement is the pose at the start."""
+        self._motors: dict[str, MotorState] = {}
+        self._start: dict[str, float] = {}
+        self._goal: dict[str, float] = {}
+        self._pressing = False
+
+    def measure(self, motors: Mapping[int, MotorState]) -> None:
+        """Take what the motors measure; one that is missing keeps its last, and begins where it is when it is back."""
+        for role, joint in self._joints.items():
+            motor = motors.get(joint.id)
+            if motor is None:
+                self._goal.pop(role, None)  # of before it sagged or was turned: it would snap there
+            else:
+                self._motors[role] = motor
+                self._start.setdefault(role, motor.position_rad)
+                self._goal.setdefault(role, motor.position_rad)
+
+    @property
+    def tip(self) -> Fingertip:
+        """Place, speed and force."""
+        x, y, depth = (self._travel_m(role) for role in ('across', 'along', 'press'))
+        vx, vy, down = (self._speed(role) for role in ('across', 'along', 'press'))
+        return Fingertip((x, y, self._profile.start_height_m - depth), (vx, vy, -down), self._force_n())
+
+    def goals(self, command: ArmCommand, dt_s: float) -> dict[int, tuple[float, float]]:
+        """Return highest current and position for each motor."""
+        profile = self._profile
+        speeds = dict(zip(('across', 'along'), command.tangential_m_s, strict=True))
+        goals = {}
+        for role, joint in self._joints.items():
+            if role not in self._goal:
+                continue
+            if role == 'press':
+                goals[joint.id] = self._press(command, joint, dt_s)
+            else:
+                self._advance(role, speeds[role] * dt_s / joint.lever_m, SLACK_RAD)
+                goals[joint.id] = (profile.move_a, self._goal[role])
+        return goals
+
+    def _press(self, command: ArmCommand, joint: Joint, dt_s: float) -> tuple[float, float]:
+        """Pressing, the goal lies within the object and the current bounds the force; else the position leads."""
+        pressing = command.force_n is not None
+        if self._pressing and not pressing:
+            self._goal['press'] = self._motors['press'].position_rad
+        self._pressing = pressing
+        if command.force_n is None:
+            self._advance('press', -command.normal_m_s * dt_s / joint.lever_m, SLACK_RAD)
+            return self._profile.move_a, self._goal['press']
+        self._advance('press', CLOSING_M_S * dt_s / joint.lever_m, REACH_RAD)
+        return self._profile.idle_a + command.force_n * abs(joint.lever_m) / self._profile.torque_nm_a, self._goal[
+            'press'
+        ]
+
+    def _advance(self, role: str, angle_rad: float, max_lead_rad: float) -> None:
+        at = self._motors[role].position_rad
+        self._goal[role] = min(at + max_lead_rad, max(at - max_lead_rad, self._goal[role] + angle_rad))
+
+    def _travel_m(self, role: str) -> float:
+        if role not in self._motors:
+            return 0.0
+        return (self._motors[role].position_rad - self._start[role]) * self._joints[role].lever_m
+
+    def _speed(self, role: str) -> float:
+        return self._motors[role].velocity_rad_s * self._joints[role].lever_m if role in self._motors else 0.0
+
+    def _force_n(self) -> float:
+        if 'press' not in self._motors:
+            return 0.0
+        lever = self._joints['press'].lever_m
+        pressing_a = math.copysign(self._motors['press'].current_a, self._motors['press'].current_a * lever)
+        return max(0.0, pressing_a - self._profile.idle_a) * self._profile.torque_nm_a / abs(lever)

@@ -1,0 +1,479 @@
+"""What a hand is to the explorer: profiles, models of force, finger sets, and a simulated hand."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+from texture_core.config import find_file, load_yaml, unknown_name
+from texture_core.errors import InvalidParameter, TextureError
+from texture_exploration.arms.arm import ArmCommand, CommandLimits, Vector
+from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
+
+# --------------------
+# Dynamixel models by number: what a count of current is, and how much torque a current makes.
+#
+# Torque per current is stall torque by stall current at the recommended voltage. Source: ROBOTIS e-Manual, table
+# Specifications and registers Model Number and Present Current of each model.
+
+
+class MotorModel(NamedTuple):
+    """Scale of the current in A per count, and torque per current in N·m/A."""
+
+    name: str
+    current_a: float
+    torque_nm_a: float
+
+
+MODELS: Mapping[int, MotorModel] = {
+    1000: MotorModel('XH430-W350', 0.00134, 3.4 / 1.3),
+    1010: MotorModel('XH430-W210', 0.00134, 2.5 / 1.3),
+    1020: MotorModel('XM430-W350', 0.00269, 4.1 / 2.3),
+    1030: MotorModel('XM430-W210', 0.00269, 3.0 / 2.3),
+    1190: MotorModel('XL330-M077', 0.001, 0.215 / 1.47),
+    1200: MotorModel('XL330-M288', 0.001, 0.52 / 1.47),
+    1210: MotorModel('XC330-T181', 0.001, 0.76 / 0.80),
+    1220: MotorModel('XC330-T288', 0.001, 0.92 / 0.80),
+    1230: MotorModel('XC330-M181', 0.001, 0.60 / 1.80),
+    1240: MotorModel('XC330-M288', 0.001, 0.93 / 1.80),
+}
+# Address and bytes of the registers in all models above. Source: the same, section Control Table.
+X_SERIES: Mapping[str, tuple[int, int]] = {
+    'operating_mode': (11, 1), 'current_limit': (38, 2), 'torque_enable': (64, 1), 'hardware_error': (70, 1),
+    'position_d': (80, 2), 'position_i': (82, 2), 'position_p': (84, 2), 'bus_watchdog': (98, 1),
+    'goal_current': (102, 2), 'goal_position': (116, 4), 'present_current': (126, 2), 'present_velocity': (128, 4),
+    'present_position': (132, 4),
+}  # fmt: skip
+TOLERANCE = 0.2  # of the torque of a count: motors of one model differ by less, and friction hides the rest
+
+SIZE_330 = range(1190, 1250)
+GOES_ON_TO = 51  # firmware of size 330 to this reports that the Bus Watchdog has tripped, and does not stop
+
+
+def goes_on(model: int, firmware: int) -> bool:
+    """Return whether a motor is known to move on after its Bus Watchdog has tripped.
+
+    Source: forum.robotis.com, topic 4814 (in current control; other modes were not told).
+    """
+    return model in SIZE_330 and firmware <= GOES_ON_TO
+
+
+def describe(model: int) -> str:
+    """Return a model number with the model's name, if it is in the table."""
+    return f'{model} ({MODELS[model].name})' if model in MODELS else str(model)
+
+
+def differs(model: int, current_a: float, torque_nm_a: float) -> str:
+    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown.
+
+    Parameters
+    ----------
+    model
+        Model number that the motor reports.
+    current_a
+        Current per count in the profile, A.
+    torque_nm_a
+        Torque per current in the profile, N·m/A.
+
+    Returns
+    -------
+    str
+        A sentence without a full stop, or ''.
+    """
+    if model not in MODELS:
+        return ''
+    own = MODELS[model]
+    count_nm = own.current_a * own.torque_nm_a
+    if abs(current_a * torque_nm_a / count_nm - 1) <= TOLERANCE:
+        return ''
+    return (
+        f'model {describe(model)} makes {own.torque_nm_a:.2f} N·m/A at {own.current_a * 1000:g} mA per count, and the '
+        f'profile says {torque_nm_a:g} N·m/A at {current_a * 1000:g} mA per count'
+    )
+
+
+# --------------------
+# What every hand can do: hold with some fingers, and move others as arms move theirs.
+
+
+@dataclass(frozen=True)
+class Fingertip:
+    """Position, velocity and force of one fingertip, in the frame of its own patch of the object; see `ArmState`."""
+
+    position: Vector
+    velocity: Vector
+    force_n: float
+
+
+@dataclass(frozen=True)
+class HandState:
+    """All fingertips at one time of CLOCK_MONOTONIC; `fault` says why the hand cannot move, '' if it can."""
+
+    time_ns: int
+    fingers: Mapping[str, Fingertip]
+    fault: str = ''
+
+
+@dataclass(frozen=True)
+class FingerSet:
+    """Which fingers hold the object, and which slide on it."""
+
+    hold: tuple[str, ...]
+    slide: tuple[str, ...]
+
+
+class Hand(Protocol):
+    """A hand. Any method but `close` raises DeviceError if it cannot be reached."""
+
+    finger_sets: Mapping[str, FingerSet]
+
+    def connect(self) -> None:
+        """Reach the hand and clear its faults; may be called again after `close`."""
+
+    def close(self) -> None:
+        """Let everything go; never raises, may be called twice."""
+
+    def state(self) -> HandState:
+        """Return the newest state at once."""
+
+    def grip(self, forces_n: Mapping[str, float]) -> None:
+        """Let fingers press with these forces from now on, whatever else is commanded; CommandRefused as `command`."""
+
+    def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
+        """Let fingers follow a command; it holds for a fraction of a second. CommandRefused if it exceeds limits."""
+
+    def warning(self) -> str:
+        """Return in a sentence what is not as it should be although the hand moves, '' if nothing."""
+
+
+@runtime_checkable
+class RebootableHand(Protocol):
+    """A hand whose motors latch errors until they are rebooted."""
+
+    def reboot(self) -> str:
+        """Let go, reboot what reports an error, stay unconnected; return in words what was done."""
+
+
+# --------------------
+# A profile: motors, control table, scales and fingers of a Dynamixel hand, from one YAML file (config/hands).
+
+ROLES = ('press', 'across', 'along')
+REGISTERS = (
+    'operating_mode',
+    'current_limit',
+    'torque_enable',
+    'hardware_error',
+    'position_d',
+    'position_i',
+    'position_p',
+    'bus_watchdog',
+    'goal_current',
+    'goal_position',
+    'present_current',
+    'present_velocity',
+    'present_position',
+)
+WATCHDOG_UNIT_S, MAX_WATCHDOG = 0.02, 127  # the register counts by these
+# Lowest and highest of every number: what motors of this kind have, with room. A number beyond is a slip of the pen,
+# and the motors would press with it.
+RANGES: Mapping[str, tuple[float, float]] = {
+    'model': (0, 65535),
+    'baud': (9600, 4_500_000),
+    'rate_hz': (1.0, 1000.0),
+    'operating_mode': (5, 5),  # current-based position: in any other the current does not bound the force
+    'gain': (0, 16383),
+    'position_rad': (1e-5, 0.1),
+    'zero': (-1_048_575, 1_048_575),
+    'velocity_rad_s': (1e-5, 1.0),
+    'current_a': (1e-5, 0.1),
+    'torque_nm_a': (0.01, 100.0),
+    'idle_a': (0.0, 0.5),
+    'move_a': (0.001, 5.0),
+    'lever_m': (0.001, 1.0),  # of either sign
+    'start_height_m': (0.0, 1.0),
+    'id': (0, 252),
+    'address': (0, 2047),
+}
+SIZES = (1, 2, 4)  # bytes of a register
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One motor of a finger: the fingertip moves `lever_m` per rad, linearised around the pose at the start."""
+
+    id: int
+    lever_m: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a profile file says; registers are (address, bytes).
+
+    `watchdog_s` is how long the motors go on without hearing anything; 0: for ever.
+    """
+
+    name: str
+    models: tuple[int, ...]
+    baud: int
+    rate_hz: float
+    operating_mode: int
+    gains: Mapping[str, int]
+    position_rad: float
+    zero: int
+    velocity_rad_s: float
+    current_a: float
+    torque_nm_a: float
+    idle_a: float
+    move_a: float
+    table: Mapping[str, tuple[int, int]]
+    fingers: Mapping[str, Mapping[str, Joint]]
+    finger_sets: Mapping[str, FingerSet]
+    start_height_m: float
+    hold_pose: tuple[int, ...] = field(default=())
+    watchdog_s: float = 0.3
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """All motors."""
+        moving = [joint.id for finger in self.fingers.values() for joint in finger.values()]
+        return tuple(sorted((*moving, *self.hold_pose)))
+
+    @property
+    def watchdog(self) -> int:
+        """What the register of the Bus Watchdog is set to."""
+        return round(self.watchdog_s / WATCHDOG_UNIT_S)
+
+    def owner(self, motor: int) -> str:
+        """Return what a motor does, in words."""
+        for name, finger in self.fingers.items():
+            for role, joint in finger.items():
+                if joint.id == motor:
+                    return f"motor {motor} ('{role}' of {name})"
+        return f'motor {motor}'
+
+
+def load_profile(name_or_path: str) -> Profile:
+    """Return a profile that the package ships, or of a file.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        With the nearest name, or what is missing in the file.
+    """
+    path = find_file(name_or_path, 'texture_exploration', 'config/hands', 'hand profile')
+    try:
+        return read_profile(load_yaml(path, 'hand profile'), path.stem)
+    except TextureError:
+        raise
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InvalidParameter(
+            f"hand profile '{path.stem}' cannot be read ({type(error).__name__}: {error}); compare it with "
+            'those of the package, in config/hands'
+        ) from error
+
+
+def read_profile(content: Mapping[str, Any], name: str) -> Profile:
+    """Return the profile in what a file holds; raises as `load_profile`.
+
+    Parameters
+    ----------
+    content
+        Content of the file.
+    name
+        Name of the profile, for the sentences of errors.
+
+    Raises
+    ------
+    InvalidParameter
+        If a register is missing, or a finger, role or number does not fit.
+    """
+    where = f"hand profile '{name}'"
+    missing = [register for register in REGISTERS if register not in content['table']]
+    if missing:
+        raise InvalidParameter(f'{where}: the table lacks {", ".join(missing)}')
+    fingers = {finger: _joints(roles, f'{where}, {finger}') for finger, roles in content['fingers'].items()}
+    sets = {key: FingerSet(tuple(one['hold']), tuple(one['slide'])) for key, one in content['finger_sets'].items()}
+    for one in sets.values():
+        for finger in (*one.hold, *one.slide):
+            if finger not in fingers:
+                raise InvalidParameter(f'{where}: {unknown_name(finger, fingers, "finger")}')
+    scales = content['scales']
+    profile = Profile(
+        name=name,
+        models=tuple(content['models']),
+        baud=int(content['baud']),
+        rate_hz=float(content['rate_hz']),
+        operating_mode=int(content['operating_mode']),
+        gains={register: int(value) for register, value in content['gains'].items()},
+        position_rad=float(scales['position_rad']),
+        zero=int(scales['zero']),
+        velocity_rad_s=float(scales['velocity_rad_s']),
+        current_a=float(scales['current_a']),
+        torque_nm_a=float(content['torque_nm_a']),
+        idle_a=float(content['idle_a']),
+        move_a=float(content['move_a']),
+        table={register: (int(place[0]), int(place[1])) for register, place in content['table'].items()},
+        fingers=fingers,
+        finger_sets=sets,
+        start_height_m=float(content['start_height_m']),
+        hold_pose=tuple(content.get('hold_pose', ())),
+        watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
+    )
+    _check_numbers(profile, where)
+    _check_models(profile, where)
+    if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
+        raise InvalidParameter(
+            f'{where}: watchdog_s is {profile.watchdog_s:g} s; allowed are {WATCHDOG_UNIT_S:g} to '
+            f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
+        )
+    if len(set(profile.ids)) != len(profile.ids):
+        raise InvalidParameter(f'{where}: a motor is named twice; each has one place')
+    return profile
+
+
+def _check_numbers(profile: Profile, where: str) -> None:
+    joints = [joint for finger in profile.fingers.values() for joint in finger.values()]
+    numbers = [(name, getattr(profile, name)) for name in RANGES if hasattr(profile, name)]
+    numbers += [('model', model) for model in profile.models] + [('gain', gain) for gain in profile.gains.values()]
+    numbers += [('id', motor) for motor in profile.ids] + [('lever_m', abs(joint.lever_m)) for joint in joints]
+    numbers += [('address', address) for address, _ in profile.table.values()]
+    for name, number in numbers:
+        low, high = RANGES[name]
+        if not low <= number <= high:  # so is NaN
+            raise InvalidParameter(f'{where}: {name} is {number:g}; allowed are {low:g} to {high:g}')
+    for register, (_, size) in profile.table.items():
+        if size not in SIZES:
+            raise InvalidParameter(f"{where}: register '{register}' has {size} bytes; 1, 2 or 4 are possible")
+
+
+def _check_models(profile: Profile, where: str) -> None:
+    """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than asked."""
+    for model in profile.models:
+        for register, place in profile.table.items():
+            if model in MODELS and place != X_SERIES.get(register, place):
+                raise InvalidParameter(
+                    f"{where}: '{register}' stands at {list(place)} in the table; motors of model {describe(model)} "
+                    f'have it at {list(X_SERIES[register])}, and what protects would not be armed'
+                )
+        if difference := differs(model, profile.current_a, profile.torque_nm_a):
+            raise InvalidParameter(
+                f'{where}: {difference}; give each model a profile of its own, with its current_a and torque_nm_a'
+            )
+
+
+def _joints(roles: Mapping[str, Any], where: str) -> dict[str, Joint]:
+    for role in roles:
+        if role not in ROLES:
+            raise InvalidParameter(f'{where}: {unknown_name(str(role), ROLES, "joint")}')
+    if 'press' not in roles:
+        raise InvalidParameter(f"{where}: no motor for 'press'; every finger needs one")
+    return {role: Joint(int(one['id']), float(one['lever_m'])) for role, one in roles.items()}
+
+
+# --------------------
+# A hand without a robot: five simulated fingers around an elastic object.
+
+FINGERS = ('thumb', 'index', 'middle', 'ring', 'little')
+# Kaboli et al. 2015: which fingers held and which slid, for learning and for testing.
+FINGER_SETS = {
+    'kaboli-train': FingerSet(hold=('thumb', 'little', 'ring'), slide=('index', 'middle')),
+    'kaboli-test': FingerSet(hold=('little', 'ring', 'middle'), slide=('thumb', 'index')),
+}
+START_M = 0.004
+LIMITS = CommandLimits()
+
+
+class SimulatedHand:
+    """Each finger is a simulated arm of its own; see `texture_exploration.arms.hand.Hand`.
+
+    Parameters
+    ----------
+    clock
+        CLOCK_MONOTONIC in ns.
+    own_thread
+        Move by itself once connected. If False, whoever owns the hand calls `step`.
+    limits
+        Of every single command.
+    """
+
+    finger_sets: Mapping[str, FingerSet] = FINGER_SETS
+
+    def __init__(
+        self,
+        clock: Callable[[], int] = time.monotonic_ns,
+        own_thread: bool = True,
+        limits: CommandLimits = LIMITS,
+    ) -> None:
+        params = SimulatedArmParams(start_height_m=START_M)
+        self.fingers = {name: SimulatedArm(params, clock, own_thread=False) for name in FINGERS}
+        self._clock = clock
+        self._limits = limits
+        self._own_thread = own_thread
+        self._grip: dict[str, ArmCommand] = {}
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def connect(self) -> None:
+        """Start to move in time."""
+        self.close()
+        self._closing.clear()
+        for finger in self.fingers.values():
+            finger.connect()
+        if self._own_thread:
+            self._thread = threading.Thread(target=self._run, name='simulated_hand', daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Let go and end the thread."""
+        self._grip = {}
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        for finger in self.fingers.values():
+            finger.close()
+
+    def state(self) -> HandState:
+        """Return the newest state."""
+        states = {name: finger.state() for name, finger in self.fingers.items()}
+        tips = {name: Fingertip(one.position, one.velocity, one.force_n) for name, one in states.items()}
+        return HandState(
+            min(one.time_ns for one in states.values()), tips, '; '.join(s.fault for s in states.values() if s.fault)
+        )
+
+    def grip(self, forces_n: Mapping[str, float]) -> None:
+        """Press from the next step on."""
+        grip = {name: ArmCommand(force_n=force) for name, force in forces_n.items()}
+        for command in grip.values():
+            self._limits.check(command)
+        self._grip = grip
+
+    def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
+        """Follow from the next step on."""
+        self._limits.check(command, lambda: self._send(fingers, ArmCommand()))
+        self._send(fingers, command)
+
+    def warning(self) -> str:
+        """Nothing ever is amiss that `state` does not tell."""
+        return ''
+
+    def _send(self, fingers: Sequence[str], command: ArmCommand) -> None:
+        for name in fingers:
+            self.fingers[name].command(command)
+
+    def step(self, dt_s: float) -> None:
+        """Move all fingers."""
+        for name, command in self._grip.items():
+            self.fingers[name].command(command)
+        for finger in self.fingers.values():
+            finger.step(dt_s)
+
+    def _run(self) -> None:
+        last_ns = self._clock()
+        while not self._closing.wait(1 / RATE_HZ):
+            now_ns = self._clock()
+            self.step((now_ns - last_ns) * 1e-9)
+            last_ns = now_ns

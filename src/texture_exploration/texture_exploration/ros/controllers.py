@@ -1,0 +1,397 @@
+"""Topics of an arm that ROS drives, and the guard that stops it when the explorer has died."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from texture_core.errors import DeviceError
+from texture_core.ros import to_ns
+from texture_exploration.arms.arm import Vector
+from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersParams
+
+# --------------------
+# A process that commands zero velocity when the process that commanded the arm is silent or gone.
+#
+# A controller may hold the last velocity for ever: the twist controller of `ur_robot_driver` has no timeout. The
+# guard
+# hears a heartbeat on a pipe whose other end only the commanding process holds. It commands zero velocity when an arm
+# that moves is no longer spoken for, as when that process hangs, is stopped (SIGSTOP) or frozen; the kernel closes
+# the
+# pipe however the process ends, also by SIGKILL. Whoever ends in order says so first.
+
+TWIST_GUARD_NODE = 'arm_guard'
+DONE, MOVING, RESTING = b'.', b'm', b'r'
+REPEATED_S = 0.5
+PERIOD_S = 0.01
+ANSWER_S = 0.05
+SILENT_S = 0.5  # a guard that has not answered for so long would not stop the arm either
+LEAVE_S = 2.0
+SCOPE = ('systemd-run', '--user', '--scope', '--quiet', '--collect')
+NO_SCOPE = (
+    'systemd-run --user --scope is not available: the guard of the arm shares the control group of this process, and '
+    'whatever kills the whole group, as stopping a container does, kills both; only a timeout of the controller or the '
+    'limits of the robot stop the arm then'
+)
+
+
+@functools.cache
+def scope() -> tuple[str, ...]:
+    """Return what starts a process in a control group of its own, nothing where systemd does not offer that."""
+    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+        if subprocess.run([*SCOPE, 'true'], capture_output=True, timeout=LEAVE_S, check=False).returncode == 0:
+            return SCOPE
+    return ()
+
+
+class TwistGuard:
+    """The guard of one topic; nothing may be commanded to those whom it does not reach, or once it has ended.
+
+    Parameters
+    ----------
+    topic
+        Full name of the topic of the velocities.
+    frame_id
+        What their header carries.
+    heartbeat_s
+        Longest silence while the arm moves.
+    """
+
+    def __init__(self, topic: str, frame_id: str, heartbeat_s: float) -> None:
+        # A session and, if possible, a control group of its own: what ends all processes of a terminal, a launch file
+        # or a service must not end the guard first.
+        self._process = subprocess.Popen(
+            [*scope(), sys.executable, '-m', __name__, topic, frame_id, str(heartbeat_s)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._out, self._in = self._process.stdin.fileno(), self._process.stdout.fileno()
+        for pipe in (self._out, self._in):
+            os.set_blocking(pipe, False)
+        self._reached = 0
+        self._heard_s = 0.0
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    @property
+    def reached(self) -> int:
+        """How many who listen the guard has found; to find them takes a while, which must not come after a death."""
+        self._hear()
+        return self._reached
+
+    def fault(self) -> str:
+        """Return in a sentence why the guard would not stop the arm, '' if it would or is still starting."""
+        self._hear()
+        if self._process.poll() is not None:
+            return 'the guard process, which would stop the arm if this process dies, has ended'
+        silent_s = time.monotonic() - self._heard_s
+        if self._heard_s and silent_s > SILENT_S:
+            return f'the guard process, which would stop the arm if this process dies, is silent for {silent_s:.1f} s'
+        return ''
+
+    def beat(self, *, moving: bool) -> None:
+        """Tell that the commanding process lives."""
+        with contextlib.suppress(OSError):  # a full pipe or a dead guard, which `fault` tells
+            os.write(self._out, MOVING if moving else RESTING)
+
+    def dismiss(self) -> None:
+        """End the guard: zero velocity has been commanded."""
+        with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended
+            self._process.communicate(DONE, timeout=LEAVE_S)
+        self._process.kill()
+        self._process.wait()
+
+    def _hear(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            while told := os.read(self._in, 4096).split():
+                self._reached, self._heard_s = int(told[-1]), time.monotonic()
+
+
+def main() -> None:
+    """Run as `python -m texture_exploration.ros.controllers TOPIC FRAME HEARTBEAT_S`; the arm starts it."""
+    topic, frame_id, heartbeat_s = sys.argv[1:]
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(TWIST_GUARD_NODE, enable_rosout=False, start_parameter_services=False)
+    publisher = node.create_publisher(TwistStamped, topic, 1)
+
+    def command_standstill() -> None:
+        message = TwistStamped()
+        message.header.stamp, message.header.frame_id = node.get_clock().now().to_msg(), frame_id
+        publisher.publish(message)
+
+    os.set_blocking(sys.stdout.fileno(), False)
+    if not guarded(publisher, float(heartbeat_s), command_standstill):
+        end_s = time.monotonic() + REPEATED_S
+        while time.monotonic() < end_s:
+            command_standstill()
+            time.sleep(PERIOD_S)
+
+
+def guarded(publisher: Any, heartbeat_s: float, command_standstill: Any) -> bool:
+    """Guard until the other end says that it is done, True, or closes, False; tell it how many listen."""
+    moving, heard_s, answered_s = False, time.monotonic(), 0.0
+    while True:
+        if select.select([sys.stdin], [], [], PERIOD_S)[0]:
+            said = os.read(sys.stdin.fileno(), 4096)
+            if not said or DONE in said:
+                return bool(said)
+            moving, heard_s = said.endswith(MOVING), time.monotonic()
+        now_s = time.monotonic()
+        if moving and heartbeat_s < now_s - heard_s < heartbeat_s + REPEATED_S:
+            command_standstill()
+        if now_s - answered_s > ANSWER_S:
+            answered_s = now_s
+            with contextlib.suppress(OSError):
+                os.write(sys.stdout.fileno(), f'{publisher.get_subscription_count()}\n'.encode())
+
+
+if __name__ == '__main__':
+    main()
+
+
+# --------------------
+# The topics of ROS controllers, taken by whoever polls them: no executor, no callbacks, one thread.
+#
+# A context of its own makes the arm independent of the node that owns it: zero velocity can still be sent when that
+# node
+# is shut down. Names follow the namespace and the remappings of the process.
+
+CONTROLLER_TOPICS_NODE = 'arm_topics'
+COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fits every subscriber
+MEASURED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # fits every publisher
+MOST = 10  # messages that are taken at once: only the newest counts
+ARRIVAL_S = 0.2
+DISCOVERY_S = 0.5  # before this node is seen to publish, it looks who else does
+LOOKING_S = 0.05
+UNNAMED = '_NODE_NAME_UNKNOWN_'  # of rmw, until the name of a publisher's node has come, too
+UNNAMED_S = 1.0
+
+
+class RosTopics:
+    """See `texture_exploration.arms.ros_controllers.ControllerTopics`.
+
+    Parameters
+    ----------
+    params
+        Names of topics and frames.
+
+    Raises
+    ------
+    DeviceError
+        If the controller would hold the last velocity for ever, or somebody else commands it.
+    """
+
+    def __init__(self, params: RosControllersParams) -> None:
+        if not (params.controller_timeout_s or params.accept_no_timeout):
+            raise DeviceError(
+                f"the controller on '{params.twist_topic}' declares no timeout ('controller_timeout_s' is 0): it may "
+                'hold the last velocity for ever if this machine or its network fails. Set its timeout, or set '
+                "'accept_no_timeout: true' once the safety limits of the robot bound speed and force (docs/safety.md)"
+            )
+        self._params = params
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node(
+            CONTROLLER_TOPICS_NODE,
+            context=self._context,
+            cli_args=['--ros-args', '-r', f'__node:={CONTROLLER_TOPICS_NODE}'],  # the process may rename its own node
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        node = self._node
+        wrench_topic = params.target_wrench_topic
+        self._commanded_topics = [node.resolve_topic_name(name) for name in (params.twist_topic, wrench_topic) if name]
+        self._unnamed_s = 0.0  # since when there has been such a publisher
+        self._wait_for_the_command()
+        self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
+        self._wrenches = node.create_publisher(WrenchStamped, wrench_topic, COMMAND_QOS) if wrench_topic else None
+        self._poses = node.create_subscription(PoseStamped, params.pose_topic, _ignore, MEASURED_QOS)
+        self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, _ignore, MEASURED_QOS)
+        self._frame_id = params.twist_frame_id or params.base_frame_id
+        self._guard = TwistGuard(self._twists.topic_name, self._frame_id, params.heartbeat_s)
+        if not scope():
+            node.get_logger().warning(NO_SCOPE)
+
+    def newest_pose(self) -> PoseSample | None:
+        """Return the newest pose that came since the last call, None if none did."""
+        message = _newest(self._poses)
+        if message is None:
+            return None
+        at, turned = message.pose.position, message.pose.orientation
+        return PoseSample(
+            to_ns(message.header.stamp),
+            message.header.frame_id,
+            (at.x, at.y, at.z),
+            (turned.x, turned.y, turned.z, turned.w),
+            self._age_ns(message),
+        )
+
+    def newest_force(self) -> ForceSample | None:
+        """Return the newest force that came since the last call, None if none did."""
+        message = _newest(self._forces)
+        if message is None:
+            return None
+        force = message.wrench.force
+        stamp_ns, age_ns = to_ns(message.header.stamp), self._age_ns(message)
+        return ForceSample(stamp_ns, message.header.frame_id, (force.x, force.y, force.z), age_ns)
+
+    def _age_ns(self, message: Any) -> int:
+        stamp_ns = to_ns(message.header.stamp)
+        return int(self._node.get_clock().now().nanoseconds) - stamp_ns if stamp_ns else 0
+
+    def listeners(self) -> int:
+        """Return how many nodes listen to the commanded velocities, and can also be reached by the guard."""
+        return min(self._twists.get_subscription_count(), self._guard.reached)
+
+    def unsafe(self) -> str:
+        """Return why the arm must not go on although it obeys: another commands it, or no guard would stop it."""
+        return self._guard.fault() or self._other_commander(
+            (self._node.get_fully_qualified_name(), f'/{TWIST_GUARD_NODE}')
+        )
+
+    def beat(self, *, moving: bool) -> None:
+        """Tell the guard that the commanding process lives."""
+        self._guard.beat(moving=moving)
+
+    def send_velocity(self, velocity_m_s: Vector) -> None:
+        """Command a velocity."""
+        message = TwistStamped()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.frame_id = self._frame_id
+        linear = message.twist.linear
+        linear.x, linear.y, linear.z = velocity_m_s
+        self._twists.publish(message)
+
+    def send_force(self, force_n: Vector) -> None:
+        """Command a force of the tool on its surroundings in the base frame."""
+        if self._wrenches is None:
+            return
+        message = WrenchStamped()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.frame_id = self._params.base_frame_id
+        force = message.wrench.force
+        force.x, force.y, force.z = force_n
+        self._wrenches.publish(message)
+
+    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
+        """Let the controller manager switch both sets or nothing.
+
+        Parameters
+        ----------
+        activate, deactivate
+            Names of controllers.
+
+        Raises
+        ------
+        DeviceError
+            If controller_manager_msgs is not installed, or the manager does not answer, or refuses.
+        """
+        manager = self._params.controller_manager
+        try:
+            kind = importlib.import_module('controller_manager_msgs.srv').SwitchController
+        except ImportError as error:
+            raise DeviceError(
+                f"parameter 'controller_manager' is '{manager}', which needs controller_manager_msgs; install it "
+                "(ros-jazzy-controller-manager-msgs), or set it to '' and switch the controllers by hand"
+            ) from error
+        request = kind.Request(activate_controllers=[*activate], deactivate_controllers=[*deactivate])
+        request.strictness = kind.Request.STRICT
+        answer = self._ask(kind, f'{manager}/switch_controller', request)
+        if answer is None or not answer.ok:
+            did = 'does not answer' if answer is None else f'refused: {getattr(answer, "message", "") or "see its log"}'
+            raise DeviceError(
+                f"'{manager}' was asked to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
+            )
+
+    def _ask(self, kind: Any, name: str, request: Any) -> Any:
+        """Return the answer of a service, None if none comes in time; nobody spins this node meanwhile."""
+        client = self._node.create_client(kind, name)
+        executor = SingleThreadedExecutor(context=self._context)
+        try:
+            if not client.wait_for_service(self._params.connect_timeout_s):
+                return None
+            future = client.call_async(request)
+            rclpy.spin_until_future_complete(self._node, future, executor, self._params.connect_timeout_s)
+            return future.result() if future.done() else None
+        finally:
+            executor.shutdown()
+            self._node.destroy_client(client)
+
+    def _wait_for_the_command(self) -> None:
+        """Take the topics only once nobody else is there; who commands must not be disturbed by being looked at."""
+        begin_s = time.monotonic()
+        while (other := self._other_commander()) or time.monotonic() - begin_s < DISCOVERY_S:
+            if other and time.monotonic() - begin_s > self._params.connect_timeout_s:
+                self._leave()
+                raise DeviceError(f'{other}; end it first. One that was killed is forgotten after about 20 s')
+            time.sleep(LOOKING_S)
+
+    def _other_commander(self, own: tuple[str, ...] = ()) -> str:
+        """Return in a sentence who else commands, '' if nobody does; each name of ours may publish once."""
+        for topic in self._commanded_topics:
+            if self._node.count_publishers(topic) <= (len(own) if topic is self._commanded_topics[0] else len(own[:1])):
+                continue
+            left, infos = list(own), self._node.get_publishers_info_by_topic(topic)
+            unnamed = any(info.node_name == UNNAMED for info in infos)
+            self._unnamed_s = (self._unnamed_s or time.monotonic()) if unnamed else 0.0
+            if unnamed and time.monotonic() - self._unnamed_s < UNNAMED_S:
+                continue
+            for info in infos:
+                name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+                if name not in left:
+                    return f"'{name}' commands the arm, too: it publishes on '{topic}'"
+                left.remove(name)
+        return ''
+
+    def close(self) -> None:
+        """Wait until what was sent has arrived, and leave."""
+        self._twists.wait_for_all_acked(Duration(seconds=ARRIVAL_S))
+        self._guard.dismiss()
+        self._leave()
+
+    def _leave(self) -> None:
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+
+def _newest(subscription: Any) -> Any:
+    """Return the newest message that waits, None if there is none."""
+    newest = None
+    with subscription.handle:
+        for _ in range(MOST):
+            taken = subscription.handle.take_message(subscription.msg_type, False)
+            if taken is None:
+                break
+            newest = taken[0]
+    return newest
+
+
+def _ignore(_message: Any) -> None:
+    """Nobody spins this node."""

@@ -1,0 +1,541 @@
+"""Copies of training windows under computed disturbances, so that a model knows what lies beside its training."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import resample_poly
+
+from texture_core.config import param
+from texture_core.types import NANOSECONDS, Array
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import CutWindow, WindowEvent, WindowParams
+
+# --------------------
+# How training examples are augmented.
+
+
+@dataclass(frozen=True)
+class Augmentation:
+    """Changes of the training slides that a classifier is to tolerate.
+
+    Speed and noise change the signals of copies of each slide. Gain and slide jitter change the features of each drawn
+    example: a gain adds a constant to the logarithm of a power or an amplitude, and slide jitter adds a random multiple
+    of the deviation of a training slide from the mean of its class, which is noise with the covariance that slides of
+    one class have among themselves.
+
+    Examples
+    --------
+    >>> Augmentation().copies, Augmentation(copies=8).speed_range  # off unless a recipe asks for copies
+    (0, 0.15)
+    """
+
+    copies: int = param(
+        0,
+        'Number of augmented copies that are made of each training slide; 0 disables the augmentation.',
+        low=0,
+        high=100,
+    )
+    speed_range: float = param(
+        0.15,
+        'Largest relative change of the speed of a copy, to either side; half of the copies keep the speed they have.',
+        low=0.0,
+        high=1.0,
+    )
+    noise_range: float = param(
+        0.05,
+        'Largest standard deviation of the white noise added to a copy, relative to that of the slide; half of the '
+        'copies stay without noise, and small values are more frequent than large ones.',
+        low=0.0,
+        high=10.0,
+    )
+    gain_range: float = param(
+        1.6, 'Largest factor by which the vibration of a drawn example is amplified or attenuated.', low=1.0, high=10.0
+    )
+    gain_probability: float = param(0.7, 'Fraction of the drawn examples whose gain is changed.', low=0.0, high=1.0)
+    slide_jitter: float = param(
+        1.5,
+        'Standard deviation of the factor by which a slide deviation is added to a drawn example; larger values make '
+        'the classifier tolerate more drift and cost accuracy without drift.',
+        low=0.0,
+        high=10.0,
+    )
+    clean_share: float = param(
+        0.43, 'Fraction of the drawn examples that are of the undisturbed slides.', low=0.0, high=1.0
+    )
+    disturbed_copies: int = param(
+        6,
+        'Number of strongly disturbed copies of each slide on which early stopping is fitted; no classifier is '
+        'trained on them.',
+        low=0,
+        high=100,
+    )
+
+
+# --------------------
+# Disturbances of the windows of one slide: one kind at a time, by a strength.
+
+BURST_S = 0.01  # samples are lost by the packet
+CURVE_TERMS = 5  # of the random response of another finger over frequency
+RATIO_LIMIT = 40  # numerator and denominator of a speed ratio: the resampling filter grows with them
+
+
+@dataclass(frozen=True, eq=False)
+class SlideWindows:
+    """Windows of one input over one slide.
+
+    Parameters
+    ----------
+    samples : (n_windows, n_samples, n_channels)
+    rate_hz
+        Sampling rate.
+    starts_s : (n_windows,)
+        Start of each window after that of the first.
+    vibration
+        Whether this is the vibration input; gain, loss of samples, clipping and the response of a finger act on it.
+
+    Examples
+    --------
+    >>> windows = SlideWindows(np.ones((4, 100, 2)), 1000.0, 0.1 * np.arange(4), vibration=True)
+    >>> amplify(windows, 3.0, np.random.default_rng(0)).mean().item(), windows.rms.tolist()
+    (3.0, [0.0, 0.0])
+    """
+
+    samples: Array
+    rate_hz: float
+    starts_s: Array
+    vibration: bool
+
+    @property
+    def mean(self) -> Array:
+        """Mean of each channel over the slide, (n_channels,)."""
+        mean: Array = self.samples.mean(axis=(0, 1))
+        return mean
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square of each channel about its mean over the slide, (n_channels,)."""
+        rms: Array = self.samples.std(axis=(0, 1))
+        return rms
+
+
+class Disturbance(Protocol):
+    """Changes windows as a disturbance of some strength would."""
+
+    def __call__(self, windows: SlideWindows, strength: float, rng: np.random.Generator, /) -> Array:
+        """Return the samples of the windows with the disturbance.
+
+        Parameters
+        ----------
+        windows
+            Windows of one input.
+        strength
+            How strong; each disturbance says in which unit.
+        rng
+            Source of all that is random.
+
+        Returns
+        -------
+        (n_windows, n_samples, n_channels)
+            In the unit of the signal.
+        """
+
+
+def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
+    """Return the first `count` samples of each window as they are at a multiple of the speed.
+
+    The windows must hold at least speed · count samples.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input.
+    speed
+        Multiple of the speed at which they were recorded, > 0.
+    count
+        Number of samples of each window to return.
+
+    Returns
+    -------
+    (n_windows, count, n_channels)
+        Resampled and band-limited; the sampling rate stays.
+    """
+    longer = windows.samples
+    ratio = Fraction(1.0 / speed).limit_denominator(RATIO_LIMIT)
+    if ratio != 1:
+        longer = resample_poly(longer, ratio.numerator, ratio.denominator, axis=1, padtype='line')
+    resampled: Array = longer[:, :count]
+    return resampled
+
+
+def add_noise(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
+    """Add white noise with a multiple, the strength, of the root mean square of the slide."""
+    return windows.samples + strength * windows.rms * rng.standard_normal(windows.samples.shape)
+
+
+def amplify(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Multiply the vibration by the strength; slow channels stay as they are."""
+    return strength * windows.samples if windows.vibration else windows.samples
+
+
+def add_drift(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Add an offset that grows by a multiple of the root mean square of the slide per second, from window to window."""
+    times = windows.starts_s[:, None] + np.arange(windows.samples.shape[1]) / windows.rate_hz
+    return windows.samples + strength * windows.rms * times[..., None]
+
+
+def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
+    """Replace a fraction of the vibration, by bursts of 10 ms, by the last value before; slow channels stay.
+
+    The first sample of a window is never lost.
+    """
+    n_windows, n_samples, _ = windows.samples.shape
+    if not windows.vibration:
+        return windows.samples
+    burst = max(1, round(BURST_S * windows.rate_hz))
+    lost = np.repeat(rng.random((n_windows, -(-n_samples // burst))) < strength, burst, axis=1)[:, :n_samples]
+    lost[:, 0] = False
+    last = np.maximum.accumulate(np.where(lost, 0, np.arange(n_samples)), axis=1)
+    held: Array = np.take_along_axis(windows.samples, last[..., None], axis=1)
+    return held
+
+
+def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Limit the vibration to a multiple of its root mean square about the mean; slow channels stay as they are."""
+    if not windows.vibration:
+        return windows.samples
+    limit = strength * windows.rms
+    return np.clip(windows.samples, windows.mean - limit, windows.mean + limit)
+
+
+def low_pass(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Filter the vibration by a low-pass of first order whose cut-off is a multiple of the sampling rate.
+
+    Slow channels stay as they are.
+    """
+    if not windows.vibration:
+        return windows.samples
+    n_samples = windows.samples.shape[1]
+    pole = math.exp(-2.0 * math.pi * strength)
+    response = (1.0 - pole) / (1.0 - pole * np.exp(-2j * math.pi * np.fft.rfftfreq(n_samples)))
+    deviation = windows.samples - windows.mean
+    return windows.mean + np.fft.irfft(np.fft.rfft(deviation, axis=1) * response[:, None], n_samples, axis=1)
+
+
+def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
+    """Filter the vibration by a smooth random response with this standard deviation in dB; shift slow channels.
+
+    The mean over the slide stays for vibration; of slow channels the gains and offsets change.
+    """
+    n_channels = windows.samples.shape[2]
+    deviation = windows.samples - windows.mean
+    if not windows.vibration:
+        gains = np.exp(0.05 * strength * rng.standard_normal(n_channels))
+        return windows.mean + gains * deviation + 3.0 * strength * rng.standard_normal(n_channels)
+    response = smooth_response(windows.samples.shape[1] // 2 + 1, strength, rng)
+    filtered = np.fft.irfft(np.fft.rfft(deviation, axis=1) * response[:, None], windows.samples.shape[1], axis=1)
+    return windows.mean + filtered
+
+
+def smooth_response(count: int, strength_db: float, rng: np.random.Generator) -> Array:
+    """Return a smooth random amplitude response over `count` frequencies from 0 to half the rate.
+
+    Parameters
+    ----------
+    count
+        Number of frequencies, the first at 0 Hz, the last at half the sampling rate.
+    strength_db
+        Standard deviation of the response, dB.
+    rng
+        Source of the response.
+
+    Returns
+    -------
+    (count,)
+        Factors of the amplitude, 1 for no change.
+    """
+    frequencies = np.linspace(0.0, 1.0, count)
+    terms = np.cos(np.pi * np.arange(CURVE_TERMS)[:, None] * frequencies)
+    curve = rng.standard_normal(CURVE_TERMS) @ terms / math.sqrt(3.0)  # standard deviation about 1
+    response: Array = 10.0 ** (strength_db * curve / 20.0)
+    return response
+
+
+@dataclass(frozen=True)
+class StrengthRange:
+    """A disturbance, and its smallest and largest strength on which early stopping is fitted.
+
+    Parameters
+    ----------
+    disturbance
+        None for a change of speed, which needs longer windows.
+    weakest, strongest
+        From harmless to useless.
+
+    Examples
+    --------
+    >>> gain = StrengthRange(amplify, 0.4, 2.5)
+    >>> 0.4 <= gain.draw(np.random.default_rng(0)) <= 2.5
+    True
+    """
+
+    disturbance: Disturbance | None
+    weakest: float
+    strongest: float
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Return a strength, uniform in its logarithm."""
+        return math.exp(rng.uniform(math.log(self.weakest), math.log(self.strongest)))
+
+
+DISTURBANCES: Mapping[str, StrengthRange] = {
+    'speed': StrengthRange(None, 0.35, 2.2),
+    'gain': StrengthRange(amplify, 0.4, 2.5),
+    'noise': StrengthRange(add_noise, 0.003, 0.3),
+    'finger': StrengthRange(other_finger, 0.3, 5.0),
+    'drift': StrengthRange(add_drift, 0.1, 10.0),
+    'held': StrengthRange(hold_lost, 0.003, 0.3),
+    'clipped': StrengthRange(clip, 0.7, 4.0),
+    'low-pass': StrengthRange(low_pass, 0.1, 1.0),
+}
+KINDS = tuple(DISTURBANCES)
+
+
+# --------------------
+# Features of the altered copies of slides.
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureCopies:
+    """Features of changed copies of slides, copy by copy and in the order of time.
+
+    Parameters
+    ----------
+    values : (n, n_features) float32
+    groups : (n,) of text
+        Slide (exploration id) of which each window is a copy.
+    copies : (n,)
+        Number of the copy of the slide.
+    kinds : (n,) of text
+        Kind of disturbance; in augmented copies NOISE if noise was added, else ''.
+
+    Examples
+    --------
+    >>> copies = FeatureCopies(np.zeros((2, 3), np.float32), np.array(['a', 'b']), np.arange(2), np.array(['', '']))
+    >>> copies.select(copies.groups == 'b').copies.tolist()
+    [1]
+    """
+
+    values: NDArray[np.float32]
+    groups: NDArray[np.str_]
+    copies: NDArray[np.intp]
+    kinds: NDArray[np.str_]
+
+    def select(self, rows: NDArray[np.bool_]) -> FeatureCopies:
+        """Return these windows, (n,).
+
+        Parameters
+        ----------
+        rows : (n,) bool
+            Which windows are kept.
+        """
+        return FeatureCopies(self.values[rows], self.groups[rows], self.copies[rows], self.kinds[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class AugmentedFeatures:
+    """What augmentation adds to labelled features.
+
+    Parameters
+    ----------
+    copies
+        To train on.
+    disturbed
+        To fit early stopping on.
+    gain_response : (n_features,)
+        Change of each feature per natural logarithm of the gain of the vibration: 2 for the logarithm of a power, 1 for
+        that of an amplitude, 0 for what no gain changes.
+
+    Examples
+    --------
+    >>> nothing = FeatureCopies(np.zeros((0, 1), np.float32), np.array(['']), np.arange(0), np.array(['']))
+    >>> features = AugmentedFeatures(nothing, nothing, gain_response=np.array([2.0]))  # of a logarithm of a power
+    >>> bool(np.isclose(np.log(3.0**2), features.gain_response[0] * np.log(3.0)))
+    True
+    """
+
+    copies: FeatureCopies
+    disturbed: FeatureCopies
+    gain_response: Array
+
+
+# --------------------
+# Augmented and disturbed copies of labelled slides, as features.
+
+GAIN_STEP = 1.25  # ratio of the two gains at which the response of the features is measured
+NOISE = 'noise'
+PROBABILITY = 0.5  # of a change of speed, and of noise, in a copy
+Cut = Callable[[WindowParams], Sequence[WindowEvent]]
+Batches = Mapping[str, SlideWindows]
+
+
+class Augmenter:
+    """Collect the copies of slides, one slide after the other.
+
+    Parameters
+    ----------
+    feature_set
+        Features, and how the windows are cut for training.
+    augmentation
+        What is changed, and how much.
+    seed
+        Of the random changes.
+
+    Examples
+    --------
+    >>> augmenter = Augmenter(FeatureSet.load('fast'), Augmentation(copies=2))
+    >>> augmenter.add('slide', lambda params: [])  # a slide without a window has no copies
+    >>> augmenter.result() is None
+    True
+    """
+
+    def __init__(self, feature_set: FeatureSet, augmentation: Augmentation, seed: int = 0) -> None:
+        self._features = feature_set
+        self._augmentation = augmentation
+        self._seed = seed
+        self._slides = 0
+        self._copies: list[tuple[Array, str, int, str]] = []
+        self._disturbed: list[tuple[Array, str, int, str]] = []
+        self._responses: list[Array] = []
+
+    def add(self, name: str, cut: Cut) -> None:
+        """Add the copies of a slide.
+
+        Parameters
+        ----------
+        name
+            Of the slide, as in the labelled features.
+        cut
+            Returns the windows of the slide for the given length and hop.
+        """
+        rng = np.random.default_rng([self._seed, self._slides])
+        self._slides += 1
+        windows = [event for event in cut(self._features.windows) if isinstance(event, CutWindow)]
+        if not windows:
+            return
+        self._responses.append(self._gain_response(windows[0]))
+        longest = 1.0 + self._augmentation.speed_range
+        longer = self._longer(cut, longest)
+        for copy in range(self._augmentation.copies if longer else 0):
+            augmented, noise = self._augmented(longer, windows[0], rng)
+            self._copies.append((augmented, name, copy, noise))
+        for copy in range(self._augmentation.disturbed_copies):
+            kind = KINDS[rng.integers(len(KINDS))]
+            values = self._disturb(kind, cut, windows, rng)
+            if values is not None:
+                self._disturbed.append((values, name, copy, kind))
+
+    def result(self) -> AugmentedFeatures | None:
+        """Return the copies of all slides; None if there are none."""
+        if not self._copies:
+            return None
+        response: Array = np.mean(self._responses, axis=0)
+        return AugmentedFeatures(_gathered(self._copies), _gathered(self._disturbed or self._copies[:0]), response)
+
+    def _longer(self, cut: Cut, times: float) -> list[CutWindow]:
+        """Return longer windows, from which others can be cut at a higher speed."""
+        own = self._features.windows
+        # One sample more, so that rounding leaves enough for the last sample of a resampled window.
+        params = dataclasses.replace(own, length_s=own.length_s * times + 0.02)
+        return [event for event in cut(params) if isinstance(event, CutWindow)]
+
+    def _augmented(self, longer: Sequence[CutWindow], like: CutWindow, rng: np.random.Generator) -> tuple[Array, str]:
+        widest = math.log1p(self._augmentation.speed_range)
+        speed = math.exp(rng.uniform(-widest, widest)) if rng.random() < PROBABILITY else 1.0
+        batches = _at_speed(_batches(longer, self._features.window_names), like, speed)
+        noisy = rng.random() < PROBABILITY
+        if noisy:
+            strength = self._augmentation.noise_range * rng.random() ** 2
+            batches = _changed(batches, lambda windows: add_noise(windows, strength, rng))
+        return self._extract(batches, longer, like, speed), NOISE if noisy else ''
+
+    def _disturb(self, kind: str, cut: Cut, windows: Sequence[CutWindow], rng: np.random.Generator) -> Array | None:
+        strengths = DISTURBANCES[kind]
+        strength = strengths.draw(rng)
+        disturbance = strengths.disturbance
+        if disturbance is None:
+            longer = self._longer(cut, max(strength, 1.0))
+            if not longer:
+                return None
+            batches = _at_speed(_batches(longer, self._features.window_names), windows[0], strength)
+            return self._extract(batches, longer, windows[0], strength)
+        batches = _changed(
+            _batches(windows, self._features.window_names), lambda batch: disturbance(batch, strength, rng)
+        )
+        return self._extract(batches, windows, windows[0], 1.0)
+
+    def _extract(self, batches: Batches, windows: Sequence[CutWindow], like: CutWindow, speed: float) -> Array:
+        """Return the features (n_windows, n_features) of changed samples."""
+        events = [
+            dataclasses.replace(
+                window,
+                length_s=like.length_s,
+                speed_m_s=speed * window.speed_m_s,
+                windows={
+                    topic: dataclasses.replace(window.windows[topic], samples=batch.samples[number])
+                    for topic, batch in batches.items()
+                },
+            )
+            for number, window in enumerate(windows)
+        ]
+        return np.stack([vector.values for vector in self._features.extract_many(events)])
+
+    def _gain_response(self, window: CutWindow) -> Array:
+        topic = self._features.window_names[0]
+        own = window.windows[topic]
+        louder = {**window.windows, topic: dataclasses.replace(own, samples=GAIN_STEP * own.samples)}
+        both = self._features.extract_many([window, dataclasses.replace(window, windows=louder)])
+        return (both[1].values - both[0].values) / math.log(GAIN_STEP)
+
+
+def _batches(windows: Sequence[CutWindow], topics: Iterable[str]) -> Batches:
+    """Return the windows of each input; the first input is the vibration."""
+    starts_s = np.array([window.start_ns - windows[0].start_ns for window in windows]) / NANOSECONDS
+    return {
+        topic: SlideWindows(
+            np.stack([window.windows[topic].samples for window in windows]),
+            windows[0].windows[topic].rate_hz,
+            starts_s,
+            vibration=number == 0,
+        )
+        for number, topic in enumerate(topics)
+    }
+
+
+def _changed(batches: Batches, change: Callable[[SlideWindows], Array]) -> Batches:
+    return {topic: dataclasses.replace(batch, samples=change(batch)) for topic, batch in batches.items()}
+
+
+def _at_speed(batches: Batches, like: CutWindow, speed: float) -> Batches:
+    """Return windows as long as those of `like` at a multiple of the speed."""
+    return {
+        topic: dataclasses.replace(batch, samples=at_speed(batch, speed, len(like.windows[topic].samples)))
+        for topic, batch in batches.items()
+    }
+
+
+def _gathered(parts: Sequence[tuple[Array, str, int, str]]) -> FeatureCopies:
+    lengths = [len(values) for values, *_ in parts]
+    if not parts:
+        nothing = np.zeros(0, dtype=str)
+        return FeatureCopies(np.zeros((0, 0), np.float32), nothing, np.zeros(0, np.intp), nothing)
+    groups, copies, kinds = (np.repeat([part[column] for part in parts], lengths) for column in (1, 2, 3))
+    values = np.concatenate([values.astype(np.float32) for values, *_ in parts])
+    return FeatureCopies(values, groups, copies.astype(np.intp), kinds)

@@ -1,1 +1,0 @@
-"""Data augmentation: copies of training slides at other speeds, gains and noise levels."""

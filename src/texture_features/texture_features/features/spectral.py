@@ -1,0 +1,458 @@
+"""Features of the spectrum: band powers, peaks, spectral exponent, short-time spectra, wavelets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import chain
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.types import Array
+from texture_features.feature import WindowBatch, mean_weights, power
+from texture_features.features.temporal import squares
+from texture_features.spectra import (
+    at_reference_speed,
+    densities_of,
+    force_normalised,
+    mean_over_segments,
+    overlapping,
+    welch_spectrum,
+)
+
+# --------------------
+# Power in equal frequency bands: the mean over the window.
+
+
+@dataclass(frozen=True)
+class LogBands:
+    """Logarithm of the mean power spectral density in equal bands from 0 Hz to half the sampling rate (Welch).
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None]
+    >>> bands = LogBands(bands=10)(WindowBatch(tone, rate_hz=1000.0))  # at 50, 100, … 500 Hz
+    >>> int(bands[0].argmax()) + 1
+    2
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    bands: int = param(32, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
+    overlap: float = param(
+        0.75,
+        'Fraction of a segment that overlaps the next one; more gives smoother values and costs time.',
+        low=0.0,
+        high=0.9,
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the band, from 1."""
+        return tuple(str(band + 1) for band in range(self.bands))
+
+    @cached_property
+    def _step(self) -> int:
+        return max(1, round(2 * self.bands * (1.0 - self.overlap)))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean density + floor)."""
+        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
+        return np.log(mean_over_segments(densities) + self.floor)
+
+
+# --------------------
+# Power density in the lowest FFT bins of long segments.
+
+
+@dataclass(frozen=True)
+class LowFftBins:
+    """Logarithm of the power spectral density at the lowest lines of long segments: where ridges and grids show.
+
+    `log_bands` with as many bands would be as fine everywhere, and noisier where fineness does not help.
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 30.0 * np.arange(1000) / 1000.0)[:, None]
+    >>> bins = LowFftBins(bins=10, points=100)(WindowBatch(tone, rate_hz=1000.0))  # at 10, 20, … 100 Hz
+    >>> int(bins[0].argmax()) + 1
+    3
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    bins: int = param(
+        32,
+        'Sets the number of FFT bins, from the first above 0 Hz; more bins reach higher frequencies.',
+        low=1,
+        high=512,
+    )
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the line, from 1."""
+        return tuple(str(bin_index + 1) for bin_index in range(self._count))
+
+    @property
+    def _count(self) -> int:
+        return min(self.bins, self.points // 2)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean density + floor)."""
+        densities, _ = welch_spectrum(windows, self.points, rate_of_change=False)
+        return np.log(densities[..., : self._count] + self.floor)
+
+
+# --------------------
+# Mean of the log power in equal frequency bands over the segments of a window.
+
+
+@dataclass(frozen=True)
+class MeanLogBands(LogBands):
+    """Mean over short segments of the logarithm of the power spectral density, in the bands of `log_bands`.
+
+    Where this is well below `log_bands`, the power comes in bursts: single bumps, stick and slip.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal((1000, 1))
+    >>> bursts = noise * (np.arange(1000) < 200)[:, None]  # silent for most of the window
+    >>> both = [WindowBatch(samples, rate_hz=1000.0) for samples in (noise, bursts)]
+    >>> below = [float((LogBands()(window) - MeanLogBands()(window)).mean()) for window in both]
+    >>> below[1] > 10 * below[0] > 0
+    True
+    """
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the mean of log(density + floor)."""
+        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
+        return mean_over_segments(np.log(densities + self.floor))
+
+
+# --------------------
+# Vibration power, weighted as the Pacinian receptors of the skin weight it.
+
+OCTAVES_PER_DB = 0.1 / np.log10(2.0)  # of power
+
+
+@dataclass(frozen=True)
+class PacinianPower:
+    """Logarithm of Σ (amplitude / threshold amplitude)² over the lines of the spectrum.
+
+    The threshold is that of the Pacinian channel in two straight lines: it falls by 12 dB an octave up to `best_hz`
+    and rises by `slope_above_db` beyond; 1 at its best. A tone of amplitude a at `best_hz` gives log(a²/2).
+
+    Source: Bensmaia & Hollins 2005, "Pacinian representations of fine surface texture"; slope and best frequency
+    after Bolanowski et al. 1988. The straight lines are an approximation.
+
+    Examples
+    --------
+    >>> time_s = np.arange(1280) / 1280.0
+    >>> tones = np.sin(2 * np.pi * np.array([60.0, 250.0]) * time_s[:, None])
+    >>> low, best = PacinianPower(rate_of_change=False)(WindowBatch(tones, rate_hz=1280.0))[:, 0].tolist()
+    >>> np.exp(best).round(1).item(), round((best - low) * 10 / np.log(10))  # a²/2, and some 12 dB · log2(250 / 60)
+    (0.5, 24)
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    best_hz: float = param(
+        250.0, 'Frequency at which the detection threshold is lowest.', unit='Hz', low=1.0, high=10_000.0
+    )
+    slope_below_db: float = param(
+        12.0, 'Sets the slope of the threshold below that frequency, in dB per octave.', low=0.0, high=100.0
+    )
+    slope_above_db: float = param(
+        12.0, 'Sets the slope of the threshold above that frequency, in dB per octave.', low=0.0, high=100.0
+    )
+    rate_of_change: bool = param(
+        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
+    )
+    at_speed_m_s: float = param(
+        0.0,
+        'Reference speed to which frequencies are scaled before weighting; 0: no scaling.',
+        unit='m/s',
+        low=0.0,
+        high=10.0,
+    )
+    force_exponent: float = param(
+        0.0,
+        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
+        low=0.0,
+        high=4.0,
+    )
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the log power."""
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
+        octaves = np.log2(at_reference_speed(hertz, windows, self.at_speed_m_s) / self.best_hz)
+        below, above = OCTAVES_PER_DB * self.slope_below_db, OCTAVES_PER_DB * self.slope_above_db
+        weights = np.exp2(np.minimum(below * octaves, -above * octaves))  # 1 / threshold²
+        power = np.add.reduce(densities * weights, axis=-1, keepdims=True) * hertz[0]
+        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)
+
+
+# --------------------
+# Peak-to-median power of the segments of a window: high when the finger sticks and slips.
+
+MEDIAN, MINIMUM = 'median', 'minimum'
+
+
+@dataclass(frozen=True)
+class PeakToMedianPower:
+    """Logarithm of the power of the strongest segment over that of the median or of the weakest one.
+
+    A finger that sticks and slips is still and then jumps; over an even texture all events are alike. The weakest event
+    tells a single skid: being still for a tenth of the window does not move the middle.
+
+    Examples
+    --------
+    >>> alternating = np.resize([1.0, -1.0], 100)[:, None]
+    >>> jump = alternating * np.where(np.arange(100) < 10, 3.0, 1.0)[:, None]  # 9 times the power in one segment
+    >>> np.exp(PeakToMedianPower()(WindowBatch(jump, rate_hz=100.0))).round(6).item()
+    9.0
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    segments: int = param(
+        10, 'Number of equal segments of the window; fewer if it has fewer samples.', low=2, high=1000
+    )
+    reference: str = param(
+        MEDIAN,
+        'Segment with whose power the largest is compared: the median or the minimum one.',
+        choices=(MEDIAN, MINIMUM),
+    )
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(strongest / other)."""
+        rows = windows.centred_rows
+        segments = min(self.segments, rows.shape[-1])
+        length = rows.shape[-1] // segments
+        cut = rows[..., : segments * length].reshape(*rows.shape[:-1], segments, length)
+        powers = power(cut)
+        powers.sort(axis=-1)
+        other = segments // 2 if self.reference == MEDIAN else 0
+        ratio = (powers[..., -1:] + self.floor) / (powers[..., other : other + 1] + self.floor)
+        return np.log(ratio)
+
+
+# --------------------
+# Autocorrelation of the power of the signal and of its first difference.
+
+# Of a power squared: far below any, far above the smallest number, so that nothing over nothing is 1.
+POWER_AUTOCORRELATION_TINY = 1e-200
+
+
+@dataclass(frozen=True)
+class PowerAutocorrelation:
+    """Log of the mean product of the squared signal and itself some samples later, over its mean squared; of steps too.
+
+    0 where the one says nothing of the other, above where bursts last so long, below where they keep such a distance.
+    The gain of the sensor changes nothing.
+
+    Examples
+    --------
+    >>> clicks = np.zeros((400, 1))
+    >>> clicks[::12] = 1.0
+    >>> feature = PowerAutocorrelation()
+    >>> values = dict(zip(feature.names, feature(WindowBatch(clicks, rate_hz=100.0))[0].tolist()))
+    >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks are 12 samples apart, never 8
+    True
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    lags: int = param(
+        12, 'Sets the number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24
+    )
+    floor: float = param(
+        1e-3,
+        'Ratio added before the logarithm, so that a lag without any power gives a finite value.',
+        low=1e-12,
+        high=1.0,
+    )
+
+    @cached_property
+    def _lags(self) -> list[int]:
+        return [1, *chain.from_iterable((2 << octave, 3 << octave) for octave in range(self.lags // 2))][: self.lags]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Lag in samples, for the signal and for its steps."""
+        return tuple(f'{what}_{lag}' for what in ('signal', 'difference') for lag in self._lags)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the values; 0 for all if the window is not two samples longer than the longest lag."""
+        powers = squares(windows)[..., :2, :]
+        n_steps = powers.shape[-1] - 1  # one less than samples
+        count = n_steps - self._lags[-1]
+        if count < 1:
+            return np.zeros((*powers.shape[:-2], len(self.names)))
+        # The axis of lags in front, where picking some copies whole blocks: a third of the time of doing so behind.
+        later = overlapping(powers, count, 1).swapaxes(0, -2)[self._lags].swapaxes(0, -2)
+        products = (later @ powers[..., :count, None])[..., 0] / count
+        mean = (powers[..., :-1] @ mean_weights(n_steps))[..., None]
+        autocorrelations = np.log(
+            (products + POWER_AUTOCORRELATION_TINY) / (mean * mean + POWER_AUTOCORRELATION_TINY) + self.floor
+        )
+        return autocorrelations.reshape(*powers.shape[:-2], -1)
+
+
+# --------------------
+# How the power in frequency bands changes over the window.
+
+
+@dataclass(frozen=True)
+class ShortTimeFourier:
+    """Logarithm of the power spectral density in equal bands, for each of some equal parts of the window.
+
+    The short-time Fourier transform, averaged within each part. Where a window has fewer segments than parts,
+    neighbouring parts share one.
+
+    Examples
+    --------
+    >>> time_s = np.arange(1000) / 1000.0
+    >>> chirp = np.where(time_s < 0.5, np.sin(2 * np.pi * 100.0 * time_s), np.sin(2 * np.pi * 300.0 * time_s))[:, None]
+    >>> feature = ShortTimeFourier(parts=2, bands=10)  # bands at 50, 100, … 500 Hz
+    >>> values = feature(WindowBatch(chirp, rate_hz=1000.0)).reshape(2, 10)
+    >>> (values.argmax(axis=1) + 1).tolist()
+    [2, 6]
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    parts: int = param(
+        4, 'Sets the number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
+    )
+    bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
+    overlap: float = param(
+        0.5,
+        'Fraction of a segment that overlaps the next one; more gives smoother values and costs time.',
+        low=0.0,
+        high=0.9,
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Part and band, each from 1."""
+        return tuple(f'{part + 1}/{band + 1}' for part in range(self.parts) for band in range(self.bands))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean density of each part + floor), part by part."""
+        step = max(1, round(2 * self.bands * (1.0 - self.overlap)))
+        densities = densities_of(windows, 2 * self.bands, step, self.bands)
+        means = _averaging(self.parts, densities.shape[-2]) @ densities
+        return np.log(means + self.floor).reshape(*means.shape[:-2], -1)
+
+
+@lru_cache(maxsize=64)
+def _averaging(parts: int, segments: int) -> Array:
+    """Return the matrix (parts, segments) whose product with segments is the mean of each part."""
+    first = np.arange(parts) * segments // parts
+    last = np.maximum(np.arange(1, parts + 1) * segments // parts, first + 1)
+    index = np.arange(segments)
+    belongs = ((index >= first[:, None]) & (index < last[:, None])).astype(np.float64)
+    matrix: Array = belongs / belongs.sum(axis=1, keepdims=True)
+    matrix.flags.writeable = False
+    return matrix
+
+
+# --------------------
+# How fast the spectrum falls.
+
+SPECTRAL_EXPONENT_TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class SpectralExponent:
+    """Exponent s of the power spectral density 1/f^s, by least squares in double logarithms.
+
+    A power law keeps its exponent when the finger goes faster; where the spectrum of a surface is none, the same waves
+    of the surface must be looked at: `at_speed_m_s` moves the band with the speed. 0 if fewer than two lines lie in it.
+
+    Source: Toscani & Metzger 2022.
+
+    Examples
+    --------
+    >>> walk = np.cumsum(np.random.default_rng(0).standard_normal((100_000, 1)), axis=0)  # its density falls as 1/f²
+    >>> round(SpectralExponent(low_hz=20.0, high_hz=100.0)(WindowBatch(walk, rate_hz=1000.0)).item(), 1)
+    2.0
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    low_hz: float = param(
+        60.0, 'Lower edge of the frequency band in which the exponent is fitted.', unit='Hz', low=0.0, high=1e6
+    )
+    high_hz: float = param(
+        420.0, 'Upper edge of the frequency band in which the exponent is fitted.', unit='Hz', low=0.0, high=1e6
+    )
+    rate_of_change: bool = param(
+        False, 'Whether the signal is the time derivative of the contact quantity; adds 2 to the exponent.'
+    )
+    at_speed_m_s: float = param(
+        0.0,
+        'Speed for which the band is given; it scales with the speed. 0: the band is fixed.',
+        unit='m/s',
+        low=0.0,
+        high=10.0,
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return s."""
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
+        measured = at_reference_speed(hertz, windows, self.at_speed_m_s)
+        within = (measured >= self.low_hz) * (
+            measured <= self.high_hz
+        ) + 0.0 * measured  # NaN where the speed is unknown
+        logs = np.log(hertz)
+        middle = (within @ logs) / (np.add.reduce(within, axis=-1) + SPECTRAL_EXPONENT_TINY)
+        weights = within * (logs - middle[..., None])
+        fall = np.add.reduce(weights * np.log(densities + self.floor), axis=-1)
+        exponent: Array = -fall / (weights @ logs + SPECTRAL_EXPONENT_TINY)
+        return exponent[..., None]

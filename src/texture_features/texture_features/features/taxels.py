@@ -1,0 +1,409 @@
+"""Features of arrays of taxels: spatial bands and variation, shares, correlation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.errors import InvalidParameter
+from texture_core.types import Array
+from texture_features.feature import WindowBatch, first_difference, power
+from texture_features.spectra import force_normalised, mean_subtracted, spatial_log_bands, welch_spectrum
+
+# --------------------
+# Centred log-ratio of the channel means: how the load is distributed over the taxels.
+
+
+@dataclass(frozen=True)
+class CentredLogRatio:
+    """Logarithm of each channel's mean level less the mean of these logarithms; for levels above 0.
+
+    A force that presses all taxels harder by the same factor changes nothing; friction and mounting do.
+
+    Examples
+    --------
+    >>> levels = np.array([[1.0, 4.0]])  # the second taxel carries four times the load of the first
+    >>> CentredLogRatio()(WindowBatch(levels, rate_hz=100.0))[:, 0].round(3).tolist()
+    [-0.693, 0.693]
+    >>> CentredLogRatio()(WindowBatch(10 * levels, rate_hz=100.0))[:, 0].round(3).tolist()  # pressed ten times as hard
+    [-0.693, 0.693]
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    floor: float = param(
+        1e-3,
+        'Smallest channel mean; smaller means are replaced by it, in the unit of the signal.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the log shares."""
+        rows = windows.rows
+        levels = np.log(np.maximum(np.add.reduce(rows, axis=-1) / rows.shape[-1], self.floor))
+        shares: Array = levels - np.add.reduce(levels, axis=-1, keepdims=True) / levels.shape[-1]
+        return shares[..., None]
+
+
+# --------------------
+# Log shares: how the load is distributed over the taxels, with its sign.
+
+
+@dataclass(frozen=True)
+class LogShares:
+    """Signed logarithm of each channel's share of the total load, less the mean of these logarithms.
+
+    The share s of a channel is its mean over the sum of the absolute means. Each gives sign(s) · log(max(|s|, floor) /
+    floor): a taxel that carries nearly nothing gives 0, not its noise. Where no level is negative these are the
+    centred log-ratios of Aitchison 1986 with a floor that follows the load. A force that presses all taxels harder by
+    the same factor changes nothing.
+
+    Examples
+    --------
+    >>> levels = np.array([[3.0, -1.0, 0.0]])  # pressed, pulled, and free
+    >>> shares = LogShares(floor=0.01)(WindowBatch(levels, rate_hz=100.0))[:, 0]
+    >>> (shares - shares[2]).round(2).tolist()  # log 75, -log 25, 0
+    [4.32, -3.22, 0.0]
+    >>> np.allclose(LogShares()(WindowBatch(10 * levels, 100.0)), LogShares()(WindowBatch(levels, 100.0)))
+    True
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    floor: float = param(
+        0.01,
+        'Sets the share of the load below which a channel counts as free; a larger one keeps out more noise.',
+        low=1e-6,
+        high=0.5,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the signed log shares."""
+        rows = windows.rows
+        levels = np.add.reduce(rows, axis=-1) / rows.shape[-1]
+        sizes = np.abs(levels)
+        total = np.add.reduce(sizes, axis=-1, keepdims=True)
+        shares = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
+        logs = np.sign(levels) * np.log(np.maximum(shares, self.floor) / self.floor)
+        centred: Array = logs - np.add.reduce(logs, axis=-1, keepdims=True) / logs.shape[-1]
+        return centred[..., None]
+
+
+# --------------------
+# Mean, power and shape statistics of the signal, averaged over the channels.
+
+
+@dataclass(frozen=True)
+class ChannelMeanStatistics:
+    """Waveform statistics of slow channels, independent of the taxel; no speed is needed.
+
+    Means over the channels of: level; log variance; rise, the last quarter of the window less the first; its absolute
+    value; share of the samples above the mean; skewness.
+
+    Examples
+    --------
+    >>> rising = np.linspace(0.0, 1.0, 100)[:, None] * np.ones(2)
+    >>> values = dict(zip(ChannelMeanStatistics.names, ChannelMeanStatistics()(WindowBatch(rising, 100.0))[0]))
+    >>> round(float(values['mean']), 2), round(float(values['rise']), 2), round(float(values['share_above']), 2)
+    (0.5, 0.76, 0.5)
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('mean', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
+
+    floor: float = param(
+        1e-4, 'Sets the power added to the variance before logarithm and split, in unit².', low=1e-300, high=1e300
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the six means."""
+        rows, centred = windows.rows, windows.centred_rows
+        n_samples = rows.shape[-1]
+        quarter = max(1, n_samples // 4)
+        level = np.add.reduce(rows, axis=-1) / n_samples
+        variance = power(centred)
+        rise = (np.add.reduce(rows[..., -quarter:], axis=-1) - np.add.reduce(rows[..., :quarter], axis=-1)) / quarter
+        above = np.count_nonzero(centred > 0.0, axis=-1) / n_samples
+        cubes = np.add.reduce(centred**3, axis=-1) / n_samples
+        skewness = cubes / (variance + self.floor) ** 1.5
+        values = np.stack([level, np.log(variance + self.floor), rise, np.abs(rise), above, skewness], axis=-1)
+        mean: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
+        return mean
+
+
+# --------------------
+# Relative changes: how much each taxel changes within a window, over the load of all.
+
+
+@dataclass(frozen=True)
+class RelativeChanges:
+    """Square roots of each channel's standard deviation and of that of its steps, over the load of all channels.
+
+    Two moments of the slow spectrum (Hjorth's activity, and that of the slope) without the level: the deviation counts
+    slow changes, the steps fast ones. The load is the sum of the absolute means; a force that presses harder, and lets
+    all change by the same factor, changes nothing.
+
+    Examples
+    --------
+    >>> samples = np.array([[1.0, 9.0], [3.0, 9.0], [1.0, 9.0], [3.0, 9.0]])  # one taxel moves by ±1 under a load of 11
+    >>> RelativeChanges()(WindowBatch(samples, rate_hz=100.0)).round(3).tolist()
+    [[0.302, 0.414], [0.0, 0.0]]
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('deviation', 'step')
+
+    floor: float = param(1e-9, 'Smallest load, in the unit of the signal; a smaller one is replaced by it.', low=1e-300)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return both roots."""
+        rows = windows.rows
+        load = np.add.reduce(np.abs(np.add.reduce(rows, axis=-1) / rows.shape[-1]), axis=-1, keepdims=True)
+        steps = first_difference(rows)
+        steps = steps - np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
+        deviations = np.sqrt(np.stack([power(windows.centred_rows), power(steps)], axis=-1))
+        changes: Array = np.sqrt(deviations / np.maximum(load, self.floor)[..., None])
+        return changes
+
+
+# --------------------
+# Power density in bands of spatial frequency, independent of the speed.
+
+# A band is at least so wide: one beyond the lines takes part of the last.
+MIN_LINES = 1e-3
+
+
+@dataclass(frozen=True)
+class SpatialBandPower:
+    """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
+
+    Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
+    v / low_hz. Of a band beyond half the sampling rate the nearest line is taken. NaN if the speed is unknown or not
+    above 0.
+
+    Examples
+    --------
+    >>> def slide(speed_m_s: float) -> WindowBatch:  # over a grating with a pitch of 1 mm
+    ...     wave = np.sin(2 * np.pi * speed_m_s / 1e-3 * np.arange(2000) / 2000.0)
+    ...     return WindowBatch(wave[:, None], 2000.0, np.array(speed_m_s))
+    >>> [int(SpatialBandPower(rate_of_change=False)(slide(speed_m_s)).argmax()) + 1 for speed_m_s in (0.1, 0.2, 0.3)]
+    [2, 2, 2]
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    bands: int = param(4, 'Sets the number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
+    longest_m: float = param(
+        2e-3, 'Sets the longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
+    )
+    shortest_m: float = param(
+        4.5e-4, 'Sets the shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
+    )
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=8, high=16384
+    )
+    rate_of_change: bool = param(
+        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
+    )
+    force_exponent: float = param(
+        0.0,
+        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
+        low=0.0,
+        high=4.0,
+    )
+    floor: float = param(
+        1e-20, 'Sets the spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300
+    )
+
+    def __post_init__(self) -> None:
+        if not self.shortest_m < self.longest_m:
+            raise InvalidParameter(
+                f'waves from {self.shortest_m} m to {self.longest_m} m came; the longest must be longer'
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the band, from 1."""
+        return tuple(str(band + 1) for band in range(self.bands))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean density + floor) of each band."""
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
+        speed = windows.moving_m_s[..., None, None, None]
+        # Line n, from 0, stands for the stretch from n to n + 1; edges are in lines, too.
+        edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
+        low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
+        high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
+        line = _numbers(len(hertz) + 1)
+        inside = np.minimum(np.maximum(line, low), high)
+        share = inside[..., 1:] - inside[..., :-1]
+        mean = np.add.reduce(share * densities[..., None, :], axis=-1) / (high - low)[..., 0]
+        # Density per wave per metre: the same power on a stretch that is speed times narrower.
+        return force_normalised(np.log(mean * speed[..., 0] + self.floor), windows, self.force_exponent)
+
+
+@lru_cache(maxsize=64)
+def _numbers(count: int) -> Array:
+    numbers = np.arange(count, dtype=np.float64)
+    numbers.flags.writeable = False
+    return numbers
+
+
+@lru_cache(maxsize=64)
+def _edges_1_m(feature: SpatialBandPower) -> Array:
+    """Return the edges of the bands in waves per metre, (bands + 1, 1)."""
+    edges: Array = np.asarray(
+        np.geomspace(1.0 / feature.longest_m, 1.0 / feature.shortest_m, feature.bands + 1), dtype=np.float64
+    )[:, None]
+    edges.flags.writeable = False
+    return edges
+
+
+# --------------------
+# Power in bands of spatial frequency, channel by channel.
+
+
+@dataclass(frozen=True)
+class SpatialBands:
+    """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
+
+    Bands are equally wide in octaves, over the whole window: a grating of pitch λ stands in the band of 1/λ whatever
+    the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
+    measures what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is
+    unknown or 0.
+
+    Examples
+    --------
+    >>> def slide(speed_m_s: float) -> WindowBatch:  # over a grating with a pitch of 2 mm
+    ...     wave = np.sin(2 * np.pi * speed_m_s / 2e-3 * np.arange(1000) / 1000.0)
+    ...     return WindowBatch(wave[:, None], 1000.0, np.array(speed_m_s))
+    >>> feature = SpatialBands(bands=8)
+    >>> strongest = [int(feature(slide(speed_m_s)).argmax()) for speed_m_s in (0.05, 0.1)]
+    >>> [bool(feature.edges_per_m[band] < 500.0 < feature.edges_per_m[band + 1]) for band in strongest]
+    [True, True]
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    bands: int = param(32, 'Sets the number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
+    longest_m: float = param(
+        33e-3, 'Sets the longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1e3
+    )
+    shortest_m: float = param(
+        0.67e-3, 'Sets the shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-7, high=1e3
+    )
+    normalised: bool = param(True, 'Subtracts the mean over the bands, which depends mainly on force and speed.')
+    floor: float = param(
+        1e-7, 'Sets the spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300
+    )
+
+    def __post_init__(self) -> None:
+        if not self.shortest_m < self.longest_m:
+            raise InvalidParameter(
+                f'spatial bands have waves from {self.shortest_m} m to {self.longest_m} m; the longest must be longer'
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the band, from 1."""
+        return tuple(str(band + 1) for band in range(self.bands))
+
+    @property
+    def edges_per_m(self) -> Array:
+        """The edges of the bands, waves per metre, (bands + 1,)."""
+        edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
+        return np.asarray(edges, dtype=np.float64)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean density + floor) of each band."""
+        bands = spatial_log_bands(windows, self.edges_per_m, self.floor)
+        return mean_subtracted(bands) if self.normalised else bands
+
+
+# --------------------
+# Power in bands of spatial frequency: the mean over the channels.
+
+
+@dataclass(frozen=True)
+class MeanSpatialBands(SpatialBands):
+    """Mean over the channels of `spatial_bands`, independent of the taxel. NaN if the speed is unknown.
+
+    Examples
+    --------
+    >>> samples = np.random.default_rng(0).standard_normal((500, 4))
+    >>> both = [WindowBatch(each, 1000.0, np.array(0.05)) for each in (samples, samples[:, ::-1])]
+    >>> np.allclose(MeanSpatialBands()(both[0]), MeanSpatialBands()(both[1]))  # which taxel measured what is lost
+    True
+    """
+
+    per_channel: ClassVar[bool] = False
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the mean over the channels of the log bands."""
+        bands = SpatialBands.__call__(self, windows)
+        mean: Array = np.add.reduce(bands, axis=-2, keepdims=True) / bands.shape[-2]
+        return mean
+
+
+# --------------------
+# How much the surface, as measured, changes within a short way.
+
+
+@dataclass(frozen=True)
+class SpatialVariation:
+    """Logarithm of the mean square difference between places `lag_m` apart along the way of the finger.
+
+    In nerves the rougher surface makes neighbouring fibres differ more; here one channel meets the places one after
+    the other, lag_m / speed apart in time. The mean square is 2·∫ S(f)·(1 - cos(2πf·lag_m/speed)) df, so that no lag
+    has to be a whole number of samples. NaN if the speed is unknown or not above 0.
+
+    Source: Lieber & Bensmaia 2019; Connor & Johnson 1992.
+
+    Examples
+    --------
+    >>> wave = np.sin(2 * np.pi * 100.0 * np.arange(1280) / 1280.0)[:, None]  # at 0.1 m/s: waves of 1 mm
+    >>> window = WindowBatch(wave, 1280.0, np.array(0.1))
+    >>> half, whole = (SpatialVariation(lag_m=lag_m, rate_of_change=False)(window).item() for lag_m in (5e-4, 1e-3))
+    >>> np.exp(half).round(1).item(), whole < half - 3  # (2 · amplitude)² / 2; places a wave apart are alike
+    (2.0, True)
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    lag_m: float = param(
+        5e-4,
+        'Sets the distance on the surface between the two compared points; longer lags compare coarser texture.',
+        unit='m',
+        low=1e-6,
+        high=1.0,
+    )
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    rate_of_change: bool = param(
+        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
+    )
+    force_exponent: float = param(
+        0.0,
+        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
+        low=0.0,
+        high=4.0,
+    )
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the log mean square difference."""
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
+        phase = 2.0 * np.pi * hertz * (self.lag_m / windows.moving_m_s[..., None, None])
+        power = 2.0 * np.add.reduce(densities * (1.0 - np.cos(phase)), axis=-1, keepdims=True) * hertz[0]
+        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)

@@ -1,0 +1,404 @@
+"""Features of the signal over time: moments, Hjorth parameters, differences, ordinal patterns; speed and force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.types import Array
+from texture_features.feature import WindowBatch, centred, first_difference, mean_weights, power
+
+# --------------------
+# The signal with its first and second difference, in one array.
+
+
+def signal_differences(windows: WindowBatch) -> Array:
+    """Return the zero-mean signal, its steps from sample to sample, and their steps, ended by zeros: (..., 3, n).
+
+    Returns
+    -------
+    (..., n_channels, 3, n_samples)
+        In the unit of the signal; differences are per sample step.
+    """
+    return windows.shared('differences', lambda: _differences(windows.centred_rows))
+
+
+def squares(windows: WindowBatch) -> Array:
+    """Return the squares of `signal_differences`.
+
+    Returns
+    -------
+    (..., n_channels, 3, n_samples)
+        In the square of the unit of the signal.
+    """
+    return windows.shared('squares', lambda: np.square(signal_differences(windows)))
+
+
+def _differences(rows: Array) -> Array:
+    orders = np.zeros((*rows.shape[:-1], 3, rows.shape[-1]))
+    signal, slope, second_difference = orders[..., 0, :], orders[..., 1, :], orders[..., 2, :]
+    signal[...] = rows
+    np.subtract(rows[..., 1:], rows[..., :-1], out=slope[..., :-1])
+    np.subtract(slope[..., 1:-1], slope[..., :-2], out=second_difference[..., :-2])
+    return orders
+
+
+# --------------------
+# Force of the finger.
+
+
+@dataclass(frozen=True)
+class Force:
+    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say.
+
+    Examples
+    --------
+    >>> Force()(WindowBatch(np.zeros((5, 1)), rate_hz=100.0, force_n=np.array(1.5))).item()
+    1.5
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the force."""
+        return np.asarray(windows.force_n, dtype=np.float64)[..., None, None]
+
+
+# --------------------
+# Friction of the surface under the finger.
+
+LEAST_N = 0.1  # normal force by which is divided at least
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Mean tangential over mean normal force in the window; NaN if the arm does not measure the tangential force.
+
+    The ratio of the means: noise of the force sensor averages out before the division.
+
+    Examples
+    --------
+    >>> samples = np.zeros((5, 1))
+    >>> pressed, dragged = np.array(2.0), np.array(0.5)
+    >>> Friction()(WindowBatch(samples, rate_hz=100.0, force_n=pressed, tangential_force_n=dragged)).item()
+    0.25
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the ratio."""
+        ratio: Array = np.asarray(windows.tangential_force_n) / np.maximum(windows.force_n, LEAST_N)
+        return ratio[..., None, None]
+
+
+# --------------------
+# Hjorth's parameters: activity, mobility and complexity.
+
+# Far below any deviation, far above the smallest number: 0 / 0 becomes 0.
+HJORTH_TINY = 1e-150
+
+
+@dataclass(frozen=True)
+class Hjorth:
+    """Activity (power), mobility (mean frequency) and complexity (bandwidth) of each channel.
+
+    Examples
+    --------
+    >>> time_s = np.arange(1000) / 1000.0
+    >>> tone = WindowBatch(np.sin(2 * np.pi * 40.0 * time_s)[:, None], rate_hz=1000.0)
+    >>> Hjorth(log_activity=False)(tone)[0, :2].round(2).tolist()  # ½, and 2 sin(π · 40 / 1000)
+    [0.5, 0.25]
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Activity, mobility, complexity."""
+        return ('log_activity' if self.log_activity else 'activity', 'mobility', 'complexity')
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return activity, mobility and complexity."""
+        values = hjorth(windows.centred_rows)
+        if self.log_activity:
+            values[..., 0] = np.log(values[..., 0] + self.floor)
+        return values
+
+
+def hjorth(rows: Array) -> Array:
+    """Return activity, mobility per sample step, and complexity; the latter two are 0 for a constant row.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+        Zero mean.
+
+    Returns
+    -------
+    (..., 3)
+
+    Source: Hjorth 1970; Kaboli et al. 2015, eq. 1 to 3.
+    """
+    slope = first_difference(rows)
+    second_difference = first_difference(slope)
+    powers = np.empty((3, *rows.shape[:-1]))
+    powers[0] = power(rows)
+    powers[1] = power(slope)
+    powers[2] = power(second_difference)
+    # The mean of the steps is known from the first and the last sample.
+    drift = (rows[..., -1] - rows[..., 0]) / slope.shape[-1]
+    powers[1] -= drift * drift
+    drift = (slope[..., -1] - slope[..., 0]) / second_difference.shape[-1]
+    powers[2] -= drift * drift
+    roots = np.sqrt(np.maximum(powers, 0.0, out=powers))
+    mobility = roots[1:] / (roots[:2] + HJORTH_TINY)
+    powers[1] = mobility[0]
+    powers[2] = mobility[1] / (mobility[0] + HJORTH_TINY)
+    return powers.transpose((*range(1, powers.ndim), 0))
+
+
+# --------------------
+# Logarithm of the variance of the steps.
+
+
+@dataclass(frozen=True)
+class LogDifferenceVariance:
+    """Logarithm of the variance of the steps from sample to sample of each channel.
+
+    Examples
+    --------
+    >>> zigzag = np.array([[0.0], [2.0], [0.0], [2.0], [0.0]])  # steps of 2 and -2: variance 4
+    >>> np.exp(LogDifferenceVariance()(WindowBatch(zigzag, rate_hz=100.0))).round(6).item()
+    4.0
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    floor: float = param(
+        1e-20,
+        'Sets the power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(variance of the steps + floor)."""
+        return np.log(power(centred(first_difference(windows.rows))) + self.floor)[..., None]
+
+
+# --------------------
+# Logarithm of the variance.
+
+
+@dataclass(frozen=True)
+class LogVariance:
+    """Logarithm of the variance of each channel.
+
+    Examples
+    --------
+    >>> np.exp(LogVariance()(WindowBatch(np.array([[1.0], [5.0]]), rate_hz=100.0))).round(6).item()
+    4.0
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    floor: float = param(
+        1e-20,
+        'Sets the power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(variance + floor)."""
+        return np.log(power(windows.centred_rows) + self.floor)[..., None]
+
+
+# --------------------
+# Mean of the signal.
+
+
+@dataclass(frozen=True)
+class ChannelMean:
+    """Mean of each channel. It may depend on how a surface was mounted.
+
+    Examples
+    --------
+    >>> ChannelMean()(WindowBatch(np.array([[1.0, 10.0], [3.0, 30.0]]), rate_hz=100.0))[:, 0].tolist()
+    [2.0, 20.0]
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the mean."""
+        rows = windows.rows
+        levels: Array = np.add.reduce(rows, axis=-1) / rows.shape[-1]
+        return levels[..., None]
+
+
+# --------------------
+# Log power, skewness and log kurtosis of the signal and of its first and second difference.
+
+VALUES = ('log_power', 'log_amplitude', 'skewness', 'log_kurtosis')
+# Far below any power, far above the smallest number: nothing over nothing becomes 0 or 1.
+MOMENTS_TINY = 1e-150
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Log mean square, log mean amplitude, skewness and log kurtosis of the signal, its steps and their steps.
+
+    A spectrum holds the mean squares and nothing of the rest: whether a surface pushes more than it pulls, and whether
+    it hits rarely and hard or often and softly.
+
+    Examples
+    --------
+    >>> spikes = np.zeros((100, 1))
+    >>> spikes[::10] = 1.0  # rare and upwards
+    >>> values = dict(zip(Moments().names, Moments()(WindowBatch(spikes, rate_hz=100.0))[0].round(2).tolist()))
+    >>> values['signal_skewness']  # (1 - 2p) / √(p (1 - p)) with p = 0.1
+    2.67
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    floor: float = param(
+        1e-10, 'Amplitude added before a logarithm; it is squared where a power is meant.', low=1e-140, high=1e100
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Value of the signal, of its slope and of its bend."""
+        return tuple(f'{order}_{value}' for value in VALUES for order in ('signal', 'difference', 'second_difference'))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the values; skewness and log kurtosis of a constant signal are 0."""
+        signals, powers = signal_differences(windows), squares(windows)
+        mean = mean_weights(signals.shape[-1])
+        square = powers @ mean
+        values = (
+            np.log(square + self.floor * self.floor),
+            np.log(np.abs(signals) @ mean + self.floor),
+            ((powers * signals) @ mean) / (square * np.sqrt(square) + MOMENTS_TINY),
+            np.log(((powers * powers) @ mean + MOMENTS_TINY) / (square * square + MOMENTS_TINY)),
+        )
+        return np.concatenate(values, axis=-1)
+
+
+# --------------------
+# Whether a window is the first of a slide.
+
+SLIDE_ONSET = 'slide_onset'
+
+
+@dataclass(frozen=True)
+class SlideOnset:
+    """1 for a window that begins with the slide, 0 for later ones and where the time since the start is unknown.
+
+    While friction, contact and sensor settle, all textures look different from what they look like later.
+
+    Examples
+    --------
+    >>> windows = WindowBatch(np.zeros((2, 5, 1)), rate_hz=100.0, elapsed_s=np.array([0.0, 0.1]))
+    >>> SlideOnset()(windows).ravel().tolist()
+    [1.0, 0.0]
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    within_s: float = param(
+        0.03,
+        'Sets how long after the start of a slide a window may begin and be one of the onset.',
+        unit='s',
+        low=0.0,
+        high=60.0,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return 1 or 0, (..., 1, 1)."""
+        elapsed_s = np.broadcast_to(windows.elapsed_s, windows.samples.shape[:-2])
+        return (elapsed_s <= self.within_s).astype(np.float64)[..., None, None]
+
+
+# --------------------
+# Speed of the finger.
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say.
+
+    Examples
+    --------
+    >>> Speed()(WindowBatch(np.zeros((5, 1)), rate_hz=100.0, speed_m_s=np.array(0.05))).item()
+    0.05
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the speed."""
+        return np.asarray(windows.speed_m_s, dtype=np.float64)[..., None, None]
+
+
+# --------------------
+# How much the signal changes within a short time.
+
+
+@dataclass(frozen=True)
+class TemporalVariation:
+    """Logarithm of the mean absolute difference of the signal with itself `lag_s` later.
+
+    In nerves the rougher surface makes the response of each fibre vary more in time; here the channel takes the place
+    of a fibre.
+
+    Source: Lieber & Bensmaia 2019; Lieber, Xia, Weber & Bensmaia 2017.
+
+    Examples
+    --------
+    >>> ramp = WindowBatch(0.5 * np.arange(100.0)[:, None], rate_hz=1000.0)  # 0.5 a sample; 2 ms are two samples
+    >>> round(TemporalVariation()(ramp).item(), 6)
+    0.0
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    lag_s: float = param(
+        0.002,
+        'Sets the time lag between the compared samples, at least one sample; a longer one compares lower frequencies.',
+        unit='s',
+        low=0.0,
+        high=10.0,
+    )
+    floor: float = param(
+        1e-20,
+        'Difference added before the logarithm, so that silence gives a finite value, unit.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean |s(t + lag) - s(t)|)."""
+        rows = windows.rows
+        lag = min(max(1, round(self.lag_s * windows.rate_hz)), rows.shape[-1] - 1)
+        steps = np.abs(rows[..., lag:] - rows[..., : rows.shape[-1] - lag])
+        mean: Array = np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
+        return np.log(mean + self.floor)

@@ -1,1 +1,0 @@
-"""Segmentation: start and end of sliding, found from the signals alone."""

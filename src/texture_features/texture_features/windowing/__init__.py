@@ -1,1 +1,0 @@
-"""Windows: which part of a stream is classified at once."""

@@ -1,0 +1,1037 @@
+"""Cut a signal into windows while the finger slides: buffers, axes, coverage, time stretch."""
+
+from __future__ import annotations
+
+import cmath
+import dataclasses
+import enum
+import heapq
+import math
+from bisect import bisect_right
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from operator import itemgetter
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import param
+from texture_core.errors import InvalidParameter
+from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, Samples, TactileSignal, Window
+from texture_features.feature import Feature, WindowBatch
+
+# --------------------
+# Windows of slides along x and along y of one exploration, joined into one.
+
+SEPARATOR = '@'  # 'signal@x': what is measured on 'signal' while the finger slides along x
+AXES_RAD = {'x': 0.0, 'y': 0.5 * math.pi}
+WITHIN_RAD = math.radians(30.0)  # a direction further from both axes is along neither
+MOST_WAITING = 100  # windows along one axis that wait for their partners: a long slide must not fill the memory
+
+
+def split_axis(name: str) -> tuple[str, str]:
+    """Return the topic of an input, and the axis along which the finger slides there; '' for any direction.
+
+    Raises
+    ------
+    InvalidParameter
+        If the axis is not x or y.
+
+    Examples
+    --------
+    >>> split_axis('signal@x'), split_axis('signal')
+    (('signal', 'x'), ('signal', ''))
+    """
+    topic, separator, axis = name.partition(SEPARATOR)
+    if separator and (axis not in AXES_RAD or not topic):
+        raise InvalidParameter(
+            f"input '{name}': a topic with an axis is needed, such as 'signal{SEPARATOR}x'; the axes are "
+            f'{" and ".join(AXES_RAD)}'
+        )
+    return topic, axis
+
+
+def axis_along(direction_rad: float) -> str:
+    """Return the axis to or against which a direction points within 30 degrees; '' if there is none.
+
+    Examples
+    --------
+    >>> axis_along(0.0), axis_along(-math.pi / 2), axis_along(math.pi / 4), axis_along(math.nan)
+    ('x', 'y', '', '')
+    """
+    for axis, angle in AXES_RAD.items():
+        # Written so that NaN is along none.
+        if math.isfinite(direction_rad) and abs(math.remainder(direction_rad - angle, math.pi)) <= WITHIN_RAD:
+            return axis
+    return ''
+
+
+class DirectedWindow(Protocol):
+    """What is joined: a dataclass with the windows of all topics, and how the finger went meanwhile.
+
+    Examples
+    --------
+    >>> from texture_features.windows import CutWindow
+    >>> {'windows', 'speed_m_s', 'force_n', 'direction_rad'} <= set(CutWindow.__dataclass_fields__)
+    True
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def windows(self) -> Mapping[str, Window]:
+        """Windows by topic."""
+
+    @property
+    def speed_m_s(self) -> float:
+        """Mean speed."""
+
+    @property
+    def force_n(self) -> float:
+        """Mean normal force."""
+
+    @property
+    def tangential_force_n(self) -> float:
+        """Mean force of the surface against the direction of travel."""
+
+    @property
+    def direction_rad(self) -> float:
+        """Mean direction of travel."""
+
+
+T = TypeVar('T', bound=DirectedWindow)
+
+
+def check_axes(names: Iterable[str]) -> None:
+    """Refuse names of inputs that cannot be joined.
+
+    Raises
+    ------
+    InvalidParameter
+        If an axis is not x or y, or some inputs name an axis and others do not.
+    """
+    names = tuple(names)
+    axes = [split_axis(name)[1] for name in names]
+    if any(axes) and not all(axes):
+        raise InvalidParameter(
+            f'the inputs {", ".join(names)} are some of slides along an axis and some of any direction; '
+            f"name the axis of each, as in 'signal{SEPARATOR}x'"
+        )
+
+
+class AxisJoiner(Generic[T]):
+    """Join the n-th window along x with the n-th along y of the same exploration, whichever comes first.
+
+    Parameters
+    ----------
+    names
+        Names of inputs, such as 'signal@x' and 'signal@y'.
+
+    Raises
+    ------
+    InvalidParameter
+        If some inputs name an axis and others do not.
+
+    Examples
+    --------
+    >>> @dataclasses.dataclass
+    ... class Slide:
+    ...     direction_rad: float
+    ...     speed_m_s: float
+    ...     force_n: float = 1.0
+    ...     tangential_force_n: float = 0.5
+    ...     windows: dict = dataclasses.field(default_factory=lambda: {'signal': 'samples'})
+    >>> joiner = AxisJoiner(['signal@x', 'signal@y'])
+    >>> joiner.add(Slide(0.0, 0.02))  # waits for its partner
+    >>> joined = joiner.add(Slide(math.pi / 2, 0.04))
+    >>> tuple(joined.windows), round(joined.speed_m_s, 3), joiner.end()
+    (('signal@x', 'signal@y'), 0.03, 0)
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        names = tuple(names)
+        check_axes(names)
+        self._sources = {name: split_axis(name) for name in names}
+        self._waiting: dict[str, deque[T]] = {axis: deque() for _, axis in self._sources.values() if axis}
+
+    @property
+    def joins(self) -> bool:
+        """Whether the inputs name axes; else every window is whole as it is."""
+        return bool(self._waiting)
+
+    def add(self, window: T) -> T | None:
+        """Return the window that is complete with this one; None if its partner is still to come, or it is none.
+
+        Parameters
+        ----------
+        window
+            Its windows are by topic.
+
+        Returns
+        -------
+        window or None
+            With windows by the names of the inputs, speed and force their means, and no direction.
+        """
+        waiting = self._waiting.get(axis_along(window.direction_rad))
+        if waiting is None or len(waiting) >= MOST_WAITING:
+            return None
+        waiting.append(window)
+        if not all(self._waiting.values()):
+            return None
+        parts = {axis: windows.popleft() for axis, windows in self._waiting.items()}
+        several = tuple(parts.values())
+        return dataclasses.replace(
+            window,
+            windows={name: parts[axis].windows[topic] for name, (topic, axis) in self._sources.items()},
+            speed_m_s=sum(part.speed_m_s for part in several) / len(several),
+            force_n=sum(part.force_n for part in several) / len(several),
+            tangential_force_n=sum(part.tangential_force_n for part in several) / len(several),
+            direction_rad=math.nan if len(several) > 1 else window.direction_rad,
+        )
+
+    def end(self) -> int:
+        """Forget what has no partner, as the exploration is over; return how many windows that were."""
+        left = sum(map(len, self._waiting.values()))
+        for windows in self._waiting.values():
+            windows.clear()
+        return left
+
+
+# --------------------
+# The recent samples of one stream, found again by their running index.
+
+# A sample belongs to a window from a thousandth of a sample before its start on: stamps are rounded to nanoseconds.
+INDEX_TOLERANCE = 1e-3
+
+
+class SampleBuffer:
+    """Samples of one numbering, rate and set of channels; lost ones are NaN, old ones are forgotten.
+
+    Parameters
+    ----------
+    signal
+        The first batch.
+    keep_s
+        A sample is kept until a batch arrives that begins so much later.
+
+    Examples
+    --------
+    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
+    >>> buffer = SampleBuffer(batch, keep_s=1.0)
+    >>> later = TactileSignal(3_000_000, 'finger', ('pac',), (), 1000.0, 3, np.array([[4.0]], dtype=np.float32))
+    >>> buffer.append(later), buffer.take(0, 4)[:, 0].tolist()  # the third sample is missing
+    (1, [1.0, 2.0, nan, 4.0])
+    """
+
+    def __init__(self, signal: TactileSignal, keep_s: float) -> None:
+        self.rate_hz = signal.sampling_rate_hz
+        self.channels = signal.channels
+        self.sensor = signal.sensor
+        self.first_sample = signal.first_sample
+        self.next_sample = signal.first_sample
+        self._keep = math.ceil(keep_s * self.rate_hz)
+        self._rows: NDArray[np.float32] = np.empty((2 * len(signal.samples), len(self.channels)), dtype=np.float32)
+        self._origin = signal.first_sample  # index of row 0
+        self._marks: deque[tuple[int, int, int]] = deque()  # index, start and end time of each batch that is kept
+        self.append(signal)
+
+    @property
+    def end_ns(self) -> int:
+        """When the newest batch ended."""
+        return self._marks[-1][2]
+
+    def continued_by(self, signal: TactileSignal) -> bool:
+        """Whether the batch carries on this numbering, with or without a loss before it."""
+        return (
+            signal.first_sample >= self.next_sample
+            and signal.sampling_rate_hz == self.rate_hz
+            and signal.channels == self.channels
+        )
+
+    def append(self, signal: TactileSignal) -> int:
+        """Append a batch; return how many samples were lost before it."""
+        lost = signal.first_sample - self.next_sample
+        self._forget(signal.first_sample - self._keep)
+        self._make_room(signal.next_sample)
+        row = signal.first_sample - self._origin
+        self._rows[self.next_sample - self._origin : row] = np.nan
+        self._rows[row : row + len(signal.samples)] = signal.samples
+        self.next_sample = signal.next_sample
+        self._marks.append((signal.first_sample, signal.stamp_ns, signal.end_ns))
+        return lost
+
+    def anchor(self, time_ns: int) -> tuple[int, int] | None:
+        """Return index and stamp of the first batch that ends after `time_ns`, if there is one."""
+        if self._marks[-1][2] <= time_ns:
+            return None
+        return next((index, stamp) for index, stamp, end in self._marks if end > time_ns)
+
+    def index_at(self, time_ns: int, anchor: tuple[int, int]) -> int:
+        """Return the index of the first sample at or after a time, reckoned from the anchor."""
+        index, stamp = anchor
+        return index + math.ceil((time_ns - stamp) * self.rate_hz / NANOSECONDS - INDEX_TOLERANCE)
+
+    def time_of(self, index: float) -> int:
+        """Return when a sample, or a place between two, was taken, ns: reckoned from its batch, or the nearest kept."""
+        batch = max(0, bisect_right(self._marks, index, key=lambda mark: mark[0]) - 1)
+        first, stamp, _ = self._marks[batch]
+        return stamp + round((index - first) / self.rate_hz * NANOSECONDS)
+
+    def take(self, first_sample: int, count: int) -> Samples:
+        """Return a copy of samples that are kept, (count, n_channels) float64.
+
+        Parameters
+        ----------
+        first_sample
+            Running index of the first one.
+        count
+            How many.
+
+        Returns
+        -------
+        (count, n_channels)
+            Lost samples are NaN.
+        """
+        row = first_sample - self._origin
+        return self._rows[row : row + count].astype(np.float64)
+
+    def _forget(self, before: int) -> None:
+        """Forget samples with an index below `before`; those already lost by then are not stored at all."""
+        if before <= self.first_sample:
+            return
+        self.first_sample = before
+        self.next_sample = max(self.next_sample, before)
+        while self._marks and self._marks[0][0] < before:
+            self._marks.popleft()
+
+    def _make_room(self, until: int) -> None:
+        if until - self._origin <= len(self._rows):
+            return
+        kept = self._rows[self.first_sample - self._origin : self.next_sample - self._origin]
+        needed = 2 * (until - self.first_sample)
+        rows = self._rows if needed <= len(self._rows) else np.empty((needed, len(self.channels)), dtype=np.float32)
+        rows[: len(kept)] = kept  # numpy copies overlapping memory correctly
+        self._rows, self._origin = rows, self.first_sample
+
+
+class BufferedStream:
+    """The runs of one topic: a new one begins when the numbering restarts or the rate or channels change.
+
+    One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are.
+
+    Examples
+    --------
+    >>> stream = BufferedStream(keep_s=1.0)
+    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, np.zeros((10, 1), dtype=np.float32))
+    >>> stream.add(batch), stream.add(batch), stream.restarts  # index 0 again: the sensor was started again
+    (True, True, 1)
+    """
+
+    MAX_BUFFERS = 4
+
+    def __init__(self, keep_s: float) -> None:
+        self.buffers: deque[SampleBuffer] = deque(maxlen=self.MAX_BUFFERS)
+        self.lost_samples = 0
+        self.restarts = 0
+        self._keep_s = keep_s
+
+    def add(self, signal: TactileSignal) -> bool:
+        """Add a batch; return whether it began a new run."""
+        while len(self.buffers) > 1 and signal.stamp_ns - self.buffers[0].end_ns > self._keep_s * NANOSECONDS:
+            self.buffers.popleft()
+        if self.buffers and self.buffers[-1].continued_by(signal):
+            self.lost_samples += self.buffers[-1].append(signal)
+            return False
+        self.restarts += bool(self.buffers)
+        self.buffers.append(SampleBuffer(signal, self._keep_s))
+        return True
+
+
+# --------------------
+# One slide: which time is covered, and how fast and hard the finger moved.
+
+# Two slide states at most so far apart cover the time between them.
+LINK_NS = NANOSECONDS // 2
+# No guarantee holds for longer: a wrong one must not make millions of windows.
+MAX_STEADY_S = 3600.0
+MAX_STATES = 20_000
+# Of the mean of the guaranteed states. A state without guarantee beyond them shows a slide that is none: in the air,
+# pressed too hard, or far too fast.
+LEAST_FORCE, MOST_FORCE, MOST_SPEED = 0.5, 1.5, 2.0
+
+
+@dataclass(frozen=True)
+class CoveredSpan:
+    """A covered stretch of time with the mean speed and forces in it.
+
+    Examples
+    --------
+    >>> span = CoveredSpan(0, NANOSECONDS // 2, speed_m_s=0.05, force_n=1.0, direction_rad=0.0)
+    >>> round(span.speed_m_s * (span.end_ns - span.start_ns) / NANOSECONDS, 6)  # m travelled in it
+    0.025
+    """
+
+    start_ns: int
+    end_ns: int
+    speed_m_s: float
+    force_n: float
+    direction_rad: float
+    tangential_force_n: float = math.nan
+
+
+class SlideCoverage:
+    """The covered time of consecutive `slide` states, handed out window by window.
+
+    After a state without guarantee, though others had one, the time up to the next state is not covered: the finger has
+    lost the surface, turns, or does not slide as asked. If its force or speed is far from that of the slide so far,
+    what is left of the guarantee is not covered either; windows that were already handed out are not taken back.
+
+    All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
+    window are those of the shortest beginning of the states that covers it.
+
+    Parameters
+    ----------
+    state
+        The first slide state.
+    length_ns, hop_ns, skip_ns
+        Of the windows; `skip_ns` is left out at the start.
+
+    Examples
+    --------
+    >>> from texture_core.types import Phase
+    >>> state = ExplorationState(0, 'a', 'linear_slide', Phase.SLIDE, steady_s=1.0, speed_m_s=0.05)
+    >>> coverage = SlideCoverage(state, length_ns=NANOSECONDS // 2, hop_ns=NANOSECONDS // 2, skip_ns=0)
+    >>> starts = []
+    >>> while span := coverage.window():
+    ...     starts.append(span.start_ns / NANOSECONDS)
+    ...     _ = coverage.advance()
+    >>> starts  # of 1 s, two windows of 0.5 s
+    [0.0, 0.5]
+    """
+
+    def __init__(self, state: ExplorationState, length_ns: int, hop_ns: int, skip_ns: int) -> None:
+        self.exploration_id = state.exploration_id
+        self.surface = state.surface
+        self.motion = state.motion
+        self.start_ns = state.stamp_ns
+        self.ended = False
+        self.skipped = 0
+        self._length_ns = length_ns
+        self._hop_ns = hop_ns
+        self._next_ns = state.stamp_ns + skip_ns
+        self._intervals: deque[list[int]] = deque()
+        # each with the end of the covered time known with it
+        self._states: deque[tuple[int, ExplorationState]] = deque(maxlen=MAX_STATES)
+        self._promising = False
+        self._withdrawn = False
+        self._force = _WeightedMean()
+        self._speed = _WeightedMean()
+        self.add(state)
+
+    def add(self, state: ExplorationState) -> bool:
+        """Take the next slide state; return False, and ignore it, if it is older than the last one."""
+        stamp = state.stamp_ns
+        start = stamp
+        if self._states:
+            before = self._states[-1][1].stamp_ns
+            if stamp < before:
+                return False
+            start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
+        self._promising |= state.steady_s > 0
+        self._cover(start, stamp + _steady_ns(state.steady_s))
+        self._withdrawn = self._promising and not state.steady_s > 0
+        if self._withdrawn and self._is_far(state):
+            self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
+        self._force.add(state.force_n, float(state.steady_s > 0))
+        self._speed.add(state.speed_m_s, float(state.steady_s > 0))
+        self._states.append((self._intervals[-1][1], state))
+        return True
+
+    @property
+    def covered_ns(self) -> int:
+        """End of the covered time."""
+        return self._intervals[-1][1]
+
+    def window(self) -> CoveredSpan | None:
+        """Return the present window if it is covered, else None; windows that never can be are passed over."""
+        while True:
+            start, end = self._intervals[0]
+            if self._next_ns < start:
+                self._next_ns += -(-(start - self._next_ns) // self._hop_ns) * self._hop_ns
+            if self._next_ns + self._length_ns <= end:
+                return self._span(self._next_ns, self._next_ns + self._length_ns)
+            if len(self._intervals) == 1:
+                return None
+            self._intervals.popleft()
+
+    def advance(self, count: int = 1) -> int:
+        """Go on by so many windows, but not beyond the covered stretch of the present one; return by how many."""
+        left = (self._intervals[0][1] - self._length_ns - self._next_ns) // self._hop_ns + 1
+        count = min(count, left)
+        self._next_ns += count * self._hop_ns
+        return count
+
+    def _is_far(self, state: ExplorationState) -> bool:
+        force_n, speed_m_s = self._force.value, self._speed.value
+        return (
+            state.force_n < LEAST_FORCE * force_n
+            or state.force_n > MOST_FORCE * force_n
+            or state.speed_m_s > MOST_SPEED * speed_m_s
+        )
+
+    def _cover(self, start: int, end: int) -> None:
+        if self._intervals and start <= self._intervals[-1][1]:
+            self._intervals[-1][1] = max(self._intervals[-1][1], end)
+        else:
+            self._intervals.append([start, end])
+
+    def _span(self, start: int, end: int) -> CoveredSpan:
+        states = self._states
+        while len(states) > 1 and states[1][1].stamp_ns <= start and states[0][0] < end:
+            states.popleft()
+        speeds = _WeightedMean()
+        forces = _WeightedMean()
+        tangential = _WeightedMean()
+        directions = _MeanDirection()
+        for number, (covered, state) in enumerate(states):
+            enough = covered >= end
+            until = end if enough else min(states[number + 1][1].stamp_ns, end)
+            weight = until - max(state.stamp_ns, start)
+            speeds.add(state.speed_m_s, weight)
+            forces.add(state.force_n, weight)
+            tangential.add(state.tangential_force_n, weight)
+            directions.add(state.direction_rad, weight)
+            if enough or until >= end:
+                break
+        return CoveredSpan(start, end, speeds.value, forces.value, directions.value, tangential.value)
+
+
+class _WeightedMean:
+    """Weighted mean of what is known."""
+
+    def __init__(self) -> None:
+        self._sum = 0.0
+        self._weight = 0.0
+
+    def add(self, value: float, weight: float) -> None:
+        if weight > 0 and math.isfinite(value):
+            self._sum += weight * value
+            self._weight += weight
+
+    @property
+    def value(self) -> float:
+        return self._sum / self._weight if self._weight else math.nan
+
+
+class _MeanDirection:
+    """Weighted mean of the directions that are known, as that of their unit vectors."""
+
+    def __init__(self) -> None:
+        self._sum = 0j
+
+    def add(self, direction_rad: float, weight: float) -> None:
+        if weight > 0 and math.isfinite(direction_rad):
+            self._sum += cmath.rect(weight, direction_rad)
+
+    @property
+    def value(self) -> float:
+        return cmath.phase(self._sum) if self._sum else math.nan
+
+
+def _steady_ns(steady_s: float) -> int:
+    return round(min(steady_s, MAX_STEADY_S) * NANOSECONDS) if steady_s > 0 else 0
+
+
+# --------------------
+# Time stretch: what a signal would have been at another speed.
+
+# A finger that hardly moves tells nothing of another speed, and must not ask for endless samples.
+LARGEST_FACTOR = 10.0
+
+
+@dataclass(frozen=True)
+class Stretched:
+    """A feature of windows that are first brought to one speed; itself a feature.
+
+    A window of n samples at speed v becomes one of n · v / `to_m_s` samples at the same rate: the surface passes as it
+    would at that speed. What then lies above half the rate is left out, not folded back. The feature gets the
+    speed after stretching. A window whose speed is unknown or not above 0 stays as it is; no window becomes more than
+    ten times as long or as short.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.D.4.
+
+    Examples
+    --------
+    >>> from texture_features.features.temporal import Speed
+    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(2048) / 1000.0)[:, None]  # at 0.1 m/s
+    >>> window = WindowBatch(tone, 1000.0, np.array(0.1))
+    >>> Stretched(Speed(), to_m_s=0.05)(window).item()  # after stretching
+    0.05
+    """
+
+    feature: Feature
+    to_m_s: float
+
+    @property
+    def per_channel(self) -> bool:
+        """As the feature says."""
+        return self.feature.per_channel
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those of the feature."""
+        return self.feature.names
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the values of the feature."""
+        parts = list(self._parts(windows))
+        extracted = [self.feature(part) for _, part in parts]
+        values = np.empty((*windows.samples.shape[:-2], *extracted[0].shape[-2:]))
+        for (chosen, _), block in zip(parts, extracted, strict=True):
+            values[chosen] = block
+        return values
+
+    def _parts(self, windows: WindowBatch) -> Iterator[tuple[AnyArray, WindowBatch]]:
+        """Yield the windows in groups of one stretched length, each with where it comes from."""
+        known: dict[int, tuple[AnyArray, WindowBatch]] = windows.shared(
+            ('stretched', self.to_m_s), lambda: self._cut(windows)
+        )
+        yield from known.values()
+
+    def _cut(self, windows: WindowBatch) -> dict[int, tuple[AnyArray, WindowBatch]]:
+        leading = windows.samples.shape[:-2]
+        speed, force = (np.broadcast_to(values, leading) for values in (windows.speed_m_s, windows.force_n))
+        lengths = stretched_lengths(speed, windows.samples.shape[-2], self.to_m_s)
+        groups = {}
+        for length in np.unique(lengths).tolist():
+            chosen = lengths == length
+            factor = windows.samples.shape[-2] / length
+            samples = resample(windows.samples[chosen], length)
+            stretched = WindowBatch(
+                samples, windows.rate_hz, speed[chosen] * factor, force[chosen], channels=windows.channels
+            )
+            groups[length] = (chosen, stretched)
+        return groups
+
+
+def stretched_lengths(speed_m_s: Array, n_samples: int, to_m_s: float) -> AnyArray:
+    """Return how many samples windows have after stretching, (...).
+
+    Parameters
+    ----------
+    speed_m_s : (...)
+        Speed of each window; NaN if unknown.
+    n_samples
+        Samples of a window before stretching.
+    to_m_s
+        Speed to which windows are brought.
+
+    Returns
+    -------
+    (...)
+        Whole numbers, at least 1.
+    """
+    speed = np.asarray(speed_m_s, dtype=np.float64)
+    moving = speed > 0  # False for NaN
+    factor = np.clip(np.where(moving, speed, to_m_s) / to_m_s, 1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
+    lengths: AnyArray = np.maximum(1, np.rint(n_samples * factor)).astype(np.intp)
+    return np.where(n_samples > 1, lengths, 1)
+
+
+def resample(samples: Samples, length: int) -> Samples:
+    """Return the band-limited signal through the samples at `length` equal steps over the same time.
+
+    The line from the first to the last sample is taken out before the Fourier transform, which sees the signal as
+    periodic, and put back after it.
+
+    Parameters
+    ----------
+    samples : (..., n_samples, n_channels)
+
+    Returns
+    -------
+    (..., length, n_channels)
+    """
+    n_samples = samples.shape[-2]
+    if length == n_samples:
+        return samples
+    rows = np.ascontiguousarray(samples.swapaxes(-1, -2))
+    first = rows[..., :1]
+    rise = rows[..., -1:] - first
+    waves = np.fft.rfft(rows - first - rise * (np.arange(n_samples) / n_samples))
+    bins = min(n_samples, length) // 2 + 1
+    steps = np.fft.irfft(waves[..., :bins], length) * (length / n_samples)
+    stretched: Samples = (steps + first + rise * (np.arange(length) / length)).swapaxes(-1, -2)
+    return stretched
+
+
+# --------------------
+# Cut windows from the sliding part of tactile streams, as soon as the last sample of each is there.
+
+TIMEOUT_S = 0.3
+DROPPED_S = 1.0  # an input that is silent for so long while others come is reported
+ALL = 1 << 62
+
+
+@dataclass(frozen=True)
+class WindowParams:
+    """How the sliding part of a signal is cut.
+
+    Examples
+    --------
+    >>> params = WindowParams(length_s=0.5, hop_s=0.1)
+    >>> 1 + round((2.0 - params.length_s) / params.hop_s)  # windows in 2 s of sliding
+    16
+    """
+
+    length_s: float = param(
+        0.5,
+        'Sets the length of a window; longer ones give more certain decisions, later.',
+        unit='s',
+        low=0.005,
+        high=60.0,
+    )
+    hop_s: float = param(
+        0.1,
+        'Sets the time between the starts of two windows; a smaller one gives more estimates and costs computing time.',
+        unit='s',
+        low=0.001,
+        high=60.0,
+    )
+    skip_s: float = param(
+        0.0, 'Time at the start of a slide that is excluded from windows.', unit='s', low=0.0, high=60.0
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class CutWindow:
+    """One window of sliding in every input, complete and finite.
+
+    `skipped` counts the windows of this slide left out so far for lost or non-finite samples.
+    """
+
+    start_ns: int
+    exploration_id: str
+    length_s: float
+    hop_s: float
+    windows: Mapping[str, Window]
+    speed_m_s: float = math.nan
+    force_n: float = math.nan
+    surface: str = ''
+    skipped: int = 0
+    motion: str = ''
+    direction_rad: float = math.nan
+    tangential_force_n: float = math.nan
+    elapsed_s: float = math.inf  # from the start of the slide to that of the window; infinite where nobody says
+
+
+@dataclass(frozen=True)
+class SlideEnd:
+    """No further window of this slide follows; `end_ns` is the end of its covered time."""
+
+    end_ns: int
+    exploration_id: str
+    hop_s: float
+    surface: str = ''
+    skipped: int = 0
+
+
+WindowEvent = CutWindow | SlideEnd
+
+
+class _Missing(enum.Enum):
+    """Why a window is not there."""
+
+    LATE = enum.auto()  # samples that have not come yet
+    LOST = enum.auto()  # samples that were lost or are not finite
+
+
+@dataclass
+class _Input:
+    """A stream and what the cutter waits for in it."""
+
+    stream: BufferedStream
+    due: float = -math.inf  # index before whose arrival nothing can happen
+    received: bool = False
+    received_s: float = math.nan
+    anchors: dict[SampleBuffer, tuple[int, int]] = field(default_factory=dict)
+
+
+class WindowCutter:
+    """Turn signal batches and exploration states into windows, in whatever order they arrive.
+
+    What is cut depends on the data alone, as long as signals and states arrive at most `keep_s` apart.
+
+    Parameters
+    ----------
+    params
+        Length and hop of the windows.
+    inputs
+        Topics of which every window needs all samples; batches of other topics are ignored. With an axis, as in
+        'signal@x' and 'signal@y', windows along both axes of one exploration are joined (`windowing/axes.py`).
+    keep_s
+        How long samples are kept at least, s.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> cutter = WindowCutter(WindowParams(length_s=0.5, hop_s=0.25), ['signal'])
+    >>> cutter.add_state(ExplorationState(0, 'a', 'linear_slide', Phase.SLIDE, steady_s=1.0))
+    >>> samples = np.zeros((1000, 1), dtype=np.float32)
+    >>> cutter.add_signal('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, samples))
+    >>> cutter.add_state(ExplorationState(NANOSECONDS, 'a', 'linear_slide', Phase.LIFT))
+    >>> for event in cutter.take():
+    ...     match event:
+    ...         case CutWindow():
+    ...             print('window at', event.start_ns / NANOSECONDS, 's,', event.windows['signal'].duration_s, 's long')
+    ...         case SlideEnd():
+    ...             print('end at', event.end_ns / NANOSECONDS, 's')
+    window at 0.0 s, 0.5 s long
+    window at 0.25 s, 0.5 s long
+    window at 0.5 s, 0.5 s long
+    end at 1.0 s
+    """
+
+    def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
+        self._params = params
+        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in dict.fromkeys(map(_topic_of, inputs))}
+        self._joiner: AxisJoiner[CutWindow] = AxisJoiner(inputs)
+        self._unpaired = 0
+        self._slides: deque[SlideCoverage] = deque()
+        self._ready = False
+        self._windows = 0
+        self._skipped = 0
+        self._old_states = 0
+        self._lost = 1  # windows from the present one on that are lost for the same reason
+
+    def add_signal(self, topic: str, signal: TactileSignal) -> None:
+        """Add a batch; batches of one topic come in the order in which they were sampled."""
+        source = self._inputs.get(topic)
+        if source is None or not len(signal.samples):
+            return
+        restarted = source.stream.add(signal)
+        source.received = True
+        if restarted or signal.next_sample >= source.due:
+            self._ready = True
+
+    def add_state(self, state: ExplorationState) -> None:
+        """Add a state; states come in the order in which they were published."""
+        self._ready = True
+        slide = self._slides[-1] if self._slides and not self._slides[-1].ended else None
+        if state.phase is Phase.SLIDE and slide and slide.exploration_id == state.exploration_id:
+            self._old_states += not slide.add(state)
+            return
+        if slide:
+            slide.ended = True
+        if state.phase is Phase.SLIDE:
+            length_s, hop_s, skip_s = self._params.length_s, self._params.hop_s, self._params.skip_s
+            self._slides.append(SlideCoverage(state, _to_ns(length_s), _to_ns(hop_s), _to_ns(skip_s)))
+
+    def take(self) -> list[WindowEvent]:
+        """Return the windows completed since the last call, and the end of each slide that is over."""
+        if not self._ready:
+            return []
+        self._ready = False
+        events: list[WindowEvent] = []
+        while self._slides and self._cut(self._slides[0], events):
+            events.append(self._end_slide())
+        return events
+
+    def time_out(self, now_s: float) -> list[WindowEvent]:
+        """Return what `take` returns, and the ends of slides that are over whose samples have not come for 0.3 s.
+
+        Call it some times a second with any clock that runs on.
+        """
+        events = self.take()
+        for source in self._inputs.values():
+            if source.received or math.isnan(source.received_s):
+                source.received, source.received_s = False, now_s
+        awaited = [source for source in self._inputs.values() if source.due < math.inf]
+        silent = any(now_s - source.received_s >= TIMEOUT_S for source in awaited)
+        return events + (self._give_up() if silent else [])
+
+    def finish(self) -> list[WindowEvent]:
+        """Return what is left of a recording, and the ends of all its slides, without waiting for more."""
+        if self._slides:
+            self._slides[-1].ended = True
+        self._ready = True
+        return self.take() + self._give_up()
+
+    @property
+    def waiting_for(self) -> tuple[str, ...]:
+        """Inputs of which nothing has come yet."""
+        return tuple(topic for topic, source in self._inputs.items() if not source.stream.buffers)
+
+    def dropped(self, now_s: float) -> tuple[str, ...]:
+        """Return the inputs that came once and are silent while another still comes, by the clock of `time_out`."""
+        ages_s = {
+            topic: 0.0 if source.received else now_s - source.received_s
+            for topic, source in self._inputs.items()
+            if source.stream.buffers
+        }
+        fresh = any(age_s < DROPPED_S for age_s in ages_s.values())
+        return tuple(topic for topic, age_s in ages_s.items() if fresh and age_s >= DROPPED_S)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Running totals: windows cut, skipped, without a partner; lost samples, restarts, states out of order."""
+        streams = [source.stream for source in self._inputs.values()]
+        return {
+            'windows': self._windows,
+            'skipped': self._skipped,
+            'unpaired': self._unpaired,
+            'lost_samples': sum(stream.lost_samples for stream in streams),
+            'restarts': sum(stream.restarts for stream in streams),
+            'old_states': self._old_states,
+        }
+
+    def _cut(self, slide: SlideCoverage, events: list[WindowEvent]) -> bool:
+        """Cut what can be cut of a slide; return whether it is used up."""
+        for source in self._inputs.values():
+            source.due = math.inf
+        while span := slide.window():
+            found = self._find(slide, span)
+            if found is _Missing.LATE:
+                return False
+            if isinstance(found, _Missing):
+                self._skip(slide, self._lost)
+                continue
+            slide.advance()
+            event: CutWindow | None = self._window_event(slide, span, found)
+            if self._joiner.joins and event is not None:
+                event = self._joiner.add(event)
+            if event is not None:
+                self._windows += 1
+                events.append(event)
+        return slide.ended
+
+    def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | _Missing:
+        self._lost = 1
+        windows = {}
+        for topic, source in self._inputs.items():
+            found = self._find_in(source, slide, span)
+            if isinstance(found, _Missing):
+                return found
+            windows[topic] = found
+        return windows
+
+    def _find_in(self, source: _Input, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
+        """Look for a window in the runs of a stream; only the newest can still grow."""
+        source.due = -math.inf
+        state, lost = _Missing.LATE, ALL
+        for buffer in source.stream.buffers:
+            anchor = source.anchors.get(buffer) or buffer.anchor(slide.start_ns)
+            if anchor is None:
+                state, source.due = _Missing.LATE, -math.inf
+                continue
+            source.anchors[buffer] = anchor
+            first = buffer.index_at(span.start_ns, anchor)
+            count = max(1, round(self._params.length_s * buffer.rate_hz))
+            if first >= buffer.first_sample and first + count <= buffer.next_sample:
+                source.due = math.inf
+                return _finite_window(buffer, first, count, span)
+            state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
+            source.due = first + count
+            if state is _Missing.LOST:
+                # What begins before the first sample is lost: a gap of an hour is passed over at once.
+                missing_s = (buffer.first_sample - first - 1) / buffer.rate_hz
+                lost = min(lost, int(missing_s / self._params.hop_s))
+        if state is _Missing.LOST:
+            source.due = math.inf
+            self._lost = max(1, lost)
+        return state
+
+    def _window_event(self, slide: SlideCoverage, span: CoveredSpan, windows: Mapping[str, Window]) -> CutWindow:
+        return CutWindow(
+            start_ns=span.start_ns,
+            exploration_id=slide.exploration_id,
+            length_s=self._params.length_s,
+            hop_s=self._params.hop_s,
+            windows=windows,
+            speed_m_s=span.speed_m_s,
+            force_n=span.force_n,
+            surface=slide.surface,
+            skipped=slide.skipped,
+            motion=slide.motion,
+            direction_rad=span.direction_rad,
+            tangential_force_n=span.tangential_force_n,
+            elapsed_s=(span.start_ns - slide.start_ns) / NANOSECONDS,
+        )
+
+    def _skip(self, slide: SlideCoverage, count: int) -> None:
+        skipped = slide.advance(count)
+        slide.skipped += skipped
+        self._skipped += skipped
+
+    def _end_slide(self) -> SlideEnd:
+        slide = self._slides.popleft()
+        self._unpaired += self._joiner.end()
+        for source in self._inputs.values():
+            source.anchors.clear()
+        return SlideEnd(slide.covered_ns, slide.exploration_id, self._params.hop_s, slide.surface, slide.skipped)
+
+    def _give_up(self) -> list[WindowEvent]:
+        """End the slides that are over without the samples that have not come."""
+        events: list[WindowEvent] = []
+        while self._slides and self._slides[0].ended:
+            while self._slides[0].window():
+                self._skip(self._slides[0], ALL)
+            events.append(self._end_slide())
+            self._ready = True
+            events += self.take()
+        return events
+
+
+def cut_recording(
+    signals: Mapping[str, Iterable[TactileSignal]],
+    states: Iterable[ExplorationState],
+    params: WindowParams,
+    inputs: Sequence[str] = (),
+) -> Iterator[WindowEvent]:
+    """Yield the windows of a recording.
+
+    Parameters
+    ----------
+    signals
+        The batches of each topic, in their order.
+    states
+        The exploration states, in their order.
+    params
+        Length and hop of the windows.
+    inputs
+        What each window holds, as for `WindowCutter`; () for every topic of `signals`.
+
+    Yields
+    ------
+    CutWindow or SlideEnd
+        In the order of time; the end of each slide comes after its windows.
+    """
+    cutter = WindowCutter(params, inputs or tuple(signals))
+    tracks = [_calls(cutter.add_state, states)]
+    tracks += [_calls(partial(cutter.add_signal, topic), batches) for topic, batches in signals.items()]
+    for _, add, item in heapq.merge(*tracks, key=itemgetter(0)):
+        add(item)
+        yield from cutter.take()
+    yield from cutter.finish()
+
+
+def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSpan) -> Window | _Missing:
+    samples = buffer.take(first, count)
+    if not np.isfinite(samples).all():
+        return _Missing.LOST
+    return Window(samples, buffer.rate_hz, buffer.channels, span.start_ns, span.speed_m_s, span.force_n, buffer.sensor)
+
+
+def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:
+    return ((item.stamp_ns, add, item) for item in items)
+
+
+def _topic_of(name: str) -> str:
+    return split_axis(name)[0]
+
+
+def _to_ns(seconds: float) -> int:
+    return round(seconds * NANOSECONDS)

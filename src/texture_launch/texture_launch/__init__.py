@@ -1,1 +1,0 @@
-"""A stand-alone launcher for the part of ROS 2's XML launch files that the suite uses."""

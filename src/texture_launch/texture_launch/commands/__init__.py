@@ -1,1 +1,0 @@
-"""Subcommands of `texture` that this package brings."""

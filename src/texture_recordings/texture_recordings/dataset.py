@@ -1,0 +1,1052 @@
+"""Labelled slides from bags, tables or public sets: `SlideDataset`, its conditions, its samples."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import re
+from bisect import bisect_left
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import groupby, pairwise
+from operator import itemgetter
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import FileRefused, writing
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.types import (
+    NANOSECONDS,
+    TURNED_RAD,
+    AnyArray,
+    Array,
+    ExplorationState,
+    FeatureVector,
+    Phase,
+    SlideMotion,
+    TactileSignal,
+    Window,
+)
+from texture_features.examples import LabelledFeatures
+from texture_features.feature import WindowBatch
+from texture_features.windows import CutWindow, WindowEvent, WindowParams, cut_recording
+from texture_recordings.bags import check_duration, find_bags, read_bag
+
+if TYPE_CHECKING:
+    from texture_features.augmentation import Augmentation, AugmentedFeatures
+    from texture_features.feature_set import FeatureSet
+
+
+# --------------------
+# Whether streams of samples arrive without gaps.
+
+
+class Continuity:
+    """Count lost samples and restarts of streams, from the running index of their batches.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> continuity = Continuity()
+    >>> for first_sample in (0, 10, 25, 0):  # five samples are missing, then the driver was started again
+    ...     samples = np.zeros((10, 1), dtype=np.float32)
+    ...     continuity.update('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, first_sample, samples))
+    >>> continuity.lost['signal'], continuity.restarts['signal']
+    (5, 1)
+    >>> continuity.losses
+    '5 samples lost, and unknown losses in 1 restart of a driver or bridge'
+    """
+
+    def __init__(self) -> None:
+        self.samples: Counter[str] = Counter()
+        self.lost: Counter[str] = Counter()
+        self.restarts: Counter[str] = Counter()
+        self._next: dict[str, int] = {}
+
+    @property
+    def losses(self) -> str:
+        """What was lost, in words, '' if nothing: of a restart, which numbers anew, nobody can tell how much."""
+        lost, restarts = self.lost.total(), self.restarts.total()
+        unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
+        return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
+
+    def update(self, stream: str, signal: TactileSignal) -> None:
+        """Take the next batch of a stream; an index that goes back is a restart of its driver, not a loss."""
+        jump = signal.first_sample - self._next.get(stream, signal.first_sample)
+        self.samples[stream] += len(signal.samples)
+        self.lost[stream] += max(0, jump)
+        self.restarts[stream] += jump < 0
+        self._next[stream] = signal.next_sample
+
+
+# --------------------
+# One labelled slide in a bag.
+
+
+@dataclass(frozen=True)
+class LabelledSlide:
+    """One exploration with a slide: its label, its conditions, and its signals if they were read.
+
+    Parameters
+    ----------
+    bag
+        Bag in which it lies, or the name of the recording of arrays.
+    exploration_id
+        As recorded.
+    surface
+        The label.
+    number
+        Counts the slides of this surface from 1 in the order recorded.
+    start_ns, stop_ns
+        What belongs to the slide was logged from `start_ns` to before `stop_ns` (None: the end of the bag).
+    namespace
+        Namespace of the finger; None if the bag has but one.
+    motion
+        How the slide was made; None if that is unknown or it was not straight.
+    signals
+        Batches of each topic in the order of time; empty if only the places of the slides were read.
+    states
+        Exploration states, in the order of time.
+
+    Examples
+    --------
+    >>> slide = LabelledSlide(Path('monday.mcap'), 'id', 'cork', number=3, start_ns=0, stop_ns=None)
+    >>> slide.name, slide.session
+    ('cork/3', 'monday')
+    """
+
+    bag: Path
+    exploration_id: str
+    surface: str
+    number: int
+    start_ns: int
+    stop_ns: int | None
+    namespace: str | None = None
+    motion: SlideMotion | None = None
+    signals: Mapping[str, Sequence[TactileSignal]] = field(default_factory=dict, compare=False, repr=False)
+    states: Sequence[ExplorationState] = field(default=(), compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """Surface and number, such as 'cork/3': unlike exploration ids, unique over all bags."""
+        return f'{self.surface}/{self.number}'
+
+    @property
+    def session(self) -> str:
+        """Name of the bag without its ending: slides of one bag were recorded in one session."""
+        return self.bag.name.removesuffix('.mcap')
+
+    @property
+    def sliding(self) -> Sequence[ExplorationState]:
+        """States while sliding."""
+        return [state for state in self.states if state.phase is Phase.SLIDE]
+
+    @property
+    def speed_m_s(self) -> float:
+        """Mean speed over the states while sliding; NaN if unknown."""
+        return _mean(state.speed_m_s for state in self.sliding)
+
+    @property
+    def force_n(self) -> float:
+        """Mean normal force over the states while sliding; NaN if unknown."""
+        return _mean(state.force_n for state in self.sliding)
+
+    @property
+    def direction_rad(self) -> float:
+        """Direction at the start of the slide; NaN if unknown."""
+        return next((state.direction_rad for state in self.sliding), math.nan)
+
+    @property
+    def motion_name(self) -> str:
+        """Name of the motion in the catalogue of motions; '' if unknown."""
+        return next((state.motion for state in self.sliding), '')
+
+    @property
+    def sensor(self) -> str:
+        """Name of the sensor of the first topic; '' if no signal was read."""
+        return next((batches[0].sensor for batches in self.signals.values() if batches), '')
+
+
+def _mean(values: Iterable[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan
+
+
+# --------------------
+# How a slide was made, as the states of its exploration tell.
+
+STRAIGHT = 'linear_slide'  # of other motions, states do not tell all that is needed to make them again
+
+
+def motion_made(states: Sequence[ExplorationState]) -> SlideMotion | None:
+    """Return how a slide was made; None if it was not straight, or its speed, force or direction are unknown.
+
+    Parameters
+    ----------
+    states
+        Of one exploration, in the order of time.
+    """
+    sliding = [state for state in states if state.phase is Phase.SLIDE and state.motion == STRAIGHT]
+    if not sliding:
+        return None
+    first, last = sliding[0], sliding[-1]
+    turned = (math.remainder(state.direction_rad - first.direction_rad, math.tau) for state in sliding)
+    speed, force = (median(numbers) for numbers in zip(*((s.speed_m_s, s.force_n) for s in sliding), strict=True))
+    if not all(abs(angle) <= TURNED_RAD for angle in turned) or not (0.0 < speed < math.inf and 0.0 < force < math.inf):
+        return None
+    over_ns = [state.stamp_ns for state in states if state.stamp_ns > last.stamp_ns]
+    end_ns = over_ns[0] if over_ns else last.stamp_ns + round(last.steady_s * NANOSECONDS)
+    if end_ns <= first.stamp_ns:
+        return None
+    return SlideMotion(STRAIGHT, first.direction_rad, speed, force, (end_ns - first.stamp_ns) / NANOSECONDS)
+
+
+# --------------------
+# Libraries that only some kinds of files need.
+
+
+def library(name: str, files: str, extra: str) -> Any:
+    """Return a library that is not installed with the suite.
+
+    Parameters
+    ----------
+    name
+        Its name, such as 'h5py'.
+    files
+        What it reads, for the sentence.
+    extra
+        Name of the extra of texture_recordings that brings it.
+
+    Returns
+    -------
+    module
+        The library.
+
+    Raises
+    ------
+    InvalidData
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise InvalidData(
+            f"{files} need the library '{name}', which is not installed; run 'pip install "
+            f"{name.partition('.')[0]}', which the extra '{extra}' of texture_recordings names"
+        ) from error
+
+
+# --------------------
+# Labelled slides as arrays: all samples of one topic, and what the finger did.
+
+
+@dataclass(frozen=True, eq=False)
+class SlideSamples:
+    """One slide.
+
+    Parameters
+    ----------
+    slide
+        Where it lies, its surface and number.
+    before : (m, n_channels)
+        Samples before the slide began, in contact; often none.
+    samples : (n, n_channels)
+        Samples of the covered time, evenly spaced.
+    rate_hz, channels
+        Of the samples.
+    speed_m_s, force_n, direction_rad
+        Means over the states of the slide (the first direction); NaN if unknown.
+
+    Examples
+    --------
+    >>> from texture_recordings.dataset import SlideDataset
+    >>> dataset = SlideDataset.from_arrays({'signal': [np.ones((100, 1))]}, ['cork'], {'signal': 100.0}, speed_m_s=0.05)
+    >>> [slide] = dataset.samples('signal')
+    >>> slide.surface, slide.windows(count=50).samples.shape
+    ('cork', (50, 1))
+    """
+
+    slide: LabelledSlide
+    before: Array
+    samples: Array
+    rate_hz: float
+    channels: tuple[str, ...]
+    speed_m_s: float
+    force_n: float
+    direction_rad: float
+
+    @property
+    def surface(self) -> str:
+        """The label."""
+        return self.slide.surface
+
+    @property
+    def distance_m(self) -> float:
+        """How far the finger slid; NaN if the speed is unknown."""
+        return len(self.samples) / self.rate_hz * self.speed_m_s
+
+    @classmethod
+    def of(cls, slide: LabelledSlide, topic: str) -> SlideSamples:
+        """Return the samples of one topic of a slide.
+
+        Raises
+        ------
+        InvalidData
+            If it has no samples of the topic or lost some.
+        """
+        batches, states = slide.signals.get(topic, ()), slide.sliding
+        where = f"slide '{slide.name}' in '{slide.bag}'"
+        if not batches or not states:
+            raise InvalidData(f"{where} has no '{topic}' while sliding; name another topic")
+        if any(after.first_sample != before.next_sample for before, after in pairwise(batches)):
+            raise InvalidData(f'{where} has lost samples; use windows of it instead')
+        rate_hz = batches[0].sampling_rate_hz
+        samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
+        first, last = (round((at - batches[0].stamp_ns) * rate_hz / NANOSECONDS) for at in _covered(states))
+        return cls(
+            slide, samples[: max(first, 0)], samples[max(first, 0) : last], rate_hz, batches[0].channels,
+            slide.speed_m_s, slide.force_n, slide.direction_rad,
+        )  # fmt: skip
+
+    def windows(self, start: int = 0, count: int | None = None, speed_m_s: float | None = None) -> WindowBatch:
+        """Return a stretch of the slide, all of it by default, to be described; at another speed if one is given.
+
+        Parameters
+        ----------
+        start
+            Number of the first sample.
+        count
+            Number of samples; None for all from there on.
+        speed_m_s
+            Speed to which the stretch is resampled; None keeps that of the slide.
+
+        Returns
+        -------
+        WindowBatch
+            One window.
+        """
+        samples = self.samples[start : None if count is None else start + count]
+        speed = self.speed_m_s if speed_m_s is None else speed_m_s
+        return WindowBatch(samples, self.rate_hz, np.array(speed), np.array(self.force_n), channels=self.channels)
+
+
+def _covered(states: Sequence[ExplorationState]) -> tuple[int, int]:
+    return states[0].stamp_ns, max(state.stamp_ns + round(state.steady_s * NANOSECONDS) for state in states)
+
+
+# --------------------
+# Write labelled slides as a Parquet file, a row for each sample.
+
+FACTS = ('slide', 'surface', 'number', 'session', 'speed_m_s', 'force_n', 'direction_rad', 'time_s')
+
+
+def write_parquet(slides: Sequence[SlideSamples], path: str | Path) -> None:
+    """Write the samples of slides, one group of rows for each slide.
+
+    Parameters
+    ----------
+    slides
+        With the same channels.
+    path
+        File to write; its columns are those of `FACTS`, then the channels.
+
+    Raises
+    ------
+    InvalidData
+        If the slides differ in channels, a channel is named as a column of `FACTS`, or pyarrow is not installed.
+    InvalidParameter
+        If the file exists or cannot be written.
+    """
+    arrow = library('pyarrow', 'Parquet files', 'parquet')
+    parquet = library('pyarrow.parquet', 'Parquet files', 'parquet')
+    channels = slides[0].channels
+    other = next((slide for slide in slides if slide.channels != channels), None)
+    if other or set(channels) & set(FACTS):
+        place = f"slide '{other.slide.name}' has {', '.join(other.channels)}" if other else ', '.join(FACTS)
+        raise InvalidData(f'the channels are {", ".join(channels)}, but {place}; export slides of one sensor')
+    if Path(path).exists():
+        raise InvalidParameter(f"'{path}' exists already; name another file or remove it")
+    first = arrow.table(_rows(arrow, slides[0]))
+    with writing(path), parquet.ParquetWriter(path, first.schema) as writer:
+        for slide in slides:
+            writer.write_table(arrow.table(_rows(arrow, slide)))
+
+
+def _rows(arrow: Any, samples: SlideSamples) -> dict[str, Any]:
+    count, slide = len(samples.samples), samples.slide
+    facts: dict[str, AnyArray] = {
+        'number': np.full(count, slide.number),
+        'speed_m_s': np.full(count, samples.speed_m_s),
+        'force_n': np.full(count, samples.force_n),
+        'direction_rad': np.full(count, samples.direction_rad),
+        'time_s': np.arange(count) / samples.rate_hz,
+    }
+    texts = {'slide': slide.name, 'surface': slide.surface, 'session': slide.session}
+    columns = {name: facts[name] if name in facts else _repeated(arrow, texts[name], count) for name in FACTS}
+    return {**columns, **dict(zip(samples.channels, samples.samples.astype(np.float32).T, strict=True))}
+
+
+def _repeated(arrow: Any, text: str, count: int) -> Any:
+    return arrow.DictionaryArray.from_arrays(np.zeros(count, dtype=np.int32), [text])
+
+
+# --------------------
+# The labelled explorations in bags, and which of them the user means by `--slides 1-30`.
+
+RANGE = re.compile(r'(\d+)(?:-(\d+))?')
+Message = tuple[str, int, Any]
+STREAMS, STATES = ('signal', 'signal_static'), 'exploration'
+
+
+def parse_selection(text: str) -> frozenset[int] | None:
+    """Return the numbers in '1-30' or '1,3,5-7'; None, meaning all, for ''.
+
+    Raises
+    ------
+    InvalidData
+        If the text is no such list.
+    """
+    if not text.strip():
+        return None
+    numbers: set[int] = set()
+    for part in text.split(','):
+        match = RANGE.fullmatch(part.strip())
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+        if not 1 <= first <= last:
+            raise InvalidData(f"slides are '{text}'; numbers from 1 and ranges are needed, such as '1-30' or '1,3,5-7'")
+        numbers.update(range(first, last + 1))
+    return frozenset(numbers)
+
+
+def find_slides(
+    bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = ()
+) -> list[LabelledSlide]:
+    """Return the labelled slides in bags, by bag and time, with the signals of topics; each bag is read once.
+
+    Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
+
+    Parameters
+    ----------
+    bags
+        Bags, or folders of bags.
+    slides
+        Slides of each surface to keep, such as '1-30', counted from 1 in the order recorded; '' keeps all.
+    namespace
+        Namespace of the finger, if bags hold several.
+    topics
+        Signals to read; none by default.
+
+    Returns
+    -------
+    list of LabelledSlide
+        Counted for each surface.
+
+    Raises
+    ------
+    InvalidData
+        If a bag cannot be read, no slide is labelled, or none has a number asked for.
+    """
+    wanted = parse_selection(slides)
+    paths = find_bags(bags)
+    labelled = [slide for path in paths for slide in _slides_of(path, namespace, topics)]
+    if not labelled:
+        raise InvalidData(
+            f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
+        )
+    numbered = number_slides(labelled)
+    found = [slide for slide in numbered if wanted is None or slide.number in wanted]
+    if not found:
+        most = max(slide.number for slide in numbered)
+        raise InvalidData(f"no surface in {_named(paths)} has slides '{slides}'; there are 1 to {most}")
+    return found
+
+
+def _slides_of(path: Path, namespace: str | None, topics: Sequence[str]) -> list[LabelledSlide]:
+    """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
+    messages = list(read_bag(path, (*topics, STATES), namespace))
+    try:
+        check_duration(path, (value for topic, _, value in messages if topic in topics))
+    except FileRefused as error:
+        raise InvalidData(f"the bag '{path}' cannot be used: {error}") from error
+    reported = [message for message in messages if message[0] == STATES and message[2].exploration_id]
+    groups = [list(group) for _, group in groupby(reported, key=lambda message: message[2].exploration_id)]
+    starts: list[int | None] = [group[0][1] for group in groups]
+    return [
+        slide
+        for group, stop_ns in zip(groups, [*starts[1:], None][: len(groups)], strict=True)
+        if (slide := _slide(path, namespace, group, stop_ns, messages))
+    ]
+
+
+def _slide(
+    path: Path, namespace: str | None, reported: Sequence[Message], stop_ns: int | None, messages: Sequence[Message]
+) -> LabelledSlide | None:
+    """Return the slide of one exploration with its messages; None if it has no label."""
+    states = [state for _, _, state in reported]
+    surface = next((state.surface for state in reversed(states) if state.phase is Phase.SLIDE), None)
+    if not surface:
+        return None
+    start_ns = reported[0][1]
+    first = bisect_left(messages, start_ns, key=itemgetter(1))
+    last = len(messages) if stop_ns is None else bisect_left(messages, stop_ns, key=itemgetter(1))
+    streams: defaultdict[str, list[Any]] = defaultdict(list)
+    for topic, _, value in messages[first:last]:
+        streams[topic].append(value)
+    heard = streams.pop(STATES)
+    return LabelledSlide(
+        path, states[0].exploration_id, surface, 0, start_ns, stop_ns, namespace, motion_made(states), dict(streams),
+        heard,
+    )  # fmt: skip
+
+
+def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
+    """Return slides numbered for each surface by itself from 1, in the order of their start."""
+    by_surface: defaultdict[str, list[LabelledSlide]] = defaultdict(list)
+    for slide in slides:
+        by_surface[slide.surface].append(slide)
+    numbers = {
+        id(slide): number
+        for group in by_surface.values()
+        for number, slide in enumerate(sorted(group, key=lambda slide: slide.start_ns), 1)
+    }
+    return [replace(slide, number=numbers[id(slide)]) for slide in slides]
+
+
+def _named(paths: Sequence[Path]) -> str:
+    return f"'{paths[0]}'" if len(paths) == 1 else f"the {len(paths)} bags from '{paths[0]}' on"
+
+
+# --------------------
+# Labelled slides with their signals: read once from bags, or given as arrays.
+
+GAP_NS = NANOSECONDS  # between two slides that are given as arrays
+# Speeds and forces that differ by less are one condition: an arm does not keep to what it was asked for.
+SAME_RATIO, SAME_RAD = 1.05, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class SlideDataset:
+    """Labelled slides: for training, evaluation and cross-validation, and for export.
+
+    All signals are held in memory, as float32: an hour of one channel at 2200 Hz takes 32 MB.
+
+    Parameters
+    ----------
+    slides
+        In the order of the bags and of time.
+
+    Raises
+    ------
+    InvalidData
+        If there is no slide.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> recordings = {'signal': [rng.normal(size=(2000, 1)) for _ in range(4)]}
+    >>> dataset = SlideDataset.from_arrays(
+    ...     recordings, ['cork', 'cork', 'felt', 'felt'], {'signal': 1000.0}, speed_m_s=[0.02, 0.04, 0.02, 0.04]
+    ... )
+    >>> [slide.name for slide in dataset]
+    ['cork/1', 'cork/2', 'felt/1', 'felt/2']
+    >>> len(dataset.select(labels=['felt'])), dataset.condition('speed').tolist()
+    (2, [0.02, 0.04, 0.02, 0.04])
+    """
+
+    slides: tuple[LabelledSlide, ...]
+
+    def __post_init__(self) -> None:
+        if not self.slides:
+            raise InvalidData('the data set has no slide; select fewer conditions, or record labelled slides')
+
+    @classmethod
+    def from_bags(
+        cls,
+        bags: Iterable[str | Path],
+        slides: str = '',
+        namespace: str | None = None,
+        topics: Sequence[str] = STREAMS,
+    ) -> SlideDataset:
+        """Read the labelled slides of bags with their signals; see `find_slides` for the arguments and errors.
+
+        Parameters
+        ----------
+        bags
+            Bags, or folders of bags.
+        slides
+            Slides of each surface to keep, such as '1-30'; '' keeps all.
+        namespace
+            Namespace of the finger, if bags hold several.
+        topics
+            Signals to read.
+
+        Returns
+        -------
+        SlideDataset
+            By bag and time.
+        """
+        return cls(tuple(find_slides(bags, slides, namespace, topics)))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        signals: Mapping[str, Sequence[AnyArray]],
+        labels: Sequence[str],
+        rates_hz: Mapping[str, float],
+        *,
+        speed_m_s: float | Sequence[float] = math.nan,
+        force_n: float | Sequence[float] = math.nan,
+        direction_rad: float | Sequence[float] = math.nan,
+        channels: Mapping[str, Sequence[str]] | None = None,
+        motion: str = 'linear_slide',
+        sensor: str = '',
+        session: str = '',
+    ) -> SlideDataset:
+        """Build a data set from arrays; the finger slides from the first sample of each to the last.
+
+        Parameters
+        ----------
+        signals
+            By topic, such as 'signal': one array (n_samples, n_channels) for each slide.
+        labels : (n_slides,)
+            Surface of each slide.
+        rates_hz
+            Sampling rate of each topic, Hz.
+        speed_m_s, force_n, direction_rad
+            Conditions of all slides, or of each, (n_slides,).
+        channels
+            Names of the channels of each topic; 'c0', 'c1', … if not given.
+        motion, sensor, session
+            Name of the motion, of the sensor and of the recording.
+
+        Returns
+        -------
+        SlideDataset
+            In the order of the arrays.
+
+        Raises
+        ------
+        InvalidData
+            If the numbers of slides or channels contradict each other.
+        """
+        count = len(labels)
+        _check_counts(signals, rates_hz, count)
+        numbers = {
+            name: _one_each(name, values, count)
+            for name, values in (('speed_m_s', speed_m_s), ('force_n', force_n), ('direction_rad', direction_rad))
+        }
+        slides, start_ns = [], 0
+        for index, label in enumerate(labels):
+            batches = {
+                topic: _batch(arrays[index], (sensor or topic, (channels or {}).get(topic), rates_hz[topic]), start_ns)
+                for topic, arrays in signals.items()
+            }
+            duration_ns = min(batch.end_ns for batch in batches.values()) - start_ns
+            state = ExplorationState(
+                start_ns,
+                f'{session or "array"}/{index}',
+                motion,
+                Phase.SLIDE,
+                duration_ns / NANOSECONDS,
+                float(numbers['speed_m_s'][index]),
+                float(numbers['force_n'][index]),
+                float(numbers['direction_rad'][index]),
+                surface=str(label),
+            )
+            slides.append(
+                LabelledSlide(
+                    Path(session), state.exploration_id, str(label), 0, start_ns, None,
+                    motion=motion_made([state]),
+                    signals={topic: (batch,) for topic, batch in batches.items()},
+                    states=(state,),
+                )
+            )  # fmt: skip
+            start_ns = max(batch.end_ns for batch in batches.values()) + GAP_NS
+        return cls(tuple(number_slides(slides)))
+
+    def __len__(self) -> int:
+        return len(self.slides)
+
+    def __iter__(self) -> Iterator[LabelledSlide]:
+        return iter(self.slides)
+
+    def __getitem__(self, index: int) -> LabelledSlide:
+        return self.slides[index]
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """Surface of each slide, (n_slides,)."""
+        return np.array([slide.surface for slide in self.slides])
+
+    @property
+    def names(self) -> NDArray[np.str_]:
+        """Name of each slide, such as 'cork/3', (n_slides,)."""
+        return np.array([slide.name for slide in self.slides])
+
+    def condition(self, name: str) -> AnyArray:
+        """Return a condition of each slide, (n_slides,): what `CONDITIONS` lists, such as 'speed' in m/s.
+
+        Speeds and forces within 5 %, and directions within 0.1 rad, of their neighbour in order count as equal: the
+        rounded mean of each group is returned.
+
+        Parameters
+        ----------
+        name
+            One of `CONDITIONS`.
+
+        Returns
+        -------
+        (n_slides,)
+            Numbers in SI units, or names.
+
+        Raises
+        ------
+        InvalidData
+            If there is no such condition, or a slide does not tell it.
+        """
+        if name not in CONDITIONS:
+            raise InvalidData(f"slides have no condition '{name}'; use one of {', '.join(CONDITIONS)}")
+        values = np.array([CONDITIONS[name](slide) for slide in self.slides])
+        if values.dtype.kind != 'f':
+            return values
+        unknown = np.flatnonzero(np.isnan(values))
+        if len(unknown):
+            raise InvalidData(
+                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others do not tell their {name}; "
+                f'use slides that were recorded with it, or another condition'
+            )
+        return _grouped(values, circular=name == 'direction')
+
+    def select(
+        self,
+        slides: str = '',
+        *,
+        labels: Iterable[str] | None = None,
+        where: Callable[[LabelledSlide], bool] = lambda _: True,
+    ) -> SlideDataset:
+        """Return some of the slides, which keep their numbers.
+
+        Parameters
+        ----------
+        slides
+            Numbers of the slides of each surface, such as '1-30' or '1,3,5-7'; '' for all.
+        labels
+            Surfaces; None for all.
+        where
+            Says of a slide whether to keep it.
+
+        Returns
+        -------
+        SlideDataset
+            In the same order.
+
+        Raises
+        ------
+        InvalidData
+            If no slide is left.
+        """
+        numbers = parse_selection(slides)
+        surfaces = None if labels is None else set(labels)
+        return SlideDataset(
+            tuple(
+                slide
+                for slide in self.slides
+                if (numbers is None or slide.number in numbers)
+                and (surfaces is None or slide.surface in surfaces)
+                and where(slide)
+            )
+        )
+
+    def take(self, indices: AnyArray) -> SlideDataset:
+        """Return the slides of a mask or of indices, as a splitter gives them; they keep their numbers.
+
+        Parameters
+        ----------
+        indices : (n_slides,) bool, or (n_taken,) int
+            Which slides are taken.
+        """
+        return SlideDataset(tuple(self.slides[int(index)] for index in np.arange(len(self))[indices]))
+
+    def windows(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[WindowEvent]]]:
+        """Yield each slide with its windows and its end, as the feature extractor on the robot cuts them.
+
+        Raises
+        ------
+        ModelMismatch
+            If a slide has nothing of an input.
+        """
+        for slide in self.slides:
+            yield slide, cut_slide(slide, feature_set)
+
+    def vectors(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[FeatureVector]]]:
+        """Yield each slide with the feature vectors of its windows, (n_windows,), which bear the name of the slide.
+
+        Raises
+        ------
+        ModelMismatch
+            If a slide has nothing of an input.
+        """
+        for slide, events in self.windows(feature_set):
+            vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
+            yield slide, [replace(vector, exploration_id=slide.name) for vector in vectors]
+
+    def features(
+        self, feature_set: FeatureSet, augmentation: Augmentation | None = None, touch_s: float = 0.0
+    ) -> LabelledFeatures:
+        """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
+
+        Parameters
+        ----------
+        feature_set
+            Windows, inputs and features.
+        augmentation
+            Changes of copies of the slides, for training; with None or without copies there are none.
+        touch_s
+            How much of the touch before the finger moves is described, too, s; 0 for none.
+
+        Returns
+        -------
+        LabelledFeatures
+            Of all windows, slide by slide.
+
+        Raises
+        ------
+        InvalidData
+            If no slide has a whole window.
+        ModelMismatch
+            If a slide lacks an input, or the slides differ in rates or channels.
+        """
+        vectors = [vector for _, own in self.vectors(feature_set) for vector in own]
+        if not vectors:
+            raise no_window(self, feature_set)
+        features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
+        motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
+        touches = self._touches(feature_set, touch_s) if touch_s else {}
+        return replace(features, motions=motions, augmented=self._augmented(feature_set, augmentation), touches=touches)
+
+    def features_over_distances(
+        self, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float
+    ) -> LabelledFeatures | None:
+        """Return features of windows that show so much of a surface, or the whole of a shorter slide.
+
+        Parameters
+        ----------
+        feature_set
+            Inputs and features; its windows have no effect.
+        distances_m
+            How far the finger slides in a window, m.
+        hop_m
+            Way between the starts of two windows, m.
+
+        Returns
+        -------
+        LabelledFeatures or None
+            Of the slides whose speed is known and that lost no samples; None if there are none.
+        """
+        events = [event for slide in self.slides for event in _windows_over(slide, feature_set, distances_m, hop_m)]
+        if not events:
+            return None
+        return LabelledFeatures.from_vectors(
+            feature_set.extract_many(events), {slide.name: slide.surface for slide in self.slides}
+        )
+
+    def _touches(self, feature_set: FeatureSet, touch_s: float) -> dict[str, Array]:
+        """Return the features of the touch before the finger moves, (n_features,), of slides that hold some of it."""
+        touches = {}
+        for slide in self.slides:
+            inputs = {topic: _touch(slide, topic, touch_s) for topic in feature_set.topics}
+            windows = {topic: window for topic, window in inputs.items() if window is not None}
+            if len(windows) == len(inputs):
+                made = slide.speed_m_s, slide.force_n
+                event = CutWindow(slide.start_ns, slide.name, touch_s, touch_s, windows, *made)
+                touches[slide.name] = feature_set.extract(event).values
+        return touches
+
+    def _augmented(self, feature_set: FeatureSet, augmentation: Augmentation | None) -> AugmentedFeatures | None:
+        """Return changed copies of the slides as features, for training; None without augmentation or copies."""
+        if augmentation is None or not augmentation.copies:
+            return None
+        from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
+
+        augmenter = Augmenter(feature_set, augmentation)
+        for slide in self.slides:
+            augmenter.add(slide.name, partial(_cut_by, slide, feature_set))
+        return augmenter.result()
+
+    def samples(self, topic: str) -> list[SlideSamples]:
+        """Return the samples of one topic of each slide without gaps, with speed, force and direction.
+
+        Raises
+        ------
+        InvalidData
+            If a slide has no samples of the topic or lost some.
+        """
+        return [SlideSamples.of(slide, topic) for slide in self.slides]
+
+    def to_numpy(self, topic: str = 'signal') -> tuple[list[Array], NDArray[np.str_]]:
+        """Return the samples of each slide, (n_samples, n_channels) each, and its label, (n_slides,).
+
+        Parameters
+        ----------
+        topic
+            Signal to return.
+
+        Returns
+        -------
+        list of (n_samples, n_channels)
+            In the unit of the signal.
+        (n_slides,) of text
+            Surface of each.
+
+        Raises
+        ------
+        InvalidData
+            If a slide has no samples of the topic or lost some.
+        """
+        return [slide.samples for slide in self.samples(topic)], self.labels
+
+    def to_parquet(self, path: str | Path, topic: str = 'signal') -> None:
+        """Write the samples of one topic as a Parquet file, a row each, with slide, surface, time and conditions.
+
+        Parameters
+        ----------
+        path
+            File to write.
+        topic
+            Signal to write.
+
+        Raises
+        ------
+        InvalidData
+            If a slide has no samples of the topic or lost some, slides differ in channels, or pyarrow is missing.
+        InvalidParameter
+            If the file exists or cannot be written.
+        """
+        write_parquet(self.samples(topic), path)
+
+
+def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:
+    """Return the windows of a slide and its end, as the feature extractor on the robot cuts them.
+
+    Raises
+    ------
+    ModelMismatch
+        If the slide has nothing of an input.
+    """
+    missing = [topic for topic in feature_set.topics if not slide.signals.get(topic)]
+    if missing:
+        raise ModelMismatch(
+            f"slide '{slide.name}' in '{slide.bag}' has no '{missing[0]}', only "
+            f'{", ".join(sorted(topic for topic, batches in slide.signals.items() if batches)) or "states"}; '
+            f'the windows need {", ".join(feature_set.topics)}: use another recipe or record the missing topic'
+        )
+    used = {topic: slide.signals[topic] for topic in feature_set.topics}
+    return list(cut_recording(used, slide.states, feature_set.windows, feature_set.window_names))
+
+
+def _windows_over(
+    slide: LabelledSlide, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float
+) -> Iterator[CutWindow]:
+    """Yield windows of a slide at a known speed without gaps, of each distance."""
+    if not slide.speed_m_s > 0.0:
+        return
+    try:
+        inputs = {topic: SlideSamples.of(slide, topic) for topic in feature_set.topics}
+    except InvalidData:
+        return
+    slid_s = min(len(samples.samples) / samples.rate_hz for samples in inputs.values())
+    windows = feature_set.windows
+    for length_s in sorted({min(distance_m / slide.speed_m_s, slid_s) for distance_m in distances_m}):
+        for start_s in np.arange(0.0, slid_s - length_s + 1e-9, hop_m / slide.speed_m_s).tolist():
+            cut = {topic: _stretch(samples, start_s, length_s) for topic, samples in inputs.items()}
+            if all(np.isfinite(window.samples).all() for window in cut.values()):
+                start_ns = slide.start_ns + round(start_s * NANOSECONDS)
+                yield CutWindow(
+                    start_ns, slide.name, windows.length_s, windows.hop_s, cut, slide.speed_m_s, slide.force_n
+                )
+
+
+def _stretch(slide: SlideSamples, start_s: float, length_s: float) -> Window:
+    first = round(start_s * slide.rate_hz)
+    samples = slide.samples[first : first + max(1, round(length_s * slide.rate_hz))]
+    return Window(samples, slide.rate_hz, slide.channels)
+
+
+def _touch(slide: LabelledSlide, topic: str, touch_s: float) -> Window | None:
+    """Return the first samples of the touch before the finger moves; None without any, or if samples were lost."""
+    try:
+        samples = SlideSamples.of(slide, topic)
+    except InvalidData:
+        return None
+    before = samples.before[: max(1, round(touch_s * samples.rate_hz))]
+    return Window(before, samples.rate_hz, samples.channels) if np.isfinite(before).all() and len(before) else None
+
+
+def _cut_by(slide: LabelledSlide, feature_set: FeatureSet, windows: WindowParams) -> list[WindowEvent]:
+    return cut_slide(slide, replace(feature_set, windows=windows, _layouts={}))
+
+
+def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
+    """Return the error for slides of which not one has a usable window."""
+    return InvalidData(
+        f'none of the {len(dataset)} slides has a whole window of {feature_set.windows.length_s} s; '
+        'record longer slides without losses, or use a recipe with shorter windows'
+    )
+
+
+CONDITIONS: Mapping[str, Callable[[LabelledSlide], Any]] = {
+    'speed': lambda slide: slide.speed_m_s,  # m/s
+    'force': lambda slide: slide.force_n,  # N
+    'direction': lambda slide: slide.direction_rad,  # rad
+    'motion': lambda slide: slide.motion_name,
+    'sensor': lambda slide: slide.sensor,
+    'session': lambda slide: slide.session,
+    'number': lambda slide: slide.number,
+}
+
+
+def _grouped(values: Array, *, circular: bool) -> Array:
+    """Return the rounded mean of the group of each value, (n,): groups end where neighbours in order differ."""
+    order = np.argsort(values, kind='stable')
+    ordered = values[order]
+    apart = np.diff(ordered) > (SAME_RAD if circular else (SAME_RATIO - 1.0) * np.abs(ordered[:-1]))
+    group = np.concatenate(([0], np.cumsum(apart)))
+    if circular and group[-1] and ordered[0] + math.tau - ordered[-1] <= SAME_RAD:  # -π is π
+        ordered = np.where(group == group[-1], ordered - math.tau, ordered)
+        group[group == group[-1]] = 0
+    means = np.bincount(group, ordered) / np.bincount(group)
+    result = np.empty(len(values))
+    result[order] = [float(f'{mean:.3g}') for mean in means[group]]
+    return result
+
+
+def _check_counts(signals: Mapping[str, Sequence[AnyArray]], rates_hz: Mapping[str, float], count: int) -> None:
+    for topic, arrays in signals.items():
+        if len(arrays) != count or topic not in rates_hz:
+            raise InvalidData(
+                f"'{topic}' has {len(arrays)} slides and the rate {rates_hz.get(topic)} for {count} labels; "
+                'give one array (n_samples, n_channels) for each label, and the rate of each topic in Hz'
+            )
+    if not signals:
+        raise InvalidData("no signal was given; give arrays by topic, such as {'signal': [...]}")
+
+
+def _one_each(name: str, values: float | Sequence[float], count: int) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (count,)):
+        raise InvalidData(f'{name} has the shape {array.shape}; give one number, or one for each of {count} slides')
+    return np.broadcast_to(array, (count,))
+
+
+def _batch(array: AnyArray, template: tuple[str, Sequence[str] | None, float], start_ns: int) -> TactileSignal:
+    """Return the samples of a slide as a batch; `template` is the sensor, the names of the channels and the rate."""
+    sensor, channels, rate_hz = template
+    samples = np.atleast_2d(np.asarray(array, dtype=np.float32).T).T  # one channel may be given without its axis
+    names = tuple(channels) if channels else tuple(f'c{number}' for number in range(samples.shape[1]))
+    return TactileSignal(start_ns, sensor, names, (), rate_hz, 0, samples)

@@ -1,1 +1,0 @@
-"""Public recordings turned into labelled bags, one module a data set."""

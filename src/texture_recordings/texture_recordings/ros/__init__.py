@@ -1,1 +1,0 @@
-"""What of texture_recordings needs ROS."""

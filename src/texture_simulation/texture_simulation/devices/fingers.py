@@ -1,0 +1,1050 @@
+"""Fingers emulated at the wire: encoders of their protocols and the devices that send them."""
+
+from __future__ import annotations
+
+import binascii
+import contextlib
+import os
+import re
+import struct
+import tty
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import param
+from texture_core.errors import DeviceError
+from texture_core.types import Array
+
+# --------------------
+# What a BioTac bridge puts on the wire, written from its protocol and not from the driver's code.
+#
+# Reply of a slot: the command's two bytes, then two bytes for each BioTac: seven and five bits of the value, each
+# byte
+# with a last bit that makes its number of ones odd. Frame: COBS(kind u8, version u8, sequence u16, time_us u32, rows
+# u8,
+# columns u8, body, CRC-16/CCITT-FALSE u16), then a zero; little endian, numbered kind by kind. Kind 'B' holds one
+# reply
+# to all slots, kind 'S' the serial numbers, separated by commas.
+
+Values = NDArray[np.uint16]
+Bytes = NDArray[np.uint8]
+
+VERSION = 1
+PAC, PDC, TAC, TDC, ELECTRODE_1 = 0, 1, 2, 3, 17  # indices of the sampling commands
+
+
+def with_parity(upper: Bytes) -> Bytes:
+    """Return bytes with bit 0 set so that the number of ones is odd."""
+    ones = np.unpackbits(upper[..., None], axis=-1).sum(axis=-1)
+    complete: Bytes = upper | (1 - ones % 2).astype(np.uint8)
+    return complete
+
+
+def commands(electrodes: int) -> Bytes:
+    """Return the sampling command of each slot, (2 * electrodes + 6,): every second one is PAC."""
+    slow = np.array([*range(ELECTRODE_1, ELECTRODE_1 + electrodes), PDC, TAC, TDC], dtype=np.uint8)
+    indices = np.stack([slow, np.full_like(slow, PAC)], axis=1).ravel()
+    return with_parity(np.uint8(0x80) | indices << np.uint8(1))
+
+
+def encode_replies(values: Values, absent: Sequence[int] = ()) -> Bytes:
+    """Return the replies to whole frames.
+
+    Parameters
+    ----------
+    values : (n_frames, n_slots, n_fingers) counts, 0 to 4095
+    absent
+        Places without a BioTac: their line stays low.
+
+    Returns
+    -------
+    (n_frames, n_slots * (2 + 2 * n_fingers))
+    """
+    n_frames, n_slots, n_fingers = values.shape
+    replies = np.zeros((n_frames, n_slots, 2 + 2 * n_fingers), dtype=np.uint8)
+    replies[:, :, 0] = commands(n_slots // 2 - 3)
+    replies[:, :, 2::2] = with_parity((values >> 5 << 1).astype(np.uint8))
+    replies[:, :, 3::2] = with_parity(((values & 31) << 3).astype(np.uint8))
+    for finger in absent:
+        replies[:, :, 2 + 2 * finger : 4 + 2 * finger] = 0
+    return replies.reshape(n_frames, n_slots * (2 + 2 * n_fingers))
+
+
+def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, version: int = VERSION) -> bytes:
+    """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds.
+
+    Parameters
+    ----------
+    sequence
+        Running number of the frame; wraps at 16 bits.
+    time_us
+        Device's time of its first row; wraps at 32 bits.
+    values : (n_slots, n_fingers)
+        Counts, 0 to 4095.
+    reply
+        Bytes of the reply.
+    version
+        Version of the protocol.
+
+    Returns
+    -------
+    bytes
+        The whole frame.
+    """
+    rows, columns = values.shape
+    return _frame(struct.pack('<cBHIBB', b'B', version, sequence % 2**16, time_us % 2**32, rows, columns) + reply)
+
+
+def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
+    """Return the serial numbers on the wire.
+
+    Parameters
+    ----------
+    sequence
+        Running number of the frame; wraps at 16 bits.
+    time_us
+        Device's time of its first row; wraps at 32 bits.
+    serials
+        Serial number of each place; '' for an empty one.
+
+    Returns
+    -------
+    bytes
+        The whole frame.
+    """
+    header = struct.pack('<cBHIBB', b'S', VERSION, sequence % 2**16, time_us % 2**32, 1, len(serials))
+    return _frame(header + ','.join(serials).encode('ascii'))
+
+
+def _frame(content: bytes) -> bytes:
+    return stuff(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
+
+
+def stuff(content: bytes) -> bytes:
+    """Return content in COBS: no zero byte, a length before every run."""
+    blocks = []
+    for run in content.split(b'\x00'):
+        full, rest = run[: len(run) // 254 * 254], run[len(run) // 254 * 254 :]
+        blocks += [b'\xff' + full[i : i + 254] for i in range(0, len(full), 254)]
+        blocks.append(bytes([len(rest) + 1]) + rest)
+    return b''.join(blocks)
+
+
+# --------------------
+# What goes wrong on the way: with bytes, and with whole frames.
+
+
+@dataclass(frozen=True)
+class ByteFaults:
+    """How likely each byte is to suffer."""
+
+    drop: float = param(0.0, 'Sets the probability that a byte is lost on the line.', low=0.0, high=1.0)
+    insert: float = param(0.0, 'Sets the probability that a random byte is inserted before a byte.', low=0.0, high=1.0)
+    flip: float = param(0.0, 'Sets the probability that one bit of a byte is changed.', low=0.0, high=1.0)
+
+    def apply(self, data: bytes, rng: np.random.Generator) -> bytes:
+        """Return what arrives of `data`."""
+        if not (self.drop or self.insert or self.flip):
+            return data
+        values = np.frombuffer(data, dtype=np.uint8).copy()
+        flipped = rng.random(len(values)) < self.flip
+        values[flipped] ^= np.uint8(1) << rng.integers(0, 8, flipped.sum(), dtype=np.uint8)
+        values = values[rng.random(len(values)) >= self.drop]
+        places = np.flatnonzero(rng.random(len(values)) < self.insert)
+        return np.insert(values, places, rng.integers(0, 256, len(places), dtype=np.uint8)).tobytes()
+
+
+@dataclass(frozen=True)
+class FrameFaults:
+    """Parameters of the faults that are injected in frames or packets."""
+
+    skip: float = param(0.0, 'Sets the probability that a frame is numbered and not sent.', low=0.0, high=1.0)
+    duplicate: float = param(0.0, 'Sets the probability that a frame is sent twice.', low=0.0, high=1.0)
+
+    def apply(self, frame: bytes, rng: np.random.Generator) -> bytes:
+        """Return what is sent of a frame."""
+        if rng.random() < self.skip:
+            return b''
+        return frame * 2 if rng.random() < self.duplicate else frame
+
+
+# --------------------
+# What the hub of PapillArrays puts on the wire, written from its protocol and not from the driver's code.
+#
+# Packet: 55 66 77 88, index, blocks, sum of the bytes since the start mark (u16), AA BB CC DD; little endian. The
+# index
+# is the size of an offset (u8), then type (u16) and offset of each block.
+
+PILLARS, QUANTITIES = 9, 6
+OFFSET_BYTES = 2
+MARK_BYTES = 4
+HUB, EACH_PILLAR, WHOLE = 1, 3, 4
+
+
+class PapillArrayEncoder:
+    """Make the packets of a hub.
+
+    Parameters
+    ----------
+    arrays
+        How many arrays it carries.
+    hub_type
+        Type of the block with counter and clock.
+    """
+
+    def __init__(self, arrays: int, hub_type: int = HUB) -> None:
+        self._arrays = arrays
+        blocks = {hub_type: bytes(12), EACH_PILLAR: self._pillars(), WHOLE: self._wholes()}
+        offset = 1 + len(blocks) * (2 + OFFSET_BYTES)
+        index, starts = bytes([OFFSET_BYTES]), {}
+        for kind, block in blocks.items():
+            starts[kind] = MARK_BYTES + offset
+            index += struct.pack('<HH', kind, offset)
+            offset += len(block)
+        content = b'\x55\x66\x77\x88' + index + b''.join(blocks.values()) + bytes(2) + b'\xaa\xbb\xcc\xdd'
+        self._template = np.frombuffer(content, dtype=np.uint8)
+        self._hub = starts[hub_type]
+        self._pillar_columns = self._columns(starts[EACH_PILLAR] + 2 + arrays * OFFSET_BYTES, PILLARS)
+        self._whole_columns = self._columns(starts[WHOLE] + 2 + arrays * OFFSET_BYTES, 0)
+
+    def packets(self, counter: int, times_us: Array, pillars: Array) -> Iterator[bytes]:
+        """Yield the packets of consecutive measurements.
+
+        Parameters
+        ----------
+        counter
+            Number of the first packet; wraps at 32 bits.
+        times_us : (n,)
+            The hub's clock.
+        pillars : (n, n_arrays, 9, 6)
+            Forces (N) and displacements (mm) along x, y, z of each pillar.
+
+        Returns
+        -------
+        iterator of bytes
+            A packet for each measurement.
+        """
+        count = len(pillars)
+        rows = np.tile(self._template, (count, 1))
+        numbers = (counter + np.arange(count)).astype('<u4')
+        rows[:, self._hub : self._hub + 4] = numbers[:, None].view(np.uint8)
+        rows[:, self._hub + 4 : self._hub + 12] = times_us.astype('<u8')[:, None].view(np.uint8)
+        wholes = np.zeros((count, self._arrays, QUANTITIES))
+        wholes[..., :3] = pillars[..., :3].sum(axis=2)
+        for columns, values in ((self._pillar_columns, pillars), (self._whole_columns, wholes)):
+            rows[:, columns] = np.ascontiguousarray(values, dtype='<f4').reshape(count, -1).view(np.uint8)
+        sums = rows[:, MARK_BYTES : -MARK_BYTES - 2].sum(axis=1, dtype=np.uint64) % 2**16
+        rows[:, -MARK_BYTES - 2 : -MARK_BYTES] = sums.astype('<u2')[:, None].view(np.uint8)
+        for row in rows:
+            yield row.tobytes()
+
+    def _pillars(self) -> bytes:
+        pillar = struct.pack('<H', 2) + bytes(4 * QUANTITIES)
+        array = struct.pack('<H', PILLARS) + bytes(PILLARS * OFFSET_BYTES) + pillar * PILLARS
+        return struct.pack('<H', self._arrays) + bytes(self._arrays * OFFSET_BYTES) + array * self._arrays
+
+    def _wholes(self) -> bytes:
+        whole = struct.pack('<H', 2) + bytes(4 * QUANTITIES)
+        return struct.pack('<H', self._arrays) + bytes(self._arrays * OFFSET_BYTES) + whole * self._arrays
+
+    def _columns(self, at: int, pillars: int) -> NDArray[np.intp]:
+        """Return where the values stand: of each pillar of each array, or of each whole array if there are none."""
+        columns = []
+        for _ in range(self._arrays):
+            at += 2 + pillars * OFFSET_BYTES if pillars else 0
+            for _ in range(max(1, pillars)):
+                columns.append(at + 2 + np.arange(4 * QUANTITIES))
+                at += 2 + 4 * QUANTITIES
+        return np.concatenate(columns)
+
+
+# --------------------
+# A serial device made of a pseudo-terminal, behind a symbolic link, that can be unplugged.
+
+
+class PtyPort:
+    """The device's end of a pseudo-terminal; `link` leads to the other end, whatever its name is this time.
+
+    Writing never waits: what does not fit the kernel's buffer (about 14 kB) is dropped and counted, as a device does
+    when nobody reads it.
+    """
+
+    def __init__(self, link: Path) -> None:
+        self.link = link
+        self.dropped_bytes = 0
+        self._ends: tuple[int, int] | None = None
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the device is there."""
+        return self._ends is not None
+
+    def plug(self) -> None:
+        """Make the device appear under a new name, and lead the link there.
+
+        Raises
+        ------
+        DeviceError
+            If the link cannot be made.
+        """
+        if self._ends is not None:
+            return
+        device_end, host_end = os.openpty()
+        tty.setraw(host_end)
+        os.set_blocking(device_end, False)
+        self._ends = (device_end, host_end)  # the host end stays open here, or reading fails while no driver is there
+        try:
+            _point_link(self.link, os.ttyname(host_end))
+        except OSError as error:
+            self.unplug()
+            raise DeviceError(
+                f"the link '{self.link}' to the emulated device cannot be made: {error}; choose a path in a folder "
+                'that you may write to, where no other file stands'
+            ) from error
+
+    def unplug(self) -> None:
+        """Make the device vanish, link and all; whoever has it open gets an error."""
+        if self._ends is None:
+            return
+        name = os.ttyname(self._ends[1])
+        for end in self._ends:
+            os.close(end)
+        self._ends = None
+        with contextlib.suppress(OSError):
+            if self.link.readlink() == Path(name):
+                self.link.unlink()
+
+    def read(self) -> bytes:
+        """Return what the host has sent."""
+        if self._ends is None:
+            return b''
+        try:
+            return os.read(self._ends[0], 4096)
+        except BlockingIOError:
+            return b''
+
+    def write(self, data: bytes) -> None:
+        """Send what fits."""
+        if self._ends is None or not data:
+            return
+        try:
+            sent = os.write(self._ends[0], data)
+        except BlockingIOError:
+            sent = 0
+        self.dropped_bytes += len(data) - sent
+
+
+def _point_link(link: Path, target: str) -> None:
+    """Make or change a symbolic link at once, so that it is never missing; a file that is no link is left alone."""
+    link.parent.mkdir(parents=True, exist_ok=True)
+    if link.exists() and not link.is_symlink():
+        raise FileExistsError(f'there is a file that is no link at {link}')
+    passing = link.with_name(f'{link.name}.{os.getpid()}')
+    passing.symlink_to(target)
+    passing.replace(link)
+
+
+# --------------------
+# What all emulated sensor devices have in common: they can be plugged, and the same can go wrong with them.
+
+
+class EmulatedDevice:
+    """An emulated device on a pseudo-terminal.
+
+    It has no clock of its own: each kind is given the samples, and a caller of another pace than nominal makes it a
+    device whose clock drifts.
+
+    Parameters
+    ----------
+    link
+        Symbolic link that leads to the device; this is the path for the driver.
+    rng
+        Randomness of the faults.
+    """
+
+    def __init__(self, link: Path, rng: np.random.Generator) -> None:
+        self.faults = ByteFaults()  # bytes lost, added, changed
+        self.frame_faults = FrameFaults()  # frames left out or sent twice
+        self.silent = False  # open but silent
+        self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
+        self.wrong_firmware = False  # sends what no driver knows
+        self._port = PtyPort(link)
+        self._rng = rng
+        self._held_back = b''
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the device is there."""
+        return self._port.plugged
+
+    @property
+    def streaming(self) -> bool:
+        """Whether it sends."""
+        return self.plugged and not self.silent
+
+    @property
+    def dropped_bytes(self) -> int:
+        """How many bytes nobody took."""
+        return self._port.dropped_bytes
+
+    def plug(self) -> None:
+        """Appear, under a new name, with clock and numbers at the beginning."""
+        self._port.plug()
+        self.reset()
+
+    def unplug(self) -> None:
+        """Vanish."""
+        self._port.unplug()
+
+    def reset(self) -> None:
+        """Begin clock and numbers again, as after a brown-out."""
+        self._held_back = b''
+
+    def _send(self, data: bytes) -> None:
+        if self.streaming:
+            self._held_back += data
+        if not self.stalled:
+            self._port.write(self.faults.apply(self._held_back, self._rng))
+            self._held_back = b''
+
+
+# --------------------
+# The board of an AnySkin on a pseudo-terminal, written from its protocol and not from the driver's code.
+#
+# Frame: of each magnetometer four float32, little endian: temperature (°C), x, y, z (µT); then CR LF.
+
+RATE_HZ = 100.0
+MAGNETOMETERS = 5
+TEMPERATURE_C = 31.25
+
+
+class EmulatedAnySkin(EmulatedDevice):
+    """An emulated board: `sample` it at its pace; it sends from the moment it is plugged in. See `EmulatedDevice`."""
+
+    def sample(self, field_ut: Array) -> None:
+        """Measure and send.
+
+        Parameters
+        ----------
+        field_ut : (n_frames, 15)
+            Field along x, y, z of each magnetometer.
+        """
+        frames = encode(field_ut[:, 3:] if self.wrong_firmware else field_ut)  # a board with fewer magnetometers
+        if self.frame_faults != FrameFaults():
+            frames = (self.frame_faults.apply(frame, self._rng) for frame in frames)
+        self._send(b''.join(frames))
+
+    def skip(self, frames: int) -> None:
+        """Let time pass without sending: the board does not number its frames."""
+
+
+def encode(field_ut: Array, temperature_c: float = TEMPERATURE_C) -> Iterator[bytes]:
+    """Yield the frames of consecutive measurements.
+
+    Parameters
+    ----------
+    field_ut : (n_frames, 3 · n_magnetometers)
+        Field along x, y, z of each magnetometer.
+    temperature_c
+        Temperature that all magnetometers report.
+    """
+    values = np.full((len(field_ut), field_ut.shape[1] // 3, 4), temperature_c, dtype='<f4')
+    values[..., 1:] = field_ut.reshape(*values.shape[:2], 3)
+    for row in values:
+        yield row.tobytes() + b'\r\n'
+
+
+# --------------------
+# A bridge with a board of BioTacs on a pseudo-terminal: streams what it is given.
+
+SLOT_US = 1e6 / 4400
+FRAMES_PER_SERIALS = 100
+WRONG_VERSION = 99
+
+
+@dataclass(frozen=True)
+class BoardFaults:
+    """What goes wrong before the bridge's check sum is made."""
+
+    flip: float = param(
+        0.0, 'Sets the probability that one bit of a byte on the SPI bus is changed.', low=0.0, high=1.0
+    )
+
+
+class EmulatedBioTac(EmulatedDevice):
+    """An emulated bridge: `advance` it by the frames that have been sampled.
+
+    Parameters
+    ----------
+    link, rng
+        See `EmulatedDevice`.
+    serials
+        Serial number of the BioTac at each place, '' where there is none.
+    """
+
+    def __init__(
+        self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
+    ) -> None:
+        super().__init__(link, rng)
+        self.board_faults = BoardFaults()
+        self._serials = serials
+        self._absent = [place for place, serial in enumerate(serials) if not serial]
+        self._frames = 0
+
+    def reset(self) -> None:
+        """Begin the sequence numbers and the clock again, as after a brown-out."""
+        super().reset()
+        self._frames = 0
+
+    def skip(self, frames: int) -> None:
+        """Let time pass without sending: frames are lost."""
+        self._frames += frames
+
+    def advance(self, values: Values) -> None:
+        """Sample some frames and send them.
+
+        Parameters
+        ----------
+        values : (n_frames, n_slots, n_fingers) counts, 0 to 4095
+        """
+        replies = self._disturb(encode_replies(values, self._absent))
+        self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True)))
+
+    def _sent(self, values: Values, reply: bytes) -> bytes:
+        """Return the bytes that one frame becomes."""
+        time_us = round(self._frames * len(values) * SLOT_US)
+        data = reply_frame(self._frames, time_us, values, reply, WRONG_VERSION if self.wrong_firmware else VERSION)
+        serials_sent, turn = divmod(self._frames, FRAMES_PER_SERIALS)
+        self._frames += 1
+        sent = self.frame_faults.apply(data, self._rng)
+        return sent if turn else serials_frame(serials_sent, time_us, self._serials) + sent
+
+    def _disturb(self, replies: Bytes) -> Bytes:
+        """Return replies with flipped bits."""
+        hit = self._rng.random(replies.shape) < self.board_faults.flip
+        bits = np.uint8(1) << self._rng.integers(0, 8, replies.shape, dtype=np.uint8)
+        return np.where(hit, replies ^ bits, replies)
+
+
+# --------------------
+# The hub of one or two PapillArrays on a pseudo-terminal: listens to commands, streams what it is given.
+
+SAMPLING_HZ = 1000.0  # of the pillars; a lower rate sends each second, fourth or tenth
+COMMAND = re.compile(rb'f(100|250|500|1000)\n|(z)\n')
+PAPILLARRAY_KEPT_BYTES = 5  # of an incomplete command
+USUAL_RATE_HZ = 100
+UNKNOWN_TYPE = 8  # of a block that no driver knows
+
+
+class EmulatedPapillArray(EmulatedDevice):
+    """An emulated hub: `sample` it 1000 times a second.
+
+    Parameters
+    ----------
+    link, rng
+        See `EmulatedDevice`.
+    arrays
+        How many it carries.
+    """
+
+    def __init__(self, link: Path, rng: np.random.Generator, arrays: int = 1) -> None:
+        super().__init__(link, rng)
+        self.rate_hz = USUAL_RATE_HZ
+        self.biases = 0  # how often the bias was set
+        self._encoder = PapillArrayEncoder(arrays)
+        self._unknown_encoder = PapillArrayEncoder(arrays, UNKNOWN_TYPE)
+        self._received = b''
+        self._bias: Array = np.zeros((arrays, PILLARS, QUANTITIES))
+        self._newest: Array = self._bias
+        self._clock_ms = self._sent = 0
+
+    def reset(self) -> None:
+        """Begin clock, numbers and bias again, as after a brown-out."""
+        super().reset()
+        self.rate_hz = USUAL_RATE_HZ
+        self._bias = np.zeros_like(self._bias)
+        self._clock_ms = self._sent = 0
+
+    def sample(self, pillars: Array) -> None:
+        """Let as many milliseconds pass as there are samples, and send those that the rate asks for.
+
+        Parameters
+        ----------
+        pillars : (n, n_arrays, 9, 6)
+            Forces (N) and displacements (mm) of each pillar.
+        """
+        self._execute(self._port.read())
+        self._newest = pillars[-1]
+        times_ms = self._clock_ms + np.arange(len(pillars))
+        due = times_ms % round(SAMPLING_HZ / self.rate_hz) == 0
+        if self.streaming and due.any():
+            self._send(self._packets(1000.0 * times_ms[due], pillars[due] - self._bias))
+        self._sent += int(due.sum())
+        self.skip(len(pillars))
+
+    def skip(self, milliseconds: int) -> None:
+        """Let time pass of which nothing is sent."""
+        self._clock_ms += milliseconds
+
+    def _packets(self, times_us: Array, pillars: Array) -> bytes:
+        encoder = self._unknown_encoder if self.wrong_firmware else self._encoder
+        packets = encoder.packets(self._sent, times_us, pillars)
+        if self.frame_faults == FrameFaults():
+            return b''.join(packets)
+        return b''.join(self.frame_faults.apply(packet, self._rng) for packet in packets)
+
+    def _execute(self, data: bytes) -> None:
+        received = self._received + data
+        end = 0
+        for command in COMMAND.finditer(received):
+            end = command.end()
+            if command.group(2):
+                self.biases += 1
+                self._bias = self._newest.copy()
+            else:
+                self.rate_hz = int(command.group(1))
+        self._received = received[end:][-PAPILLARRAY_KEPT_BYTES:]
+
+
+# --------------------
+# A microcontroller that streams samples over a pseudo-terminal, written from its protocol, not from the driver's
+# code.
+#
+# Frame: COBS(kind u8, version u8, sequence u16, time_us u32, rows u8, columns u8, rows × columns int16,
+# CRC-16/CCITT-FALSE u16), then a zero; little endian, numbered kind by kind, timed at the first row.
+
+Counts = NDArray[np.int16]
+MICROSECONDS = 1_000_000
+
+
+@dataclass(frozen=True)
+class SampledStream:
+    """One kind of frames that the device sends."""
+
+    kind: int
+    rate_hz: float
+    columns: int
+    rows: int  # in a frame
+
+
+class EmulatedSampler(EmulatedDevice):
+    """An emulated device: `advance` it by what has been sampled.
+
+    Parameters
+    ----------
+    link, rng
+        See `EmulatedDevice`.
+    streams
+        What it samples, by a name of our own.
+    start_us
+        Its clock when plugged in.
+    """
+
+    def __init__(
+        self, link: Path, rng: np.random.Generator, streams: Mapping[str, SampledStream], start_us: int = 0
+    ) -> None:
+        super().__init__(link, rng)
+        self._start_us = start_us
+        self._streams = streams
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin numbers and clock again, as after a brown-out."""
+        super().reset()
+        self._frames = dict.fromkeys(self._streams, 0)
+        self._waiting: dict[str, Counts] = {
+            name: np.empty((0, stream.columns), dtype=np.int16) for name, stream in self._streams.items()
+        }
+
+    def skip(self, duration_s: float) -> None:
+        """Let time pass without sending: whole frames are lost."""
+        for name, stream in self._streams.items():
+            self._frames[name] += round(duration_s * stream.rate_hz / stream.rows)
+
+    def advance(self, samples: Mapping[str, Counts]) -> None:
+        """Sample, and send what fills a frame.
+
+        Parameters
+        ----------
+        samples
+            Counts of each stream, (n_samples, n_columns).
+        """
+        data = b''
+        for name, counts in samples.items():
+            self._waiting[name] = np.concatenate([self._waiting[name], counts])
+            rows = self._streams[name].rows
+            while len(self._waiting[name]) >= rows:
+                data += self._sent(name, self._waiting[name][:rows])
+                self._waiting[name] = self._waiting[name][rows:]
+        self._send(data)
+
+    def _sent(self, name: str, counts: Counts) -> bytes:
+        """Return the bytes that one frame becomes."""
+        stream, number = self._streams[name], self._frames[name]
+        self._frames[name] += 1
+        time_us = self._start_us + round(number * stream.rows * MICROSECONDS / stream.rate_hz)
+        data = encode_samples(stream, number, time_us, counts, WRONG_VERSION if self.wrong_firmware else VERSION)
+        return self.frame_faults.apply(data, self._rng)
+
+
+def encode_samples(stream: SampledStream, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
+    """Return a frame on the wire; number and time wrap.
+
+    Parameters
+    ----------
+    stream
+        Kind of the frame.
+    number
+        Running number of the frame; wraps at 16 bits.
+    time_us
+        Device's time of its first row; wraps at 32 bits.
+    counts : (n_rows, n_columns)
+        Samples of the frame.
+    version
+        Version of the protocol.
+
+    Returns
+    -------
+    bytes
+        The whole frame.
+    """
+    rows, columns = counts.shape
+    content = struct.pack('<BBHIBB', stream.kind, version, number % 2**16, time_us % 2**32, rows, columns)
+    content += counts.astype('<i2').tobytes()
+    return stuff(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
+
+
+# --------------------
+# The converter of the data acquisition finger on a pseudo-terminal.
+
+STREAM = SampledStream(kind=0x01, rate_hz=2500.0, columns=8, rows=10)  # 250 frames of 174 bytes a second
+
+
+class EmulatedDaq(EmulatedSampler):
+    """Eight channels at 2.5 kHz; see `EmulatedSampler`."""
+
+    def __init__(
+        self, link: Path, rng: np.random.Generator, start_us: int = 0, rate_hz: float = STREAM.rate_hz
+    ) -> None:
+        super().__init__(link, rng, {'daq': replace(STREAM, rate_hz=rate_hz)}, start_us)
+
+    def sample(self, counts: Counts) -> None:
+        """Take samples, (n_samples, 8)."""
+        self.advance({'daq': counts})
+
+
+# --------------------
+# The microcontroller of the PVDF finger on a pseudo-terminal.
+
+FILM = SampledStream(kind=0x10, rate_hz=4096.0, columns=1, rows=32)  # 128 frames of 78 bytes a second
+FORCE = SampledStream(kind=0x11, rate_hz=64.0, columns=1, rows=1)  # 64 frames of 16 bytes a second
+
+
+class EmulatedPvdf(EmulatedSampler):
+    """Film at 4096 Hz and force at 64 Hz; see `EmulatedSampler`."""
+
+    def __init__(self, link: Path, rng: np.random.Generator, start_us: int = 0) -> None:
+        super().__init__(link, rng, {'film': FILM, 'force': FORCE}, start_us)
+
+    def sample(self, film: Counts, force: Counts) -> None:
+        """Take samples, (n_film,) and (n_force,)."""
+        self.advance({'film': film[:, None], 'force': force[:, None]})
+
+
+# --------------------
+# A sound card without hardware: ALSA's file plugin reads what is sampled from a pipe, PortAudio lists it as a card.
+#
+# It lives in user space: the environment variable `ALSA_CONFIG_PATH` names its configuration, in the process that
+# opens
+# it and before PortAudio is loaded there.
+
+# A write of this many bytes is read at once, or not at all; PortAudio asks for two blocks of 480 frames.
+FRAMES_AT_ONCE = 960
+SYSTEM_CONFIG = '/usr/share/alsa/alsa.conf'
+CONFIG = """pcm.{name} {{
+  type file
+  slave.pcm null
+  file /dev/null
+  infile "{pipe}"
+  format raw
+  hint {{ show on description "emulated sound card" }}
+}}
+"""
+
+
+class EmulatedSoundCard:
+    """A card that delivers, in its own time, what it is given.
+
+    Parameters
+    ----------
+    folder
+        Where its configuration and its pipe are made; must exist.
+    name
+        By which PortAudio knows it.
+    """
+
+    def __init__(self, folder: Path, name: str = 'emulated') -> None:
+        self.name = name
+        self.dropped_frames = 0  # nobody took them
+        pipe, config = folder / f'{name}.pipe', folder / f'{name}.conf'
+        os.mkfifo(pipe)
+        config.write_text(CONFIG.format(name=name, pipe=pipe))
+        self.environment = {'ALSA_CONFIG_PATH': f'{SYSTEM_CONFIG}:{config}'}
+        # Both ends are open here: listing the cards opens and closes the pipe, too, and must not end it.
+        self._pipe = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
+
+    def sample(self, counts: NDArray[np.int16]) -> None:
+        """Deliver 960 samples of the only channel.
+
+        Parameters
+        ----------
+        counts : (960,)
+            Samples; what nobody takes is dropped and counted.
+
+        Raises
+        ------
+        ValueError
+            If there are more or fewer.
+        """
+        if counts.shape != (FRAMES_AT_ONCE,):
+            raise ValueError(f'the samples have the shape {counts.shape}; ({FRAMES_AT_ONCE},) is delivered at once')
+        try:
+            os.write(self._pipe, counts.astype('<i2').tobytes())
+        except BlockingIOError:
+            self.dropped_frames += FRAMES_AT_ONCE
+
+    def drain(self) -> None:
+        """Throw away what nobody has taken, as a card does that is not open."""
+        try:
+            while os.read(self._pipe, 65536):
+                pass
+        except BlockingIOError:
+            return
+
+    def close(self) -> None:
+        """Close the pipe; who reads it gets nothing any more."""
+        os.close(self._pipe)
+
+
+# --------------------
+# What a TSF-85 puts on the wire, written from its protocol and not from the driver's code.
+#
+# Packets: `9A 00 58 length payload`; payload items big-endian, item byte = type | finger << 2. Firmware from 1.1.7 on
+# stamps with 64 bits and sends an image when there is a new one; older firmware stamps with 16 bits and repeats the
+# images every millisecond in packets of their own.
+
+Image = NDArray[np.uint16]
+
+TAXELS = 28
+FINGERS = 2
+RESTING_ACCELERATION = b'\x00\x00\x00\x00\x40\x00'  # 1 g along z at 16384 counts/g
+RESTING_ROTATION = bytes(6)
+
+
+class Tsf85Encoder:
+    """Make the packets of consecutive milliseconds; a finger that does not sense and the inertial sensors rest.
+
+    Parameters
+    ----------
+    finger
+        The finger that senses, 0 or 1.
+    long_stamps
+        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+    stamped
+        Whether there are stamps at all.
+    """
+
+    def __init__(self, finger: int = 0, long_stamps: bool = True, stamped: bool = True) -> None:
+        self._finger = finger
+        self._plugged = (True,) * FINGERS
+        self._long_stamps = long_stamps
+        self._stamped = stamped
+        self._stamp_type = '>u8' if long_stamps else '>u2'
+        self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
+        self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize) if stamped else slice(4, 4)
+
+    def plug(self, plugged: Sequence[bool]) -> None:
+        """Send items of the fingers that are plugged in alone, one flag a finger."""
+        self._plugged = tuple(plugged)
+        self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
+
+    def _resting_packet(self) -> bytes:
+        items = b'\x70' + bytes(8 if self._long_stamps else 2) if self._stamped else b''
+        for finger in self._present:
+            head = finger << 2
+            items += bytes([0x20 | head, 0, 0])
+            items += bytes([0x30 | head]) + RESTING_ACCELERATION + bytes([0x40 | head]) + RESTING_ROTATION
+        return bytes([0x9A, 0x00, 0x58, len(items)]) + items
+
+    def encode(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> bytes:
+        """Return the bytes of some milliseconds; see `packets`.
+
+        Parameters
+        ----------
+        first_ms
+            Device's clock at the first millisecond.
+        dynamic : (n,) or (n, 2)
+            Dynamic values, a row for each millisecond.
+        image : (n_taxels,) or (2, n_taxels)
+            Taxel image.
+        image_is_new
+            Whether the image changed since the last call.
+
+        Returns
+        -------
+        bytes
+            Packets one after the other.
+        """
+        return b''.join(self.packets(first_ms, dynamic, image, image_is_new))
+
+    def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:
+        """Yield the packets of some milliseconds.
+
+        Parameters
+        ----------
+        first_ms
+            The device's clock at the first of them.
+        dynamic : (n,) or (n, 2)
+            Of the finger that senses, or of both.
+        image : (n_taxels,) or (2, n_taxels)
+            The same.
+        image_is_new
+            Whether it has changed since the last call.
+
+        Yields
+        ------
+        bytes
+            One packet each.
+        """
+        rows = np.tile(self._template, (len(dynamic), 1))
+        stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
+        if self._stamped:
+            rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
+        for finger, counts in self._by_finger(dynamic.T):
+            at = self._stamp_at.stop + self._present.index(finger) * 17 + 1
+            rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
+        images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image)]
+        for number, row in enumerate(rows):
+            if not self._long_stamps or (image_is_new and number == 0):
+                yield from images
+            yield row.tobytes()
+
+    def _by_finger(self, values: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
+        """Yield finger and values of each that senses and is plugged in, (n,) or (2, n)."""
+        each = [(self._finger, values)] if values.ndim == 1 else enumerate(values)
+        yield from ((finger, row) for finger, row in each if self._plugged[finger])
+
+    @property
+    def _present(self) -> list[int]:
+        return [finger for finger, plugged in enumerate(self._plugged) if plugged]
+
+
+def _image_packet(finger: int, taxels: NDArray[Any]) -> bytes:
+    return bytes([0x9A, 0x00, 0x58, 1 + 2 * len(taxels), 0x10 | finger << 2]) + taxels.astype('>u2').tobytes()
+
+
+# --------------------
+# A TSF-85 on a pseudo-terminal: listens to commands, streams what it is given.
+
+AUTOSEND = re.compile(rb'\x9a.\x58\x01(.)', re.DOTALL)  # the last byte is the period in ms; 0 stops
+TSF85_KEPT_BYTES = 4  # of an incomplete command
+UNKNOWN_ITEM = b'\x80'  # no type that any firmware known sends
+
+
+class EmulatedTsf85(EmulatedDevice):
+    """An emulated sensor: `advance` it by the milliseconds that have passed.
+
+    Parameters
+    ----------
+    link, rng
+        See `EmulatedDevice`.
+    finger, long_stamps
+        See `Tsf85Encoder`.
+    """
+
+    def __init__(self, link: Path, rng: np.random.Generator, finger: int = 0, long_stamps: bool = True) -> None:
+        super().__init__(link, rng)
+        self.started = False
+        self.ignored_starts = 0  # so many start commands to come do not help, as after an unclean end
+        self._encoder = Tsf85Encoder(finger, long_stamps)
+        self._received = b''
+        self._clock_ms = 0
+        self._image: Image = np.zeros(TAXELS, dtype=np.uint16)
+        self._image_is_new = False
+
+    @property
+    def streaming(self) -> bool:
+        """Whether it sends."""
+        return super().streaming and self.started
+
+    def reset(self) -> None:
+        """Begin the clock again, silent until started, as after a brown-out."""
+        super().reset()
+        self._clock_ms = 0
+        self.started = False
+
+    def plug_fingers(self, plugged: Sequence[bool]) -> None:
+        """Pull the plugs of fingers, or plug them in again, one flag a finger; the hub stays on its line."""
+        self._encoder.plug(plugged)
+
+    def advance(self, dynamic: Counts, images: Image) -> None:
+        """Let as many milliseconds pass as there are dynamic values, and send them if started.
+
+        Parameters
+        ----------
+        dynamic : (n,) or (n, 2)
+        images : (n_images, n_taxels) or (n_images, 2, n_taxels)
+            New ones; the last is in force from the first of these milliseconds on.
+        """
+        self._execute(self._port.read())
+        if len(images):
+            self._image, self._image_is_new = images[-1], True
+        data = b''
+        if self.streaming:
+            data, self._image_is_new = self._sent(dynamic), False
+        self._send(data)
+        self.skip(len(dynamic))
+
+    def skip(self, milliseconds: int) -> None:
+        """Let time pass of which nothing is sent."""
+        self._clock_ms += milliseconds
+
+    def _sent(self, dynamic: Counts) -> bytes:
+        packets = self._encoder.packets(self._clock_ms, dynamic, self._image, self._image_is_new)
+        if self.wrong_firmware:
+            packets = (UNKNOWN_ITEM.join([packet[:4], packet[4:]]) for packet in packets)
+        if self.frame_faults == FrameFaults():
+            return b''.join(packets)
+        return b''.join(self.frame_faults.apply(packet, self._rng) for packet in packets)
+
+    def _execute(self, data: bytes) -> None:
+        received = self._received + data
+        for command in AUTOSEND.finditer(received):
+            is_start = command.group(1) != b'\x00'
+            self.started = is_start and not self.ignored_starts
+            self.ignored_starts -= is_start and self.ignored_starts > 0
+        self._received = received[-TSF85_KEPT_BYTES:] if data else self._received
+
+
+# --------------------
+# The emulated device of each sensor; a sensor without one reads no device.
+
+DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
+    'tsf85': EmulatedTsf85,
+    'tsf85_pair': EmulatedTsf85,
+    'tsf85_3x4': EmulatedTsf85,
+    'biotac': EmulatedBioTac,
+    'biotac_sp': EmulatedBioTac,
+    'biotac_hand': partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')),
+    'daq': EmulatedDaq,
+    'pvdf': EmulatedPvdf,
+    'anyskin': EmulatedAnySkin,
+    'papillarray': EmulatedPapillArray,
+    'papillarray_pair': partial(EmulatedPapillArray, arrays=2),
+}

@@ -1,0 +1,1677 @@
+"""A UR controller emulated at the wire: RTDE, dashboard, program, and a robot in contact."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import enum
+import itertools
+import math
+import os
+import re
+import selectors
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from texture_core.config import from_mapping, param, parameters_of
+from texture_core.errors import DeviceError, TextureError
+from texture_core.types import Array, FingerSender, FingerState, rotation_matrix
+
+# --------------------
+# What moves the emulated robot: each motion says which velocity comes next.
+#
+# Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched:
+# rotation
+# vectors change component by component, and 1 rad counts as 1 m.
+
+
+class RobotMove(Protocol):
+    """One motion of the robot; `done` when it will not move any further by itself."""
+
+    done: bool
+
+    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
+        """Return the velocity of the next step, (6,).
+
+        Parameters
+        ----------
+        pose : (6,)
+            Place of the tool in m and rotation vector in rad.
+        velocity : (6,)
+            m/s and rad/s.
+        step_s
+            Length of the step.
+
+        Returns
+        -------
+        (6,)
+            m/s and rad/s.
+        """
+
+
+class StopMove:
+    """Lose speed (stopl)."""
+
+    def __init__(self, deceleration: float) -> None:
+        self.done = False
+        self._deceleration = deceleration
+
+    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
+        """Slow down."""
+        slower = approach(velocity, np.zeros(6), self._deceleration * step_s)
+        self.done = not slower.any()
+        return slower
+
+
+class SpeedMove:
+    """Gain a velocity and keep it (speedl)."""
+
+    def __init__(self, wanted: Array, acceleration: float) -> None:
+        self.done = False
+        self._wanted = wanted
+        self._acceleration = acceleration
+
+    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
+        """Go towards the wanted velocity."""
+        return approach(velocity, self._wanted, self._acceleration * step_s)
+
+
+class LinearMove:
+    """Go to a pose on a straight line, speeding up and slowing down (movel)."""
+
+    def __init__(self, goal: Array, speed: float, acceleration: float) -> None:
+        self.done = False
+        self.goal = goal
+        self._speed = speed
+        self._acceleration = acceleration
+
+    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
+        """Go on; the last step lands on the goal."""
+        if self.done:
+            return np.zeros(6)
+        offset = self.goal - pose
+        distance = math.sqrt(offset @ offset)
+        faster = math.sqrt(velocity @ velocity) + self._acceleration * step_s
+        speed = min(self._speed, faster, math.sqrt(2 * self._acceleration * distance))
+        if speed * step_s >= distance:
+            self.done = True
+            speed = distance / step_s
+        return speed / distance * offset if distance > 0 else np.zeros(6)
+
+
+class ServoMove:
+    """Follow a pose that is moved all the time (servoj of the pose): approach it within the look-ahead time."""
+
+    def __init__(self, goal: Array, lookahead_s: float) -> None:
+        self.done = False
+        self._goal = goal
+        self._lookahead_s = lookahead_s
+
+    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
+        """Take the share of the way that the step has in the look-ahead time."""
+        follow: Array = (self._goal - pose) * -math.expm1(-step_s / self._lookahead_s) / step_s
+        return follow
+
+
+def approach(now: Array, wanted: Array, step: float) -> Array:
+    """Return `now` led towards `wanted` by at most `step`.
+
+    Parameters
+    ----------
+    now, wanted : (n,)
+        In one unit.
+    step
+        Largest change of their distance, in that unit.
+
+    Returns
+    -------
+    (n,)
+    """
+    offset = wanted - now
+    distance = math.sqrt(offset @ offset)
+    return wanted if distance <= step else now + step / distance * offset
+
+
+# --------------------
+# The registers through which a program on the controller and the world outside talk.
+
+COUNT = 48
+
+
+class Registers:
+    """Input and output registers of integers and doubles.
+
+    `last_command_s` is when the command register last came, and `excused_s` how much of the silence since then the
+    client is not charged with.
+    """
+
+    def __init__(self) -> None:
+        self.int_in = np.zeros(COUNT, dtype=np.int64)
+        self.double_in = np.zeros(COUNT)
+        self.int_out = np.zeros(COUNT, dtype=np.int64)
+        self.double_out = np.zeros(COUNT)
+        self.last_command_s = 0.0
+        self.excused_s = 0.0
+
+    def heard(self, time_s: float) -> None:
+        """Take note that the command register came."""
+        self.last_command_s, self.excused_s = time_s, 0.0
+
+    def from_first(self, first: int) -> Registers:
+        """Return the registers from a first one on, counted from there: what is written to them is written here."""
+        shifted = Registers()
+        for name in ('int_in', 'double_in', 'int_out', 'double_out'):
+            setattr(shifted, name, getattr(self, name)[first:])
+        return shifted
+
+
+# --------------------
+# Facts about UR controllers and about the control script of ur-rtde.
+#
+# Sources: the RTDE and dashboard guides of Universal Robots; the source of ur-rtde 1.6.5.
+
+RTDE_PORT = 30004
+DASHBOARD_PORT = 29999
+SCRIPT_PORT = 30003
+
+
+@dataclass(frozen=True)
+class ControllerVersion:
+    """What depends on the version of the control software."""
+
+    numbers: tuple[int, int, int, int]
+    rate_hz: float
+    dashboard: bool  # PolyScope X, version 10, has none
+
+
+VERSIONS: Mapping[str, ControllerVersion] = {
+    '3.15': ControllerVersion((3, 15, 8, 0), 125.0, True),
+    '5.12': ControllerVersion((5, 12, 0, 0), 500.0, True),
+    '5.23': ControllerVersion((5, 23, 0, 0), 500.0, True),
+    '10.10': ControllerVersion((10, 10, 0, 0), 500.0, False),
+}
+
+
+class RtdeMessage(enum.IntEnum):
+    """Types of RTDE messages."""
+
+    REQUEST_VERSION = 86
+    CONTROLLER_VERSION = 118
+    TEXT = 77
+    DATA = 85
+    SETUP_OUTPUTS = 79
+    SETUP_INPUTS = 73
+    START = 83
+    PAUSE = 80
+
+
+# RTDE type -> format of `struct`, big-endian
+FORMATS: Mapping[str, str] = {
+    'BOOL': 'B',
+    'UINT8': 'B',
+    'UINT32': 'I',
+    'UINT64': 'Q',
+    'INT32': 'i',
+    'DOUBLE': 'd',
+    'VECTOR3D': '3d',
+    'VECTOR6D': '6d',
+    'VECTOR6INT32': '6i',
+    'VECTOR6UINT32': '6I',
+}
+
+
+class SafetyMode(enum.IntEnum):
+    """RTDE variable safety_mode."""
+
+    NORMAL = 1
+    PROTECTIVE_STOP = 3
+
+
+SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2}
+SAFETY_NAMES: Mapping[SafetyMode, str] = {SafetyMode.NORMAL: 'NORMAL', SafetyMode.PROTECTIVE_STOP: 'PROTECTIVE_STOP'}
+ROBOT_RUNNING = 7  # robot_mode
+PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
+COMMAND_REGISTERS = (0, 24)  # input_int registers of the control script: of the lower range, of the upper one
+CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
+POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
+
+
+class ScriptCommand(enum.IntEnum):
+    """Numbers in input_int_register_0 that the control script obeys."""
+
+    NONE = 0
+    MOVE_L = 3
+    FORCE_MODE = 6
+    FORCE_MODE_STOP = 7
+    ZERO_FT_SENSOR = 8
+    SPEED_L = 10
+    SPEED_STOP = 15
+    SERVO_STOP = 16
+    SERVO_L = 24
+    TOOL_CONTACT = 25
+    GET_STEPTIME = 26
+    GET_TARGET_WAYPOINT = 28
+    PROTECTIVE_STOP = 31
+    STOP_L = 33
+    SET_WATCHDOG = 35
+    IS_POSE_WITHIN_SAFETY_LIMITS = 36
+    IS_STEADY = 47
+    MOVE_UNTIL_CONTACT = 51
+    START_CONTACT_DETECTION = 62
+    STOP_CONTACT_DETECTION = 63
+    READ_CONTACT_DETECTION = 64
+    STOP_SCRIPT = 255
+
+
+# The script processes these in every cycle and stays ready; the client does not wait for them.
+REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+# What the robot does for some time; a real controller may acknowledge it late.
+SLOW = frozenset(
+    {ScriptCommand.SPEED_STOP, ScriptCommand.FORCE_MODE_STOP, ScriptCommand.ZERO_FT_SENSOR, ScriptCommand.STOP_L}
+)
+READY, DONE = 1, 2  # output_int_register_0
+
+
+# --------------------
+# What can be chosen about the emulated controller.
+
+
+@dataclass(frozen=True)
+class UrControllerParams:
+    """The emulated controller, its robot and the surface under the finger."""
+
+    ip: str = param('127.0.0.2', 'Sets the loopback address to listen on; the ports of a UR controller are fixed.')
+    version: str = param('5.12', 'Sets the version of the emulated control software.', choices=tuple(VERSIONS))
+    finger_port: int = param(
+        0,
+        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
+    start_height_m: float = param(
+        0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0
+    )
+    surface_x_m: float = param(0.4, 'Sets the x coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_y_m: float = param(0.0, 'Sets the y coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_z_m: float = param(0.1, 'Sets the z coordinate of the centre of the surface in the base frame.', unit='m')
+    slope_x: float = param(0.0, 'Sets the rise of the surface along x, in metres per metre.', low=-1.0, high=1.0)
+    slope_y: float = param(0.0, 'Sets the rise of the surface along y, in metres per metre.', low=-1.0, high=1.0)
+    bump_height_m: float = param(
+        0.0,
+        'Sets the height of a bump at the centre of the surface; 0 removes the bump.',
+        unit='m',
+        low=-0.05,
+        high=0.05,
+    )
+    bump_width_m: float = param(
+        0.02,
+        'Sets the standard deviation of the Gaussian shape of the bump; a larger value is flatter.',
+        unit='m',
+        low=0.001,
+        high=1.0,
+    )
+    stiffness_n_m: float = param(
+        2000.0,
+        'Sets the stiffness of finger and surface in contact; 0 removes the surface.',
+        unit='N/m',
+        low=0.0,
+        high=20000.0,
+    )
+    friction: float = param(
+        0.5, 'Sets the coefficient of Coulomb friction; a larger value drags the finger more.', low=0.0, high=3.0
+    )
+    wall_m: float = param(
+        2.0,
+        'Sets the x coordinate of a wall across the way of the finger, from the centre of the surface.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    wall_stiffness_n_m: float = param(
+        20000.0, 'Sets the stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0
+    )
+    force_offset_n: float = param(1.5, 'Sets the offset of the force sensor until it is zeroed.', unit='N')
+    force_noise_n: float = param(
+        0.02, 'Sets the standard deviation of the noise of the force sensor.', unit='N', low=0.0
+    )
+    stop_force_n: float = param(
+        100.0, 'Sets the force above which the controller goes into a protective stop.', unit='N', low=1.0
+    )
+    unlock_delay_s: float = param(
+        5.0, 'Sets how long a protective stop cannot be unlocked after it occurred.', unit='s', low=0.0, high=60.0
+    )
+    seed: int = param(1, 'Sets the seed of the noise; equal seeds give equal noise.', low=0)
+
+
+# --------------------
+# The surface under the robot's finger: a plane that may slope and have a bump, elastic and with friction; a wall.
+
+STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
+
+
+class ContactPlane:
+    """Contact force on a finger at a position and velocity, in the base frame of the robot.
+
+    Attributes
+    ----------
+    drop_m
+        The whole surface lies lower by this: set while the finger slides, the surface is lost as behind an edge.
+    friction
+        Coefficient of Coulomb friction: another sample has another one.
+    """
+
+    def __init__(self, params: UrControllerParams) -> None:
+        self._params = params
+        self.drop_m = 0.0
+        self.friction = params.friction
+        self.origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
+
+    def force_n(self, position_m: Array, velocity_m_s: Array) -> Array:
+        """Return the force of the surface on the finger.
+
+        Parameters
+        ----------
+        position_m, velocity_m_s : (3,)
+
+        Returns
+        -------
+        (3,)
+            Stiffness × depth along the normal, Coulomb friction against the movement, and the push of the wall.
+        """
+        behind_m = max(0.0, float(position_m[0] - self.origin[0]) - self._params.wall_m)
+        wall: Array = np.array([-self._params.wall_stiffness_n_m * behind_m, 0.0, 0.0])
+        depth, normal = self._depth_and_normal(position_m)
+        pressing = self._params.stiffness_n_m * max(0.0, depth)
+        if pressing == 0.0:
+            return wall
+        along = velocity_m_s - (velocity_m_s @ normal) * normal
+        speed = math.sqrt(along @ along)
+        force: Array = wall + pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
+        return force
+
+    def _depth_and_normal(self, position_m: Array) -> tuple[float, Array]:
+        params = self._params
+        x, y, z = position_m - self.origin
+        width = params.bump_width_m
+        bump = params.bump_height_m * math.exp(-(x * x + y * y) / (2 * width * width))
+        slope_x = params.slope_x - bump * x / (width * width)
+        slope_y = params.slope_y - bump * y / (width * width)
+        steepness = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+        height = params.slope_x * x + params.slope_y * y + bump - self.drop_m
+        normal = np.array([-slope_x, -slope_y, 1.0]) / steepness
+        return float(height - z) / steepness, normal
+
+
+# --------------------
+# The emulated controller as a process of its own, for demonstrations and tests.
+#
+# It cannot run in the process of its client: the constructors of ur-rtde hold Python's global lock until they are
+# answered.
+
+START_S = 20.0
+ANSWER_S = 10.0
+
+
+class ControllerProcess:
+    """Runs from `start` to `stop`, or as a context."""
+
+    def __init__(self, params: UrControllerParams) -> None:
+        self.params = params
+        self._process: subprocess.Popen[str] | None = None
+
+    def __enter__(self) -> ControllerProcess:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Return when its ports are open.
+
+        Raises
+        ------
+        DeviceError
+            If they cannot be opened.
+        """
+        options = [f'--{name.replace("_", "-")}={value}' for name, value in dataclasses.asdict(self.params).items()]
+        command = [sys.executable, '-m', 'texture_simulation.devices.ur', *options]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        if not self._ready(self._process):
+            self._process.kill()
+            _, stderr = self._process.communicate()
+            raise DeviceError(stderr.strip() or 'the emulated UR controller did not start')
+
+    @property
+    def running(self) -> bool:
+        """Whether it is there."""
+        return self._process is not None and self._process.poll() is None
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        assert self._process is not None
+        return self._process.pid
+
+    def freeze(self) -> None:
+        """Let it hang."""
+        os.kill(self.pid, signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Let it go on."""
+        os.kill(self.pid, signal.SIGCONT)
+
+    def stop(self) -> None:
+        """Kill it; may be called twice."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
+
+    def ask(self, line: str) -> str:
+        """Return the answer of its dashboard."""
+        with socket.create_connection((self.params.ip, DASHBOARD_PORT), ANSWER_S) as connection:
+            lines = connection.makefile('rw', encoding='utf-8')
+            lines.readline()  # the banner
+            lines.write(line + '\n')
+            lines.flush()
+            return lines.readline().strip()
+
+    @staticmethod
+    def _ready(process: subprocess.Popen[str]) -> bool:
+        assert process.stdout is not None
+        with selectors.DefaultSelector() as selector:
+            selector.register(process.stdout, selectors.EVENT_READ)
+            return bool(selector.select(START_S)) and process.stdout.readline() == 'ready\n'
+
+
+# --------------------
+# The emulated robot: a finger that follows motions exactly, complies under force control, and measures forces.
+
+# Force control of the emulated robot: speed per force error, and the lag of the arm behind it. With 2 kN/m the error
+# fades in about 0.1 s, which is of the order of a real arm's.
+ADMITTANCE_M_S_N = 0.01
+LAG_S = 0.01
+HALT = 20.0  # deceleration of a protective stop, m/s²
+# The sensor drifts apart on all axes when it is not zeroed.
+OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class ForceMode:
+    """Which axes of a frame yield (selection, (6,)), to which wrench, and how fast at most; see force_mode in URScript.
+
+    `axes` is (3, 3), the axes of the frame as columns, in the base frame. The wrench is what the robot does to its
+    surroundings.
+    """
+
+    axes: Array
+    selection: Array
+    wrench: Array
+    limits: Array
+
+
+class EmulatedRobot:
+    """Physics of the robot, step by step.
+
+    Attributes
+    ----------
+    pose, velocity, force : (6,)
+        Of the fingertip in the base frame: m and rad, m/s, N. The force is that of the surroundings on the robot, as
+        the sensor shows it, with offset and noise.
+    motion, force_mode
+        What moves it; set from outside.
+    touched_at : (6,)
+        Where the last contact began.
+    speed_share
+        Position of the speed slider on the pendant, 0 to 1; the force mode does not obey it.
+    """
+
+    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
+        self.surface = ContactPlane(params)
+        x, y, z = self.surface.origin
+        self.pose: Array = np.array([x, y, z + params.start_height_m, 0.0, 0.0, 0.0])
+        self.velocity: Array = np.zeros(6)
+        self.speed_share = 1.0
+        self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
+        self.force: Array = np.zeros(6)
+        self.motion: RobotMove = StopMove(HALT)
+        self.force_mode: ForceMode | None = None
+        self.touched_at = self.pose
+        self._offset: Array = params.force_offset_n * OFFSET_DIRECTION
+        self._noise_n = params.force_noise_n
+        self._rng = rng
+        self._contact: Array = np.zeros(3)
+        self._compliant_m_s: Array = np.zeros(3)  # speed of the yielding axes in the frame of the force mode
+
+    @property
+    def pressing_n(self) -> float:
+        """The true force of the surface on the finger, along the vertical."""
+        return float(self._contact[2])
+
+    def step(self, step_s: float) -> None:
+        """Move for one step."""
+        led = velocity = self.motion.velocity(self.pose, self._unslowed, step_s)
+        if self.force_mode is not None:
+            velocity = self._comply(velocity, self.force_mode, step_s)
+            led = _stiff(led, self.force_mode)
+        self._unslowed = velocity
+        velocity = velocity - (1.0 - self.speed_share) * led
+        self.velocity = velocity
+        self.pose = self.pose + velocity * step_s
+        touched = self._contact.any()
+        self._contact = self.surface.force_n(self.pose[:3], velocity[:3])
+        if not touched and self._contact.any():
+            self.touched_at = self.pose
+        self.force = self._offset + self._noise_n * self._rng.standard_normal(6)
+        self.force[:3] += self._contact
+
+    def zero_force(self) -> None:
+        """Take what the sensor shows for nothing from now on."""
+        self._offset = np.zeros(6)
+        self._offset[:3] = -self._contact
+
+    def touches(self, direction: Array, threshold_n: float) -> bool:
+        """Return whether a force against a direction, (3,), is measured; a direction of 0 means any.
+
+        Parameters
+        ----------
+        direction : (3,)
+            Direction of the movement; 0 for any.
+        threshold_n
+            Force from which on it counts.
+        """
+        force = self.force[:3]
+        length = math.sqrt(direction @ direction)
+        against = math.sqrt(force @ force) if length == 0 else -(force @ direction) / length
+        return float(against) > threshold_n
+
+    def end_force_mode(self) -> None:
+        """Yield no longer."""
+        self.force_mode = None
+        self._compliant_m_s = np.zeros(3)
+
+    def halt(self) -> None:
+        """Stop hard, whatever it was doing."""
+        self.end_force_mode()
+        self.motion = StopMove(HALT)
+
+    def _comply(self, velocity: Array, mode: ForceMode, step_s: float) -> Array:
+        """Replace the velocity along yielding axes by one that brings the force to what is wanted."""
+        error = mode.wrench[:3] + mode.axes.T @ self.force[:3]
+        wanted = np.clip(ADMITTANCE_M_S_N * error, -mode.limits[:3], mode.limits[:3])
+        self._compliant_m_s = self._compliant_m_s - (wanted - self._compliant_m_s) * math.expm1(-step_s / LAG_S)
+        along = mode.axes.T @ velocity[:3]
+        along = np.where(mode.selection[:3] > 0, self._compliant_m_s, along)
+        turning = np.where(mode.selection[3:] > 0, 0.0, velocity[3:])
+        return np.concatenate([mode.axes @ along, turning])
+
+
+def _stiff(velocity: Array, mode: ForceMode) -> Array:
+    """Return the part of a velocity along the axes that do not yield, (6,)."""
+    along = np.where(mode.selection[:3] > 0, 0.0, mode.axes.T @ velocity[:3])
+    return np.concatenate([mode.axes @ along, velocity[3:]])
+
+
+# --------------------
+# What the control script of ur-rtde does on the controller, without being URScript.
+#
+# The script looks at its command register, input_int_register_0 or 24, once per cycle. Realtime commands are obeyed
+# in
+# every cycle in which they stand there; others once, until the client has written 0 in between. A command that is
+# overwritten within a cycle is lost, as on the real controller.
+
+CONTACT_N = 3.0  # what tool_contact takes for a contact
+RETRACT_STOP = 3.0  # m/s², as in the script
+RETRACT_SPEED, RETRACT_ACCELERATION = 0.25, 1.2  # defaults of movel
+FORCE_MODE_STOP = 10.0  # m/s², as in the script
+RUNNING_BIT = 1 << 15
+COUNTER_SIZE = 128
+
+
+class Host(Protocol):
+    """What the program asks of the controller that runs it."""
+
+    def set_watchdog(self, min_frequency_hz: float) -> None:
+        """Stop the program when its command register comes less often."""
+
+    def protective_stop(self) -> None:
+        """Stop hard."""
+
+    @property
+    def acknowledge_s(self) -> float:
+        """So much later than it is done a stop, the end of force control or a zeroing is acknowledged."""
+
+
+Steps = Iterator[None]
+
+
+class ControlProgram:
+    """The running script; `cycles` is advanced once per cycle of the controller and ends with the script."""
+
+    def __init__(self, robot: EmulatedRobot, registers: Registers, host: Host, step_s: float) -> None:
+        self._robot = robot
+        self._registers = registers
+        self._host = host
+        self._step_s = step_s
+        self._goal = robot.pose
+        self._operation: LinearMove | StopMove | None = None  # what runs without the script waiting for it
+        self._operations = 0
+        self._writes = 0
+        self._contact_direction: Array | None = None
+        self._contact_seen = False
+        self._unknown: set[int] = set()
+
+    def cycles(self) -> Steps:
+        """Obey until told to end; one item per cycle."""
+        registers = self._registers
+        executed = False
+        self._report_progress(False)
+        registers.int_out[0] = READY
+        while (number := int(registers.int_in[0])) != ScriptCommand.STOP_SCRIPT:
+            if number in REALTIME:
+                yield from self._execute(number)
+                registers.int_out[0] = READY
+            elif number == ScriptCommand.NONE:
+                executed = False
+                registers.int_out[0] = READY
+            elif not executed:
+                yield from self._execute(number)
+                if number in SLOW:
+                    yield from self._wait(self._host.acknowledge_s)
+                registers.int_out[0] = DONE
+                executed = True
+            yield from self._check_background()
+            yield
+
+    def _wait(self, seconds: float) -> Steps:
+        for _ in range(round(seconds / self._step_s)):
+            yield
+
+    def _execute(self, number: int) -> Steps:
+        handler = COMMANDS.get(number)
+        if handler is None:
+            if number not in self._unknown:
+                self._unknown.add(number)
+                print(f'emulated UR controller: command {number} does nothing here', file=sys.stderr)
+            return
+        steps = handler(self)
+        if steps is not None:
+            yield from steps
+
+    def _check_background(self) -> Steps:
+        """Notice the end of an operation in the background, and contacts."""
+        if self._operation is not None and self._operation.done:
+            self._operation = None
+            self._report_progress(False)
+        direction = self._contact_direction
+        if direction is not None and self._robot.touches(direction, CONTACT_N):
+            self._contact_direction = None
+            self._contact_seen = True
+            yield from self._retract()
+
+    def _vector(self, start: int) -> Array:
+        return np.array(self._registers.double_in[start : start + 6])
+
+    def _run(self, motion: LinearMove | StopMove, in_background: bool) -> Steps:
+        self._robot.motion = motion
+        if self._operation is not None:
+            self._operation = None
+            self._report_progress(False)
+        if in_background:
+            self._operations = (self._operations + 1) % COUNTER_SIZE
+            self._operation = motion
+            self._report_progress(True)
+            return
+        while not motion.done:
+            yield
+
+    def _report_progress(self, running: bool) -> None:
+        self._writes = (self._writes + 1) % COUNTER_SIZE
+        word = self._operations << 24 | self._writes << 16 | (RUNNING_BIT if running else 0)
+        self._registers.int_out[2] = word
+
+    def _retract(self) -> Steps:
+        """Stop, and go back to where the contact began."""
+        yield from self._run(StopMove(RETRACT_STOP), False)
+        yield from self._run(LinearMove(self._robot.touched_at, RETRACT_SPEED, RETRACT_ACCELERATION), False)
+
+    def move_l(self) -> Steps:
+        """d0-5 pose, d6 speed, d7 acceleration, i1 in the background."""
+        self._goal = self._vector(0)
+        line = LinearMove(self._goal, *self._registers.double_in[6:8])
+        return self._run(line, self._registers.int_in[1] == 1)
+
+    def stop_l(self) -> Steps:
+        """d0 deceleration, i1 in the background."""
+        return self._run(StopMove(self._registers.double_in[0]), self._registers.int_in[1] == 1)
+
+    def speed_l(self) -> None:
+        """d0-5 velocity, d6 acceleration."""
+        self._robot.motion = SpeedMove(self._vector(0), self._registers.double_in[6])
+
+    def speed_stop(self) -> Steps:
+        """d0 deceleration."""
+        return self._run(StopMove(self._registers.double_in[0]), False)
+
+    def servo_l(self) -> None:
+        """d0-5 pose, d9 look-ahead time."""
+        self._robot.motion = ServoMove(self._vector(0), self._registers.double_in[9])
+
+    def force_mode(self) -> None:
+        """i1 type, i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; only type 2, the frame as it is."""
+        self._robot.force_mode = ForceMode(
+            axes=rotation_matrix(self._vector(0)[3:]),
+            selection=np.array(self._registers.int_in[2:8]),
+            wrench=self._vector(6),
+            limits=self._vector(12),
+        )
+
+    def force_mode_stop(self) -> Steps:
+        """End yielding, then stop. What speedl was told goes on afterwards: its thread lives."""
+        speeding = self._robot.motion
+        self._robot.end_force_mode()
+        yield from self._run(StopMove(FORCE_MODE_STOP), False)
+        if isinstance(speeding, SpeedMove):
+            self._robot.motion = speeding
+
+    def zero_ft_sensor(self) -> None:
+        """Take the present force for nothing."""
+        self._robot.zero_force()
+
+    def tool_contact(self) -> None:
+        """d0-5 direction; result i1: cycles since the contact, here 1 or 0."""
+        self._registers.int_out[1] = int(self._robot.touches(self._vector(0)[:3], CONTACT_N))
+
+    def get_steptime(self) -> None:
+        """Result d0."""
+        self._registers.double_out[0] = self._step_s
+
+    def get_target_waypoint(self) -> None:
+        """Result d0-5."""
+        self._registers.double_out[:6] = self._goal.tolist()
+
+    def protective_stop(self) -> None:
+        """Stop hard."""
+        self._host.protective_stop()
+
+    def set_watchdog(self) -> None:
+        """d0 lowest frequency."""
+        self._host.set_watchdog(self._registers.double_in[0])
+
+    def is_pose_within_safety_limits(self) -> None:
+        """Result i1: always, there are none here."""
+        self._registers.int_out[1] = 1
+
+    def is_steady(self) -> None:
+        """Result i1."""
+        self._registers.int_out[1] = int(not self._robot.velocity.any())
+
+    def move_until_contact(self) -> Steps:
+        """d0-5 velocity, d6-11 direction of the contact, d12 acceleration."""
+        direction = self._vector(6)[:3]
+        self._robot.motion = SpeedMove(self._vector(0), self._registers.double_in[12])
+        while not self._robot.touches(direction, CONTACT_N):
+            yield
+        yield from self._retract()
+
+    def start_contact_detection(self) -> None:
+        """d0-5 direction."""
+        self._contact_direction = self._vector(0)[:3]
+        self._contact_seen = False
+
+    def stop_contact_detection(self) -> None:
+        """Result i1: whether there was one."""
+        self._contact_direction = None
+        self.read_contact_detection()
+
+    def read_contact_detection(self) -> None:
+        """Result i1: whether there was one."""
+        self._registers.int_out[1] = int(self._contact_seen)
+
+
+COMMANDS: Mapping[int, Callable[[ControlProgram], Steps | None]] = {
+    ScriptCommand.MOVE_L: ControlProgram.move_l,
+    ScriptCommand.FORCE_MODE: ControlProgram.force_mode,
+    ScriptCommand.FORCE_MODE_STOP: ControlProgram.force_mode_stop,
+    ScriptCommand.ZERO_FT_SENSOR: ControlProgram.zero_ft_sensor,
+    ScriptCommand.SPEED_L: ControlProgram.speed_l,
+    ScriptCommand.SPEED_STOP: ControlProgram.speed_stop,
+    ScriptCommand.SERVO_STOP: ControlProgram.speed_stop,
+    ScriptCommand.SERVO_L: ControlProgram.servo_l,
+    ScriptCommand.TOOL_CONTACT: ControlProgram.tool_contact,
+    ScriptCommand.GET_STEPTIME: ControlProgram.get_steptime,
+    ScriptCommand.GET_TARGET_WAYPOINT: ControlProgram.get_target_waypoint,
+    ScriptCommand.PROTECTIVE_STOP: ControlProgram.protective_stop,
+    ScriptCommand.STOP_L: ControlProgram.stop_l,
+    ScriptCommand.SET_WATCHDOG: ControlProgram.set_watchdog,
+    ScriptCommand.IS_POSE_WITHIN_SAFETY_LIMITS: ControlProgram.is_pose_within_safety_limits,
+    ScriptCommand.IS_STEADY: ControlProgram.is_steady,
+    ScriptCommand.MOVE_UNTIL_CONTACT: ControlProgram.move_until_contact,
+    ScriptCommand.START_CONTACT_DETECTION: ControlProgram.start_contact_detection,
+    ScriptCommand.STOP_CONTACT_DETECTION: ControlProgram.stop_contact_detection,
+    ScriptCommand.READ_CONTACT_DETECTION: ControlProgram.read_contact_detection,
+}
+
+
+# --------------------
+# The emulated controller without its network: program, robot, safety, in steps of its own time.
+
+STARTING_S = 0.05  # between the upload of a program and its start
+STOP_DECELERATION = 5.0  # of a program that ends, m/s²
+ENDED = object()
+MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
+# So the control script of ur-rtde says it; the client puts the number behind a comment.
+FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
+
+
+class EmulatedController:
+    """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
+
+    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
+        self.version = VERSIONS[params.version]
+        self.step_s = 1.0 / self.version.rate_hz
+        self.ticks = 0
+        self.registers = Registers()
+        self.first_register = 0  # that the program uses
+        self.robot = EmulatedRobot(params, rng)
+        self.safety = SafetyMode.NORMAL
+        self.acknowledge_s = 0.0  # see `Host`; set from outside
+        self.program_name = CONTROL_SCRIPT  # of the one that runs, or ran last
+        self.loaded = ''  # name of the program that `play` starts
+        self.paused = False
+        self._params = params
+        self._starts_s: float | None = None  # when an uploaded program starts
+        self._program: Iterator[None] | None = None
+        self._watchdog_s = 0.0  # longest silence, 0: no watchdog
+        self._stopped_s = 0.0  # when the protective stop happened
+
+    @property
+    def time_s(self) -> float:
+        """Time since the controller was switched on."""
+        return self.ticks * self.step_s
+
+    @property
+    def playing(self) -> bool:
+        """Whether a program runs."""
+        return self._program is not None and not self.paused
+
+    def tick(self) -> None:
+        """Do one cycle."""
+        self.ticks += 1
+        if self._starts_s is not None and self.time_s >= self._starts_s:
+            self._start_program()
+        if self._watchdog_s and self.time_s - self.registers.last_command_s > self._watchdog_s:
+            self.stop_program()
+        if self._program is not None and not self.paused and next(self._program, ENDED) is ENDED:
+            self.stop_program()
+        self.robot.step(self.step_s)
+        if np.linalg.norm(self.robot.force[:3]) > self._params.stop_force_n:
+            self.protective_stop()
+
+    def catch_up(self) -> None:
+        """Do a cycle that should have been done before; it is not the client who was silent in it.
+
+        A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
+        """
+        registers = self.registers
+        if registers.excused_s < MAX_EXCUSED_S:
+            registers.excused_s += self.step_s
+            registers.last_command_s += self.step_s
+        self.tick()
+
+    def upload(self, script: str) -> None:
+        """Take over a program, which starts a little later; in a protective stop none starts."""
+        if 'rtde_control' in script and self.safety is SafetyMode.NORMAL:
+            self.stop_program()
+            self._starts_s = self.time_s + STARTING_S
+            first = FIRST_REGISTER.search(script)
+            self.first_register = int(first.group(1)) if first else 0
+
+    def play(self, name: str) -> None:
+        """Run a program that somebody else brought; it takes no commands and does nothing."""
+        self.stop_program()
+        self._program, self.program_name = itertools.repeat(None), name
+
+    def pause(self) -> None:
+        """Let the program wait."""
+        self.paused = self._program is not None
+
+    def _start_program(self) -> None:
+        self._starts_s = None
+        self.program_name = CONTROL_SCRIPT
+        self._program = ControlProgram(
+            self.robot, self.registers.from_first(self.first_register), self, self.step_s
+        ).cycles()
+
+    def stop_program(self) -> None:
+        """End the program, and with it every motion and the watchdog."""
+        if self._program is not None:
+            self.robot.end_force_mode()
+            self.robot.motion = StopMove(STOP_DECELERATION)
+        self._program = None
+        self.paused = False
+        self._starts_s = None
+        self._watchdog_s = 0.0
+
+    def set_watchdog(self, min_frequency_hz: float) -> None:
+        """Stop the program when input_int_register_0 comes less often."""
+        self._watchdog_s = 1.0 / min_frequency_hz
+        self.registers.heard(self.time_s)
+
+    def protective_stop(self) -> None:
+        """Stop hard; the program ends."""
+        if self.safety is SafetyMode.NORMAL:
+            self.safety = SafetyMode.PROTECTIVE_STOP
+            self._stopped_s = self.time_s
+            self.stop_program()
+            self.robot.halt()
+
+    def unlock(self) -> bool:
+        """End a protective stop; return whether it was old enough for that."""
+        if self.time_s - self._stopped_s < self._params.unlock_delay_s:
+            return False
+        self.safety = SafetyMode.NORMAL
+        return True
+
+
+# --------------------
+# The dashboard server: one line asks, one line answers.
+#
+# Beside the real commands it obeys the fault switches of the emulator: `emulate protective stop`,
+# `emulate offline SECONDS`, `emulate slow SECONDS`, which lets stops, the end of force control and zeroing be
+# acknowledged so much later, `emulate drop METRES`, which lowers the surface under the finger by so much, and
+# `emulate friction COEFFICIENT`, as of another sample under the finger.
+# `load NAME` and `play` start a program of somebody else, which takes no commands.
+
+BANNER = b'Connected: Universal Robots Dashboard Server\n'
+SERIAL_NUMBER = '20205500001'
+TOO_EARLY = (
+    'Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking'
+)
+
+
+class DashboardSession:
+    """The conversation with one client."""
+
+    def __init__(
+        self,
+        controller: EmulatedController,
+        go_offline: Callable[[float], None],
+        go_silent: Callable[[float], None],
+    ) -> None:
+        self._controller = controller
+        self._go_offline = go_offline
+        self._go_silent = go_silent
+        self._received = b''
+
+    def greeting(self) -> bytes:
+        """Return the line with which the server begins."""
+        return BANNER
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answers."""
+        *lines, self._received = (self._received + data).split(b'\n')
+        return b''.join(self._answer(line.decode('utf-8', 'replace').strip()).encode() + b'\n' for line in lines)
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+    def package(self) -> bytes:
+        """Say nothing unasked."""
+        return b''
+
+    def _answer(self, line: str) -> str:
+        for command, answer in ANSWERS.items():
+            if line.lower() == command or line.lower().startswith(command + ' '):
+                return answer(self, line[len(command) :].strip())
+        return f'could not understand: {line}'
+
+    def _safety(self) -> str:
+        return SAFETY_NAMES[self._controller.safety]
+
+    def _version(self, _argument: str) -> str:
+        numbers = '.'.join(str(number) for number in self._controller.version.numbers)
+        return f'URSoftware {numbers} (emulated)'
+
+    def _load(self, argument: str) -> str:
+        self._controller.loaded = argument
+        return f'Loading program: {argument}'
+
+    def _loaded(self, _argument: str) -> str:
+        loaded = self._controller.loaded
+        return f'Loaded program: {loaded}' if loaded else 'No program loaded'
+
+    def _play(self, _argument: str) -> str:
+        if not self._controller.loaded:
+            return 'Failed to execute: play'
+        self._controller.play(self._controller.loaded)
+        return 'Starting program'
+
+    def _pause(self, _argument: str) -> str:
+        self._controller.pause()
+        return 'Pausing program'
+
+    def _state(self, _argument: str) -> str:
+        controller = self._controller
+        state = 'PAUSED' if controller.paused else 'PLAYING' if controller.playing else 'STOPPED'
+        return f'{state} {controller.program_name}'
+
+    def _stop(self, _argument: str) -> str:
+        self._controller.stop_program()
+        return 'Stopped'
+
+    def _unlock(self, _argument: str) -> str:
+        return 'Protective stop releasing' if self._controller.unlock() else TOO_EARLY
+
+    def _emulate_stop(self, _argument: str) -> str:
+        self._controller.protective_stop()
+        return f'Safetystatus: {self._safety()}'
+
+    def _emulate_offline(self, argument: str) -> str:
+        return self._with_seconds(argument, self._go_offline, 'Going offline')
+
+    def _emulate_silence(self, argument: str) -> str:
+        return self._with_seconds(argument, self._go_silent, 'Falling silent')
+
+    def _emulate_slow(self, argument: str) -> str:
+        return self._with_seconds(argument, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
+
+    def _emulate_speed(self, argument: str) -> str:
+        robot = self._controller.robot
+        return self._with_number(argument, partial(setattr, robot, 'speed_share'), 'The speed was set', 'shares')
+
+    def _emulate_drop(self, argument: str) -> str:
+        plane = self._controller.robot.surface
+        return self._with_number(argument, partial(setattr, plane, 'drop_m'), 'The surface was moved', 'metres')
+
+    def _emulate_friction(self, argument: str) -> str:
+        plane = self._controller.robot.surface
+        return self._with_number(argument, partial(setattr, plane, 'friction'), 'The friction was set', 'newtons per N')
+
+    def _with_seconds(self, argument: str, use: Callable[[float], None], done: str) -> str:
+        return self._with_number(argument, use, done, 'seconds')
+
+    @staticmethod
+    def _with_number(argument: str, use: Callable[[float], None], done: str, unit: str) -> str:
+        try:
+            number = float(argument)
+        except ValueError:
+            number = math.nan
+        if not 0 <= number < math.inf:
+            return f"came '{argument}'; a number of {unit} is needed"
+        use(number)
+        return done
+
+
+Answer = Callable[[DashboardSession, str], str]
+
+
+def _fixed(text: str) -> Answer:
+    return lambda _session, _argument: text
+
+
+ANSWERS: Mapping[str, Answer] = {
+    'polyscopeversion': DashboardSession._version,
+    'get serial number': _fixed(SERIAL_NUMBER),
+    'get robot model': _fixed('UR5'),
+    'is in remote control': _fixed('true'),
+    'robotmode': _fixed('Robotmode: RUNNING'),
+    'safetystatus': lambda session, _argument: f'Safetystatus: {session._safety()}',
+    'safetymode': lambda session, _argument: f'Safetymode: {session._safety()}',
+    'running': lambda session, _argument: f'Program running: {str(session._controller.playing).lower()}',
+    'programstate': DashboardSession._state,
+    'get loaded program': DashboardSession._loaded,
+    'isprogramsaved': _fixed('true rtde_control'),
+    'load': DashboardSession._load,
+    'play': DashboardSession._play,
+    'stop': DashboardSession._stop,
+    'pause': DashboardSession._pause,
+    'unlock protective stop': DashboardSession._unlock,
+    'close safety popup': _fixed('closing safety popup'),
+    'close popup': _fixed('closing popup'),
+    'popup': _fixed('showing popup'),
+    'addtolog': _fixed('Added log message'),
+    'power on': _fixed('Powering on'),
+    'brake release': _fixed('Brake releasing'),
+    'quit': _fixed('Disconnected'),
+    'emulate protective stop': DashboardSession._emulate_stop,
+    'emulate offline': DashboardSession._emulate_offline,
+    'emulate silence': DashboardSession._emulate_silence,
+    'emulate slow': DashboardSession._emulate_slow,
+    'emulate speed': DashboardSession._emulate_speed,
+    'emulate drop': DashboardSession._emulate_drop,
+    'emulate friction': DashboardSession._emulate_friction,
+}
+
+
+# --------------------
+# The port that takes programs in URScript.
+
+LONGEST_SCRIPT = 1_000_000
+END = b'\nend\n'
+
+
+class ScriptSession:
+    """The conversation with one client, who sends programs and gets no answer."""
+
+    def __init__(self, controller: EmulatedController) -> None:
+        self._controller = controller
+        self._received = b''
+
+    def greeting(self) -> bytes:
+        """Say nothing at the start."""
+        return b''
+
+    def receive(self, data: bytes) -> bytes:
+        """Start a program once its last line is there."""
+        self._received = (self._received + data)[-LONGEST_SCRIPT:]
+        if self._received.endswith(END):
+            self._controller.upload(self._received.decode('utf-8', 'replace'))
+            self._received = b''
+        return b''
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+    def package(self) -> bytes:
+        """Say nothing unasked."""
+        return b''
+
+
+# --------------------
+# The variables that RTDE offers: name, type and how to read it.
+#
+# The robot has no joints: joint variables stand still at a usual pose. What no client of the suite looks at is
+# constant.
+
+Getter = Callable[[EmulatedController], Sequence[Any]]
+Variable = tuple[str, Getter]
+
+JOINTS = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+JOINT_RUNNING = 253
+
+
+def _constant(*values: float) -> Getter:
+    return lambda _controller: values
+
+
+def _register(name: str, index: int) -> Getter:
+    return lambda controller: (getattr(controller.registers, name)[index],)
+
+
+def _status_bits(controller: EmulatedController) -> Sequence[int]:
+    return (POWER_ON_BIT | (PROGRAM_RUNNING_BIT if controller.playing else 0),)
+
+
+def _runtime_state(controller: EmulatedController) -> Sequence[int]:
+    if controller.paused:
+        return (PROGRAM_PAUSED,)
+    return (PROGRAM_PLAYING if controller.playing else PROGRAM_STOPPED,)
+
+
+OUTPUTS: Mapping[str, Variable] = {
+    'timestamp': ('DOUBLE', lambda controller: (controller.time_s,)),
+    'actual_TCP_pose': ('VECTOR6D', lambda controller: controller.robot.pose.tolist()),
+    'target_TCP_pose': ('VECTOR6D', lambda controller: controller.robot.pose.tolist()),
+    'actual_TCP_speed': ('VECTOR6D', lambda controller: controller.robot.velocity.tolist()),
+    'target_TCP_speed': ('VECTOR6D', lambda controller: controller.robot.velocity.tolist()),
+    'actual_TCP_force': ('VECTOR6D', lambda controller: controller.robot.force.tolist()),
+    'ft_raw_wrench': ('VECTOR6D', lambda controller: controller.robot.force.tolist()),
+    'safety_mode': ('INT32', lambda controller: (int(controller.safety),)),
+    'safety_status_bits': ('UINT32', lambda controller: (SAFETY_BITS[controller.safety],)),
+    'robot_status_bits': ('UINT32', _status_bits),
+    'runtime_state': ('UINT32', _runtime_state),
+    'robot_mode': ('INT32', _constant(ROBOT_RUNNING)),
+    'joint_mode': ('VECTOR6INT32', _constant(*(JOINT_RUNNING,) * 6)),
+    'actual_tool_accelerometer': ('VECTOR3D', _constant(0.0, 0.0, -9.81)),
+    'payload': ('DOUBLE', _constant(0.0)),
+    'payload_cog': ('VECTOR3D', _constant(0.0, 0.0, 0.0)),
+    'payload_inertia': ('VECTOR6D', _constant(*(0.0,) * 6)),
+    'target_q': ('VECTOR6D', _constant(*JOINTS)),
+    'actual_q': ('VECTOR6D', _constant(*JOINTS)),
+    **{
+        name: ('VECTOR6D', _constant(*(0.0,) * 6))
+        for name in (
+            'target_qd',
+            'target_qdd',
+            'target_current',
+            'target_moment',
+            'actual_qd',
+            'actual_current',
+            'actual_current_as_torque',
+            'joint_control_output',
+        )
+    },
+    'joint_temperatures': ('VECTOR6D', _constant(*(30.0,) * 6)),
+    'actual_joint_voltage': ('VECTOR6D', _constant(*(48.0,) * 6)),
+    'actual_digital_input_bits': ('UINT64', _constant(0)),
+    'actual_digital_output_bits': ('UINT64', _constant(0)),
+    'actual_execution_time': ('DOUBLE', _constant(0.1)),
+    'speed_scaling': ('DOUBLE', _constant(1.0)),
+    'target_speed_fraction': ('DOUBLE', _constant(1.0)),
+    'actual_momentum': ('DOUBLE', _constant(0.0)),
+    'actual_main_voltage': ('DOUBLE', _constant(48.0)),
+    'actual_robot_voltage': ('DOUBLE', _constant(48.0)),
+    'actual_robot_current': ('DOUBLE', _constant(1.0)),
+    'standard_analog_input0': ('DOUBLE', _constant(0.0)),
+    'standard_analog_input1': ('DOUBLE', _constant(0.0)),
+    'standard_analog_output0': ('DOUBLE', _constant(0.0)),
+    'standard_analog_output1': ('DOUBLE', _constant(0.0)),
+    **{f'output_int_register_{index}': ('INT32', _register('int_out', index)) for index in range(COUNT)},
+    **{f'output_double_register_{index}': ('DOUBLE', _register('double_out', index)) for index in range(COUNT)},
+}
+
+Setter = Callable[[EmulatedController, Sequence[Any]], None]
+
+
+def _write(name: str, index: int) -> Setter:
+    def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
+        getattr(controller.registers, name)[index] = values[0]
+
+    return setter
+
+
+def _write_command(index: int) -> Setter:
+    """Write a command register; the watchdog watches that of the program."""
+
+    def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
+        controller.registers.int_in[index] = values[0]
+        if index == controller.first_register:
+            controller.registers.heard(controller.time_s)
+
+    return setter
+
+
+def _ignore(_controller: EmulatedController, _values: Sequence[Any]) -> None:
+    return
+
+
+INPUTS: Mapping[str, tuple[str, Setter]] = {
+    **{f'input_int_register_{index}': ('INT32', _write('int_in', index)) for index in range(COUNT)},
+    **{f'input_double_register_{index}': ('DOUBLE', _write('double_in', index)) for index in range(COUNT)},
+    **{f'input_int_register_{index}': ('INT32', _write_command(index)) for index in COMMAND_REGISTERS},
+    'external_force_torque': ('VECTOR6D', _ignore),
+}
+
+
+# --------------------
+# RTDE, protocol version 2, as the controller speaks it: one session per connection.
+
+HEADER = struct.Struct('>HB')
+PROTOCOL_VERSION = 2
+OUTPUT_RECIPE = 1
+
+
+class InputClaims(dict[str, 'RtdeSession']):
+    """Who writes which input: each may belong to one session only."""
+
+
+class RtdeSession:
+    """The conversation with one client; `package` is what it gets each cycle once it has asked for it."""
+
+    def __init__(self, controller: EmulatedController, claims: InputClaims) -> None:
+        self._controller = controller
+        self._claims = claims
+        self._received = b''
+        self._output_format = struct.Struct('>')
+        self._getters: list[Getter] = []
+        self._every_s = controller.step_s
+        self._due_s = 0.0
+        self._started = False
+        self._inputs: list[InputRecipe] = []
+
+    def greeting(self) -> bytes:
+        """Say nothing at the start."""
+        return b''
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answers."""
+        self._received += data
+        answers = b''
+        while (packet := self._take_packet()) is not None:
+            kind, payload = packet
+            handler = HANDLERS.get(kind)
+            answer = handler(self, payload) if handler is not None else None
+            answers += _message(kind, answer) if answer is not None else b''
+        return answers
+
+    def _take_packet(self) -> tuple[int, bytes] | None:
+        """Return the kind and the content of the next packet; None if it is not complete."""
+        if len(self._received) < HEADER.size:
+            return None
+        size, kind = HEADER.unpack_from(self._received)
+        if size < HEADER.size:
+            self._received = b''
+        if len(self._received) < size or size < HEADER.size:
+            return None
+        payload, self._received = self._received[HEADER.size : size], self._received[size:]
+        return kind, payload
+
+    def close(self) -> None:
+        """Give the inputs free."""
+        for name in [name for name, owner in self._claims.items() if owner is self]:
+            del self._claims[name]
+
+    def package(self) -> bytes:
+        """Return the data message if one is due, else nothing."""
+        controller = self._controller
+        if not self._started or controller.time_s < self._due_s - 0.5 * controller.step_s:
+            return b''
+        self._due_s = max(self._due_s + self._every_s, controller.time_s)
+        values = [value for getter in self._getters for value in getter(controller)]
+        return _message(RtdeMessage.DATA, bytes([OUTPUT_RECIPE]) + self._output_format.pack(*values))
+
+    def _on_request_version(self, payload: bytes) -> bytes:
+        return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
+
+    def _on_controller_version(self, _payload: bytes) -> bytes:
+        return struct.pack('>4I', *self._controller.version.numbers)
+
+    def _on_setup_outputs(self, payload: bytes) -> bytes | None:
+        if len(payload) < 8:
+            return None
+        (frequency_hz,) = struct.unpack_from('>d', payload)
+        self._every_s = max(1.0 / frequency_hz if frequency_hz > 0 else 0.0, self._controller.step_s)
+        names = _names(payload[8:])
+        types = [OUTPUTS[name][0] if name in OUTPUTS else 'NOT_FOUND' for name in names]
+        if 'NOT_FOUND' not in types:
+            self._getters = [OUTPUTS[name][1] for name in names]
+            self._output_format = _format(types)
+        return bytes([OUTPUT_RECIPE]) + ','.join(types).encode()
+
+    def _on_setup_inputs(self, payload: bytes) -> bytes:
+        names = _names(payload)
+        types = [self._input_type(name) for name in names]
+        if not {'NOT_FOUND', 'IN_USE'} & set(types):
+            self._claims.update(dict.fromkeys(names, self))
+            self._inputs.append(InputRecipe(names))
+        return bytes([len(self._inputs)]) + ','.join(types).encode()
+
+    def _input_type(self, name: str) -> str:
+        if name not in INPUTS:
+            return 'NOT_FOUND'
+        return INPUTS[name][0] if self._claims.get(name, self) is self else 'IN_USE'
+
+    def _on_start(self, _payload: bytes) -> bytes:
+        self._started = True
+        return b'\x01'
+
+    def _on_pause(self, _payload: bytes) -> bytes:
+        self._started = False
+        return b'\x01'
+
+    def _on_data(self, payload: bytes) -> None:
+        if payload and 1 <= payload[0] <= len(self._inputs):
+            self._inputs[payload[0] - 1].write(self._controller, payload[1:])
+
+
+class InputRecipe:
+    """A list of inputs that are written together."""
+
+    def __init__(self, names: list[str]) -> None:
+        self._format = _format([INPUTS[name][0] for name in names])
+        self._setters: list[tuple[Setter, int]] = [
+            (INPUTS[name][1], len(struct.unpack(fields, bytes(struct.calcsize(fields)))))
+            for name in names
+            for fields in ['>' + FORMATS[INPUTS[name][0]]]
+        ]
+
+    def write(self, controller: EmulatedController, data: bytes) -> None:
+        """Write the values in `data`; what has another length is not taken."""
+        if len(data) != self._format.size:
+            return
+        values = self._format.unpack(data)
+        start = 0
+        for setter, count in self._setters:
+            setter(controller, values[start : start + count])
+            start += count
+
+
+HANDLERS: Mapping[int, Callable[[RtdeSession, bytes], bytes | None]] = {
+    RtdeMessage.REQUEST_VERSION: RtdeSession._on_request_version,
+    RtdeMessage.CONTROLLER_VERSION: RtdeSession._on_controller_version,
+    RtdeMessage.SETUP_OUTPUTS: RtdeSession._on_setup_outputs,
+    RtdeMessage.SETUP_INPUTS: RtdeSession._on_setup_inputs,
+    RtdeMessage.START: RtdeSession._on_start,
+    RtdeMessage.PAUSE: RtdeSession._on_pause,
+    RtdeMessage.DATA: RtdeSession._on_data,
+}
+
+
+def _message(kind: int, payload: bytes) -> bytes:
+    return HEADER.pack(HEADER.size + len(payload), kind) + payload
+
+
+def _names(data: bytes) -> list[str]:
+    """Return the names of a list, which may end with a comma."""
+    return [name for name in data.decode('ascii', 'replace').split(',') if name]
+
+
+def _format(types: list[str]) -> struct.Struct:
+    return struct.Struct('>' + ''.join(FORMATS[name] for name in types))
+
+
+# --------------------
+# The network of the emulated controller, and its clock.
+#
+# One thread: it sleeps until the next cycle is due, looks what has come, lets the controller do its cycles, and
+# sends.
+
+# That are made up for; a process that was held up for longer has lost the time. Meanwhile it hears no commands, and no
+# real controller moves for longer than its watchdog waits without one.
+MAX_MISSED_CYCLES = 50
+CHUNK = 65536
+
+
+class Session(Protocol):
+    """One conversation."""
+
+    def greeting(self) -> bytes:
+        """Return what the server says first."""
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answer."""
+
+    def package(self) -> bytes:
+        """Return what is sent unasked in this cycle."""
+
+    def close(self) -> None:
+        """End it."""
+
+
+class Server:
+    """Serve a controller on its ports.
+
+    Raises
+    ------
+    DeviceError
+        If a port cannot be opened.
+    """
+
+    def __init__(self, controller: EmulatedController, ip: str, finger_port: int) -> None:
+        self._controller = controller
+        self._ip = ip
+        claims = InputClaims()
+        self._kinds: dict[int, Callable[[], Session]] = {
+            RTDE_PORT: partial(RtdeSession, controller, claims),
+            SCRIPT_PORT: partial(ScriptSession, controller),
+        }
+        if controller.version.dashboard:
+            self._kinds[DASHBOARD_PORT] = partial(DashboardSession, controller, self._go_offline, self._go_silent)
+        self._selector = selectors.DefaultSelector()
+        self._listeners: list[socket.socket] = []
+        self._sessions: dict[socket.socket, Session] = {}
+        self._online_ns = 0
+        self._offline_s = 0.0  # asked for
+        self._silent_until_ns = 0
+        self._finger = FingerReport(controller, finger_port)
+        self._open()
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        """Serve until told to stop."""
+        step_ns = round(self._controller.step_s * 1e9)
+        due_ns = time.monotonic_ns()
+        while not stopped():
+            time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
+            missed = max(0, time.monotonic_ns() - due_ns) // step_ns
+            due_ns += (1 + missed) * step_ns
+            self._serve()
+            for _ in range(min(missed, MAX_MISSED_CYCLES)):
+                self._controller.catch_up()
+            self._controller.tick()
+            self._publish()
+
+    def close(self) -> None:
+        """Close all ports and connections."""
+        for connection in list(self._sessions):
+            self._hang_up(connection)
+        for listener in self._listeners:
+            self._selector.unregister(listener)
+            listener.close()
+        self._listeners = []
+
+    def _open(self) -> None:
+        for port, make_session in self._kinds.items():
+            try:
+                listener = socket.create_server((self._ip, port), backlog=8)
+            except OSError as error:
+                self.close()
+                raise DeviceError(
+                    f'the emulated UR controller cannot listen on {self._ip}:{port}: {error}; give each controller '
+                    "a loopback address of its own, such as '127.0.0.3'"
+                ) from error
+            listener.setblocking(False)
+            self._listeners.append(listener)
+            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, make_session))
+
+    def _go_offline(self, seconds: float) -> None:
+        self._offline_s = seconds
+
+    def _go_silent(self, seconds: float) -> None:
+        self._silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
+
+    @property
+    def _silent(self) -> bool:
+        return time.monotonic_ns() < self._silent_until_ns
+
+    def _serve(self) -> None:
+        """Deal with what has come."""
+        if self._silent:
+            return
+        for key, _ in self._selector.select(timeout=0):
+            key.data()
+        if self._offline_s:
+            self.close()
+            self._online_ns = time.monotonic_ns() + int(self._offline_s * 1e9)
+            self._offline_s = 0.0
+        if not self._listeners and time.monotonic_ns() >= self._online_ns:
+            self._open()
+
+    def _accept(self, listener: socket.socket, make_session: Callable[[], Session]) -> None:
+        with suppress(BlockingIOError):
+            connection, _ = listener.accept()
+            connection.setblocking(False)
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            session = self._sessions[connection] = make_session()
+            self._selector.register(connection, selectors.EVENT_READ, partial(self._receive, connection, session))
+            self._send(connection, session.greeting())
+
+    def _receive(self, connection: socket.socket, session: Session) -> None:
+        try:
+            data = connection.recv(CHUNK)
+        except OSError:
+            data = b''
+        if data:
+            self._send(connection, session.receive(data))
+        else:
+            self._hang_up(connection)
+
+    def _publish(self) -> None:
+        if not self._silent:
+            for connection, session in list(self._sessions.items()):
+                self._send(connection, session.package())
+        self._finger.send()
+
+    def _send(self, connection: socket.socket, data: bytes) -> None:
+        """Send all of it, or hang up on a client that does not read."""
+        if not data:
+            return
+        try:
+            sent = connection.send(data)
+        except OSError:
+            sent = 0
+        if sent < len(data):
+            self._hang_up(connection)
+
+    def _hang_up(self, connection: socket.socket) -> None:
+        session = self._sessions.pop(connection, None)
+        if session is not None:
+            self._selector.unregister(connection)
+            session.close()
+            connection.close()
+
+
+class FingerReport:
+    """Sends the finger state to the emulator in every cycle; nothing if the port is 0."""
+
+    def __init__(self, controller: EmulatedController, port: int) -> None:
+        self._controller = controller
+        self._emulator = FingerSender(port)
+
+    def send(self) -> None:
+        """Send one datagram."""
+        robot = self._controller.robot
+        x, y, z = (robot.pose[:3] - robot.surface.origin).tolist()
+        vx, vy, vz = robot.velocity[:3].tolist()
+        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
+
+
+# --------------------
+# Run the emulated controller, as in `python -m texture_simulation.devices.ur --ip 127.0.0.2`.
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serve until SIGINT, SIGTERM or the end of the parent process; 'ready' is printed once the ports are open."""
+    signals: list[int] = []
+    parent = os.getppid()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _frame: signals.append(number))
+    try:
+        params = read_params(arguments)
+        controller = EmulatedController(params, np.random.default_rng(params.seed))
+        server = Server(controller, params.ip, params.finger_port)
+    except TextureError as error:
+        print(f'emulated UR controller: {error}', file=sys.stderr)
+        return 2
+    print('ready', flush=True)
+    server.run(lambda: bool(signals) or os.getppid() != parent)
+    server.close()
+    return 0
+
+
+def read_params(arguments: Sequence[str] | None) -> UrControllerParams:
+    """Return the parameters from the command line: each has an option of its own."""
+    parser = argparse.ArgumentParser(prog='python -m texture_simulation.devices.ur', description=__doc__)
+    for item in parameters_of(UrControllerParams):
+        option = '--' + item.name.replace('_', '-')
+        text = f'{item.description} {item.range_text} (default {item.default})'.replace('%', '%%')
+        parser.add_argument(option, type=item.type, default=item.default, help=text)
+    return from_mapping(UrControllerParams, vars(parser.parse_args(arguments)))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,654 @@
+"""What disturbs a real finger, one class each; a scene names those that it needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from texture_core.config import param
+from texture_core.types import Array, Samples
+from texture_simulation.path import Filter, Trajectory, interpolated_field
+
+# --------------------
+# A sphere pressed on a plane (Hertz): size and stiffness of the contact grow with the cube root of the force.
+
+
+def _power(force_n: Array, exponent: float) -> Array:
+    """Return force ** exponent; 0 N gives 0."""
+    grown: Array = np.maximum(force_n, 0.0) ** exponent
+    return grown
+
+
+@dataclass(frozen=True)
+class PatchGrowth:
+    """The contact, over which the skin averages, grows with the force."""
+
+    exponent: float = param(
+        1 / 3,
+        'Sets the exponent with which the contact radius grows with the force; 0 keeps it constant.',
+        low=0.0,
+        high=1.0,
+    )
+
+    def blur_growth(self, force_n: Array) -> Array | float:
+        """Return how much larger the contact is than at 1 N."""
+        return _power(force_n, self.exponent)
+
+    def gain_growth(self, force_n: Array) -> Array | float:
+        """Return 1."""
+        return 1.0
+
+
+@dataclass(frozen=True)
+class ForceGain:
+    """The contact is the stiffer, the harder it is pressed: the same height changes the force more."""
+
+    exponent: float = param(
+        1 / 3,
+        'Sets the exponent with which the contact stiffness grows with the force; 0 keeps it constant.',
+        low=0.0,
+        high=1.0,
+    )
+
+    def blur_growth(self, force_n: Array) -> Array | float:
+        """Return 1."""
+        return 1.0
+
+    def gain_growth(self, force_n: Array) -> Array | float:
+        """Return how much stronger a texture is measured than at 1 N."""
+        return _power(force_n, self.exponent)
+
+
+# --------------------
+# No two fingers of a kind are equally sensitive.
+
+SALT = 41  # so that the gain of a finger is drawn apart from its other traits
+
+
+@dataclass(frozen=True)
+class FingerSpread:
+    """Each individual of the sensor senses textures by a factor of its own more or less strongly."""
+
+    relative: float = param(
+        0.1, 'Sets the relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5
+    )
+    skin: float = param(
+        0.0,
+        'Sets the relative spread of the skin from finger to finger: a thicker one touches over a larger area, is '
+        'softer and resonates lower.',
+        low=0.0,
+        high=0.5,
+    )
+    noise: float = param(
+        0.0, 'Sets the relative spread of the strength of the noise from finger to finger.', low=0.0, high=1.0
+    )
+
+    def gain(self, path: Trajectory, finger: int) -> Array | float:
+        """Return the factor of a finger, the same at all points."""
+        return self.factors(finger)[0]
+
+    def factors(self, finger: int) -> tuple[float, float, float]:
+        """Return the factors of a finger: of its sensitivity, of the thickness of its skin, and of its noise.
+
+        Parameters
+        ----------
+        finger
+            Which individual of the sensor.
+        """
+        drawn = np.random.default_rng([SALT, finger]).standard_normal(3)
+        gain, thicker, noisier = np.exp(np.array([self.relative, self.skin, self.noise]) * drawn)
+        return float(gain), float(thicker), float(noisier)
+
+
+# --------------------
+# Where in the chain from slide to sample an effect acts: each stage is one protocol.
+#
+# A slide begins: `SlideEffect`. The finger goes its way: `PathEffect`. The skin senses a texture: `GrowthEffect`,
+# `TextureEffect`. The force shakes the skin: `ForceEffect`. Samples are taken: `SignalEffect`. What has a memory is
+# started once and then called block by block; what lies between the blocks is continuous.
+
+BatchShape = tuple[int, ...]  # () for one slide, (count,) for many at once
+TrajectoryFilter = Callable[[Trajectory], Trajectory]
+ForceFilter = Callable[[Trajectory, Array], Array]
+SignalFilter = Callable[[Samples], Samples]
+
+
+@runtime_checkable
+class SlideEffect(Protocol):
+    """Changes what was planned."""
+
+    def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Return speed and force as they become, of the same shape.
+
+        Parameters
+        ----------
+        speed_m_s : (count,)
+            Planned speeds.
+        force_n : (count,)
+            Planned normal forces.
+        rng
+            Random numbers of this effect.
+
+        Returns
+        -------
+        (count,), (count,)
+            Speeds in m/s and forces in N.
+        """
+
+
+@runtime_checkable
+class PathEffect(Protocol):
+    """Changes where the skin is."""
+
+    def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
+        """Return what turns the next piece of path, (..., n) points, into the skin's own.
+
+        Parameters
+        ----------
+        rng
+            Random numbers of this effect.
+        rate_hz
+            Sampling rate of the samples or points.
+        batch_shape
+            () for one slide, (count,) for many at once.
+
+        Returns
+        -------
+        callable
+            Takes and returns a Trajectory; keeps a state from piece to piece.
+        """
+
+
+@runtime_checkable
+class GrowthEffect(Protocol):
+    """Lets what the skin makes of a texture depend on the force."""
+
+    def blur_growth(self, force_n: Array) -> Array | float:
+        """Return how much larger the contact is than at 1 N.
+
+        Parameters
+        ----------
+        force_n : (...)
+            Normal force.
+
+        Returns
+        -------
+        (...)
+            Factor of the contact size, of the shape of `force_n`.
+        """
+
+    def gain_growth(self, force_n: Array) -> Array | float:
+        """Return how much stronger a texture is measured than at 1 N.
+
+        Parameters
+        ----------
+        force_n : (...)
+            Normal force.
+
+        Returns
+        -------
+        (...)
+            Factor of the stiffness, of the shape of `force_n`.
+        """
+
+
+@runtime_checkable
+class TextureEffect(Protocol):
+    """Changes how strongly the texture is measured."""
+
+    def gain(self, path: Trajectory, finger: int) -> Array | float:
+        """Return the gain at places, (..., n), for one individual of the sensor.
+
+        Parameters
+        ----------
+        path
+            Places on the sample.
+        finger
+            Which individual of the sensor.
+
+        Returns
+        -------
+        (..., n), or a number
+            Factor of the texture.
+        """
+
+
+@runtime_checkable
+class ForceEffect(Protocol):
+    """Changes how the force on the skin varies."""
+
+    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
+        """Return what turns the variation along the next piece of path, (..., n) N, into another.
+
+        Parameters
+        ----------
+        rng
+            Random numbers of this effect.
+        rate_hz
+            Sampling rate of the samples or points.
+        batch_shape
+            () for one slide, (count,) for many at once.
+
+        Returns
+        -------
+        callable
+            Takes and returns (..., n) N; keeps a state from piece to piece.
+        """
+
+
+@runtime_checkable
+class SignalEffect(Protocol):
+    """Changes what is measured."""
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
+        """Return what turns the next samples, (..., n_samples, n_channels) counts, into those with the effect.
+
+        Parameters
+        ----------
+        rng
+            Random numbers of this effect.
+        rate_hz
+            Sampling rate of the samples or points.
+        batch_shape
+            () for one slide, (count,) for many at once.
+        channels
+            Number of channels.
+        slow
+            Whether the stream is the slow one.
+
+        Returns
+        -------
+        callable
+            Takes and returns (..., n_samples, n_channels) counts; keeps a state from piece to piece.
+        """
+
+
+# --------------------
+# What warms up wanders.
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Each channel wanders at random (a Wiener process)."""
+
+    count_per_sqrt_s: float = param(
+        20.0,
+        'Sets the standard deviation of the random walk after one second; a larger value drifts faster.',
+        unit='count',
+        low=0.0,
+    )
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
+        """Return what adds the drift."""
+        at = np.zeros((*batch_shape, 1, channels))
+        step = self.count_per_sqrt_s / np.sqrt(rate_hz)
+
+        def add(samples: Samples) -> Samples:
+            nonlocal at
+            if not samples.shape[-2]:
+                return samples
+            wandered = at + np.cumsum(step * rng.standard_normal(samples.shape), axis=-2)
+            at = wandered[..., -1:, :]
+            return np.asarray(samples + wandered)
+
+        return add
+
+
+# --------------------
+# A bad contact in a cable.
+
+
+@dataclass(frozen=True)
+class Dropouts:
+    """Now and then all channels stand still for a moment: the converter repeats its last sample.
+
+    Samples that are missing altogether are a fault of the line: see `devices/faults.py`.
+    """
+
+    per_s: float = param(
+        0.5, 'Sets how often a dropout occurs; a higher rate gives more dropouts.', unit='1/s', low=0.0, high=100.0
+    )
+    length_s: float = param(
+        0.02, 'Sets how long a dropout lasts; the last good sample is repeated during it.', unit='s', low=1e-3, high=1.0
+    )
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
+        """Return what holds the samples."""
+        length = max(1, round(self.length_s * rate_hz))
+        held = np.zeros((*batch_shape, 1, channels))  # the last good sample
+        left = np.zeros(batch_shape, dtype=np.intp)  # samples that are still to be held
+
+        def hold(samples: Samples) -> Samples:
+            nonlocal held, left
+            count = samples.shape[-2]
+            if not count:
+                return samples
+            number = np.arange(count)
+            begins = rng.random((*batch_shape, count)) < self.per_s / rate_hz
+            last = np.maximum.accumulate(np.where(begins, number, left[..., None] - length - 1), axis=-1)
+            bad = number - last < length
+            source = np.maximum.accumulate(np.where(bad, -1, number), axis=-1)
+            joined = np.concatenate([held, samples], axis=-2)
+            result: Samples = np.take_along_axis(joined, source[..., None] + 1, axis=-2)
+            held, left = result[..., -1:, :], np.maximum(last[..., -1] + length - count, 0)
+            return result
+
+        return hold
+
+
+# --------------------
+# What cables pick up from the mains.
+
+THIRD = 0.3  # of the fundamental; rectifiers draw odd harmonics
+
+
+@dataclass(frozen=True)
+class MainsHum:
+    """A sine of the mains' frequency, and its third harmonic, on all channels alike."""
+
+    rms_count: float = param(
+        20.0, 'Sets the root mean square of the fundamental; a larger value gives more hum.', unit='count', low=0.0
+    )
+    mains_hz: float = param(50.0, 'Sets the frequency of the mains, 50 or 60 Hz.', unit='Hz', low=40.0, high=70.0)
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
+        """Return what adds the hum; its phase is another in each slide."""
+        phase = rng.uniform(0, 2 * np.pi, (*batch_shape, 1))
+        turn, done = 2 * np.pi * self.mains_hz / rate_hz, 0
+
+        def add(samples: Samples) -> Samples:
+            nonlocal done
+            angle = phase + turn * (done + np.arange(samples.shape[-2]))
+            done += samples.shape[-2]
+            hum = np.sqrt(2) * self.rms_count * (np.sin(angle) + THIRD * np.sin(3 * angle))
+            return np.asarray(samples + hum[..., None])
+
+        return add
+
+
+# --------------------
+# The motor shakes the finger.
+
+
+@dataclass(frozen=True)
+class MotorVibration:
+    """A ripple of the force with each step of the motor: its frequency is speed · steps; none in the air or at rest."""
+
+    rms_n: float = param(
+        2e-3,
+        'Sets the root mean square of the force ripple; a larger value vibrates more.',
+        unit='N',
+        low=0.0,
+        high=1.0,
+    )
+    steps_1_m: float = param(
+        1000.0,
+        'Sets the motor steps per metre of travel; the ripple has speed times this frequency.',
+        unit='1/m',
+        low=1.0,
+        high=1e5,
+    )
+
+    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
+        """Return what adds the ripple."""
+        travelled_m = rng.uniform(0, 1 / self.steps_1_m, (*batch_shape, 1))
+        last: tuple[Array, Array] | None = None
+
+        def add(path: Trajectory, variation_n: Array) -> Array:
+            nonlocal travelled_m, last
+            if not len(path):
+                return variation_n
+            x_m, y_m = last or (path.x_m[..., :1], path.y_m[..., :1])
+            last = path.x_m[..., -1:], path.y_m[..., -1:]
+            travelled_m = travelled_m[..., -1:] + np.cumsum(
+                np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)), axis=-1
+            )
+            ripple = np.sqrt(2) * self.rms_n * np.sin(2 * np.pi * self.steps_1_m * travelled_m) * (path.force_n > 0)
+            # All elements of a finger with several shake alike: they have an axis more than the path.
+            shaken: Array = variation_n + (ripple if variation_n.ndim == ripple.ndim else ripple[..., None, :])
+            return shaken
+
+        return add
+
+
+# --------------------
+# The electronics' own noise.
+
+
+@dataclass(frozen=True)
+class Noise:
+    """White noise on every sample: its density is 2·count²/rate, from 0 Hz to half the rate."""
+
+    fast_count: float = param(
+        25.0, 'Sets the standard deviation of the noise on the fast channels.', unit='count', low=0.0
+    )
+    slow_count: float = param(
+        8.0, 'Sets the standard deviation of the noise on the slow channels.', unit='count', low=0.0
+    )
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
+        """Return what adds the noise."""
+        spread = self.slow_count if slow else self.fast_count
+
+        def add(samples: Samples) -> Samples:
+            # Single precision costs half as much, and its last bit lies far below a count.
+            return samples + spread * rng.standard_normal(samples.shape, dtype=np.float32)
+
+        return add
+
+
+# --------------------
+# A converter of fewer bits than its numbers have.
+
+
+@dataclass(frozen=True)
+class Quantisation:
+    """Samples come in steps of several counts; steps of one count are always there."""
+
+    step_count: float = param(16.0, 'Sets the quantisation step; a larger step is coarser.', unit='count', low=1.0)
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
+        """Return what rounds the samples."""
+        return self._round
+
+    def _round(self, samples: Samples) -> Samples:
+        return self.step_count * np.rint(samples / self.step_count)
+
+
+# --------------------
+# The skin sticks, is stretched, and jumps after.
+
+CATCH_UP_S = 4e-3  # time constant of the jump
+FORGOTTEN = 8.0  # time constants after which nothing of a skid is left
+
+
+@dataclass(frozen=True)
+class Skids:
+    """Now and then the skin stays where it is for a moment while the finger goes on, then catches up.
+
+    A cheap stand-in for stick-slip, for slides of which some went wrong.
+    """
+
+    per_s: float = param(
+        0.5,
+        'Sets how often the skin sticks and jumps; a higher rate disturbs more slides.',
+        unit='1/s',
+        low=0.0,
+        high=20.0,
+    )
+    length_s: float = param(0.05, 'Sets how long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
+
+    def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
+        """Return what lets the skin lag behind the finger."""
+        length, kept = max(1, round(self.length_s * rate_hz)), math.exp(-1 / (CATCH_UP_S * rate_hz))
+        since = np.full(batch_shape, 10**9)  # points since the last skid began
+        held = [np.zeros(batch_shape), np.zeros(batch_shape)]  # where
+        farthest = length + FORGOTTEN * CATCH_UP_S * rate_hz
+
+        def lag(path: Trajectory) -> Trajectory:
+            nonlocal since
+            count = len(path)
+            begins = rng.random((*batch_shape, count)) < self.per_s / rate_hz * (path.force_n > 0)
+            if not begins.any() and not (since < farthest).any():
+                since = since + count
+                return path
+            number = np.arange(count)
+            last = np.maximum.accumulate(np.where(begins, number, -1), axis=-1)
+            age = number - np.where(last >= 0, last, -since[..., None])
+            # Where the finger is when the skin comes loose is what it catches up with from then on.
+            weight = np.where(age < length, 1.0, kept ** np.maximum(age - length + 1.0, 0.0))
+            skin = [_lagging(place, hold, last, weight) for place, hold in zip((path.x_m, path.y_m), held, strict=True)]
+            for i, place in enumerate((path.x_m, path.y_m)):
+                end = last[..., -1]
+                began = np.take_along_axis(place, np.maximum(end, 0)[..., None], axis=-1)[..., 0]
+                held[i] = np.where(end >= 0, began, held[i])
+            since = age[..., -1] + 1
+            return Trajectory(skin[0], skin[1], path.force_n)
+
+        return lag
+
+
+def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array:
+    """Return where the skin is: `weight` of the way back to where the last skid began, (..., n)."""
+    began = np.take_along_axis(place_m, np.maximum(last, 0), axis=-1)
+    began = np.where(last >= 0, began, held_m[..., None])
+    lagging: Array = place_m + weight * (began - place_m)
+    return lagging
+
+
+# --------------------
+# The skin as a mass on a spring and a damper.
+
+
+@dataclass(frozen=True)
+class Skin:
+    """The force reaches the sensor through m·x'' + d·x' + k·x = F, so that it resonates and then falls off.
+
+    Turned into a filter by the bilinear transform, warped so that the resonance stays where it is: unconditionally
+    stable, and exact at the resonance.
+    """
+
+    resonance_hz: float = param(
+        200.0, 'Sets the resonance frequency of the skin, √(k/m) / 2π.', unit='Hz', low=1.0, high=400.0
+    )
+    damping: float = param(
+        0.3,
+        'Sets the damping ratio d / (2·√(k·m)); 1 is critical damping, a larger value is slower.',
+        low=0.01,
+        high=10.0,
+    )
+
+    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
+        """Return what filters the variation."""
+        skin = Filter(self.sections(rate_hz))
+
+        def through(path: Trajectory, variation_n: Array) -> Array:
+            return skin(variation_n)
+
+        return through
+
+    def sections(self, rate_hz: float) -> Array:
+        """Return the filter, (1, 6).
+
+        Parameters
+        ----------
+        rate_hz
+            Sampling rate.
+
+        Returns
+        -------
+        (1, 6)
+            Second-order section as scipy.signal.sosfilt takes it.
+        """
+        k = math.tan(math.pi * self.resonance_hz / rate_hz)
+        scale = 1 + 2 * self.damping * k + k * k
+        ahead = [k * k / scale, 2 * k * k / scale, k * k / scale]
+        return np.array([[*ahead, 1.0, 2 * (k * k - 1) / scale, (1 - 2 * self.damping * k + k * k) / scale]])
+
+
+# --------------------
+# A robot is not quite as fast and does not press quite as hard as it should.
+
+MIN_SHARE = 0.05  # of what was wanted
+
+
+@dataclass(frozen=True)
+class SlideError:
+    """Speed and force deviate from slide to slide (offline recordings; a simulated arm has errors of its own)."""
+
+    speed: float = param(
+        0.01, 'Sets the relative standard deviation of the speed from slide to slide.', low=0.0, high=0.5
+    )
+    force: float = param(
+        0.04, 'Sets the relative standard deviation of the force from slide to slide.', low=0.0, high=0.5
+    )
+
+    def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Return speed and force as they become, of the same shape."""
+        return (
+            speed_m_s * np.maximum(MIN_SHARE, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
+            force_n * np.maximum(MIN_SHARE, 1 + self.force * rng.standard_normal(force_n.shape)),
+        )
+
+
+# --------------------
+# No sample is everywhere the same.
+
+# Plane waves of 16 to 45 mm in four directions, with phases of no meaning.
+WAVES_1_M = 2 * np.pi * np.array([[38.0, 11.0], [-17.0, 57.0], [29.0, -33.0], [9.0, 20.0]])
+PHASES = np.array([0.3, 1.9, 4.1, 5.2])
+KNOT_M = 1e-3  # straight between such places it is wrong by 2 % of its variation at most
+
+
+@dataclass(frozen=True)
+class Unevenness:
+    """The texture is measured more strongly in some places of a sample than in others."""
+
+    relative: float = param(
+        0.1, 'Sets the relative standard deviation of the texture strength over some centimetres.', low=0.0, high=1.0
+    )
+
+    def gain(self, path: Trajectory, finger: int) -> Array | float:
+        """Return the gain at places, (..., n): mean 1, standard deviation `relative`, never below 0."""
+        return interpolated_field(self._at, path.x_m, path.y_m, KNOT_M) if len(path) else 1.0
+
+    def _at(self, x_m: Array, y_m: Array) -> Array:
+        waves = sum(np.cos(kx * x_m + ky * y_m + phase) for (kx, ky), phase in zip(WAVES_1_M, PHASES, strict=True))
+        gain: Array = np.maximum(1 + self.relative * np.sqrt(2 / len(PHASES)) * waves, 0.0)
+        return gain
+
+
+# --------------------
+# The effects by name, in the order in which they act.
+
+EFFECTS: Mapping[str, type] = {
+    'slide_error': SlideError,  # the robot is faster or slower, presses harder or less than it should
+    'skids': Skids,  # the skin sticks for a moment and jumps after
+    'patch_growth': PatchGrowth,  # a harder pressed finger senses fine textures less
+    'force_gain': ForceGain,  # a harder pressed finger senses textures more
+    'unevenness': Unevenness,  # no sample is everywhere the same
+    'finger_spread': FingerSpread,  # no finger is as sensitive as another
+    'motor_vibration': MotorVibration,  # a ripple of the force with the way
+    'skin': Skin,  # resonance of mass, spring and damper
+    'noise': Noise,  # of the electronics
+    'mains_hum': MainsHum,  # 50 or 60 Hz
+    'drift': Drift,  # a baseline that wanders
+    'dropouts': Dropouts,  # moments in which the signal stands still
+    'quantisation': Quantisation,  # steps of several counts
+}

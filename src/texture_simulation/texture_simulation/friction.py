@@ -1,0 +1,1105 @@
+"""Friction between finger and surface: Coulomb, Stribeck, stick-slip, and their integration in time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from texture_core.config import find, param
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import Array
+from texture_simulation.path import Trajectory, before_first
+
+# --------------------
+# What makes a fingertip stick and slip: the friction of a surface and the skin that drags the tip over it.
+
+# A fading bristle damping gives power back nowhere if no speed u has damping(u)·|u| > 4·friction(u); exp(−x²)·x is at
+# most 1/√(2e), so damping·stribeck ≤ 4·√(2e)·kinetic is enough.
+PASSIVE = 4 * math.sqrt(2 * math.e)
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """Friction by LuGre bristles with a Stribeck curve, and a tip of some mass on the spring and damper of the skin.
+
+    All friction is proportional to the normal force, so stiffness and damping of the bristles are given for 1 N. The
+    values are guesses of the order of what is published for fingertips and silicone on smooth surfaces.
+
+    Raises
+    ------
+    InvalidParameter
+        If the friction could give out more work than it took in (`PASSIVE`), or falls below the sliding one at rest.
+    """
+
+    static: float = param(
+        0.9, 'Sets the coefficient of static friction at which a sticking tip starts to slip.', low=0.0, high=5.0
+    )
+    kinetic: float = param(0.5, 'Sets the coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
+    stribeck_m_s: float = param(
+        0.05,
+        'Sets the Stribeck speed over which friction falls from static to kinetic; a larger value falls more slowly.',
+        unit='m/s',
+        low=1e-4,
+        high=10.0,
+    )
+    viscous_s_m: float = param(
+        0.0, 'Sets the growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0
+    )
+    bristle_1_m: float = param(
+        1.5e5,
+        'Sets the bristle stiffness per normal force; a larger value bends the bristles less.',
+        unit='1/m',
+        low=1e2,
+        high=1e8,
+    )
+    bristle_s_m: float = param(
+        10.0,
+        'Sets the bristle damping per normal force; a larger value damps small motions more.',
+        unit='s/m',
+        low=0.0,
+        high=1e4,
+    )
+    skin_n_m: float = param(
+        1000.0,
+        'Sets the tangential stiffness of the skin; a larger value makes the stick phases shorter.',
+        unit='N/m',
+        low=1.0,
+        high=1e6,
+    )
+    skin_n_s_m: float = param(
+        0.4,
+        'Sets the tangential damping of the skin; a larger value damps the slip phases more.',
+        unit='N s/m',
+        low=0.0,
+        high=1e3,
+    )
+    mass_kg: float = param(
+        5e-4,
+        'Sets the moving mass of the skin; a larger value makes the slip phases longer.',
+        unit='kg',
+        low=1e-6,
+        high=1.0,
+    )
+    force_coupling: float = param(
+        0.2,
+        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
+        low=-10.0,
+        high=10.0,
+    )
+    step_s: float = param(
+        2.5e-4,
+        'Sets the longest integration step; a shorter step is more exact and costs more computing time.',
+        unit='s',
+        low=1e-7,
+        high=0.1,
+    )
+
+    def __post_init__(self) -> None:
+        if self.static < self.kinetic:
+            raise InvalidParameter(
+                f'static friction {self.static} is below the kinetic one, {self.kinetic}; give at least as much'
+            )
+        most = PASSIVE * self.kinetic / self.stribeck_m_s
+        if self.bristle_s_m > most:
+            raise InvalidParameter(
+                f'bristle_s_m is {self.bristle_s_m} s/m; more than {most:.3g} (9.33·kinetic/stribeck_m_s) would give '
+                'out work that was never put in; lower it'
+            )
+
+    @property
+    def passive_step_s(self) -> float:
+        """Up to this step the default integrator provably never adds energy: damping over stiffness of the skin."""
+        return self.skin_n_s_m / self.skin_n_m
+
+
+# --------------------
+# LuGre friction: the surfaces touch with bristles that bend before they slide (Canudas de Wit et al. 1995).
+#
+# State of the tip: `stretch_m` of the skin (base ahead of tip), `slip_m_s` (speed of the tip over the surface) and
+# `bend_m` of the bristles. With N the normal force and g the Stribeck curve:
+#
+#     stretch' = speed − slip
+#     mass·slip' = skin_n_m·stretch + skin_n_s_m·(speed − slip) − N·(σ0·bend + σ1(slip)·bend' + σ2·slip)
+#     bend' = slip − σ0·|slip|·bend / g(slip)
+#
+# σ1 fades as the Stribeck curve does, which keeps friction passive at all speeds. What comes into contact when the
+# force
+# grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend stays
+# when
+# N falls. So a change of force adds no energy, and a new touch begins unbent by itself.
+
+Value = Any  # a float, or an array over scans: the same formulas serve both
+
+
+class Tip(NamedTuple):
+    """State of one tip (floats) or of many (arrays of one shape)."""
+
+    stretch_m: Value
+    slip_m_s: Value
+    bend_m: Value
+
+
+AT_REST = Tip(0.0, 0.0, 0.0)
+
+
+def rate(friction: StickSlip, tip: Tip, speed_m_s: Value, force_n: Value, exp: Any = math.exp) -> Tip:
+    """Return the derivative of the state under a constant normal force; `exp` is numpy's for arrays.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    tip
+        State of the tip, floats or arrays of one shape.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+    exp
+        `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+    Returns
+    -------
+    Tip
+        Derivative of each part of the state by time.
+    """
+    stretch, slip, bend = tip
+    fading = exp(-slip * slip / friction.stribeck_m_s**2)
+    curve = friction.kinetic + (friction.static - friction.kinetic) * fading
+    bending = slip - friction.bristle_1_m * abs(slip) * bend / curve
+    rubbing = friction.bristle_1_m * bend + friction.bristle_s_m * fading * bending + friction.viscous_s_m * slip
+    pull_n = friction.skin_n_m * stretch + friction.skin_n_s_m * (speed_m_s - slip)
+    return Tip(speed_m_s - slip, (pull_n - force_n * rubbing) / friction.mass_kg, bending)
+
+
+def energy_j(friction: StickSlip, tip: Tip, force_n: Value) -> Value:
+    """Return what is stored: movement of the tip, stretched skin, bent bristles.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    tip
+        State of the tip, floats or arrays of one shape.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    float or array
+        J, at least 0.
+    """
+    moving = friction.mass_kg * tip.slip_m_s**2
+    bent = force_n * friction.bristle_1_m * tip.bend_m**2
+    return (moving + friction.skin_n_m * tip.stretch_m**2 + bent) / 2
+
+
+def jacobian(friction: StickSlip, slip_m_s: float, force_n: float) -> Array:
+    """Return the derivative of `rate` at rest with unbent bristles, or at steady sliding with slip > 0, (3, 3).
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    (3, 3)
+        1/s, in the order of the fields of `Tip`.
+    """
+    fading = math.exp(-((slip_m_s / friction.stribeck_m_s) ** 2))
+    curve = friction.kinetic + (friction.static - friction.kinetic) * fading
+    slope = -2 * slip_m_s / friction.stribeck_m_s**2 * (curve - friction.kinetic)
+    relaxing = friction.bristle_1_m * slip_m_s / curve
+    bending_by_slip = slip_m_s * slope / curve if slip_m_s else 1.0
+    damping = friction.bristle_s_m * fading
+    by_slip = force_n * (damping * bending_by_slip + friction.viscous_s_m)
+    by_bend = force_n * (friction.bristle_1_m - damping * relaxing)
+    moved = np.array([friction.skin_n_m, -friction.skin_n_s_m - by_slip, -by_bend]) / friction.mass_kg
+    return np.array([[0.0, -1.0, 0.0], moved, [0.0, bending_by_slip, -relaxing]])
+
+
+# --------------------
+# What integrates the bristle model step by step, and the longest step with which it is stable.
+
+State = tuple[Value, Value, Value]
+Step = Callable[[Value, Value, Value, Value, Value], State]
+
+
+class PrepareStep(Protocol):
+    """Makes the step of an integrator."""
+
+    def __call__(self, friction: StickSlip, step_s: float, exp: Any, /) -> Step:
+        """Return what takes the state over one step.
+
+        Parameters
+        ----------
+        friction
+            Friction of the surface, and the skin.
+        step_s
+            Length of an integration step.
+        exp
+            `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+        Returns
+        -------
+        callable
+            Takes stretch, slip, bend, and the speed and the force at the end of the step; returns the next state.
+        """
+
+
+class StepLimit(Protocol):
+    """Gives the longest step with which an integrator is stable."""
+
+    def __call__(self, friction: StickSlip, slip_m_s: float, force_n: float, /) -> float:
+        """Return the longest stable step.
+
+        Parameters
+        ----------
+        friction
+            Friction of the surface, and the skin.
+        slip_m_s
+            Speed of the tip over the surface; 0 if it sticks.
+        force_n
+            Normal force, at least 0.
+
+        Returns
+        -------
+        float
+            s; inf if every step is stable.
+        """
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """An integrator of fixed step.
+
+    Parameters
+    ----------
+    name
+        For messages and charts.
+    prepare
+        Makes its step.
+    limit_s
+        Gives the longest stable step.
+    """
+
+    name: str
+    prepare: PrepareStep
+    limit_s: StepLimit
+
+
+# --------------------
+# Stick-slip solved by scipy with a step of its own choice: the measure for the integrators of fixed step.
+
+SOLVERS: Mapping[str, str] = {'lsoda': 'LSODA', 'radau': 'Radau'}
+ABSOLUTE = np.array([1e-4, 1e-2, 1e-6])  # m, m/s, m: how large stretch, slip and bend are; times the tolerance
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """States at the times asked for, and how often the rate was computed."""
+
+    tip: Tip
+    evaluations: int
+
+
+def solve(
+    friction: StickSlip,
+    speed_m_s: float,
+    force_n: float,
+    times_s: Array,
+    *,
+    method: str = 'radau',
+    tolerance: float = 1e-9,
+) -> Solution:
+    """Return the movement from rest under constant speed and force at increasing times, (n,).
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Constant speed of the base.
+    force_n
+        Constant normal force.
+    times_s : (n,)
+        Increasing times.
+    method
+        One of `SOLVERS`.
+    tolerance
+        Relative tolerance of the solver.
+
+    Returns
+    -------
+    Solution
+        State at each time, and what it took.
+    """
+
+    def slope(_: float, state: Array) -> Tip:
+        return rate(friction, Tip(*state.tolist()), speed_m_s, force_n)
+
+    found = solve_ivp(
+        slope,
+        (0.0, float(times_s[-1])),
+        AT_REST,
+        method=find(SOLVERS, method, 'solver'),
+        t_eval=times_s,
+        rtol=tolerance,
+        atol=tolerance * ABSOLUTE,
+    )
+    return Solution(Tip(*found.y), int(found.nfev))
+
+
+# --------------------
+# The integrator of the bristle model: stable with long steps however stiff the bristles are.
+
+CORRECTIONS = 2  # solutions of the semi-implicit step: one with the friction of the old speed, one with that of the new
+
+
+def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
+    """Return a step with friction and damping at the new speed and the skin's spring at the old stretch.
+
+    Friction at the new speed makes the bristles harmless however stiff they are; the spring at the old stretch keeps
+    the skin's own swing from being damped by the numbers. The new slip w = ±W solves a quadratic equation:
+
+        bend' = (bend + h·w) / (1 + q·W), q = h·σ0/g
+        (mass/h + c + N·σ2)·w + N·(σ0·bend' + σ1·(bend' − bend)/h) = mass·slip/h + k·stretch + c·speed
+
+    The Stribeck curve g and σ1 are taken at the old slip first, then once again at the slip that this gave.
+    """
+    stiffness, damping, viscous = friction.skin_n_m, friction.skin_n_s_m, friction.viscous_s_m
+    bristle, bristle_damping = friction.bristle_1_m, friction.bristle_s_m
+    kinetic, more = friction.kinetic, friction.static - friction.kinetic
+    inertia, narrow, step_bristle = (
+        friction.mass_kg / step_s,
+        -1 / friction.stribeck_m_s**2,
+        step_s * friction.bristle_1_m,
+    )
+    corrections = range(CORRECTIONS)
+    copysign = math.copysign if exp is math.exp else np.copysign
+
+    def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
+        linear = inertia + damping + force * viscous
+        drive = inertia * slip + stiffness * stretch + damping * speed
+        left = drive - force * bristle * bend
+        size, sign = abs(left), copysign(1.0, left)
+        for _ in corrections:
+            fading = exp(narrow * slip * slip)
+            bent = step_bristle / (kinetic + more * fading)
+            holding = force * bristle_damping * fading
+            square = linear * bent
+            middle = linear + force * step_bristle + holding - sign * bent * (drive + holding * bend / step_s)
+            fast = ((middle * middle + 4 * square * size) ** 0.5 - middle) / (2 * square)
+            slip = sign * fast
+        return stretch + step_s * (speed - slip), slip, (bend + step_s * slip) / (1 + bent * fast)
+
+    return step
+
+
+def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
+    """Return the longest semi-implicit step: h²·k = 4·m + 2·h·D + h²·N·σ0, with D all damping and σ0 only if sticking.
+
+    Only the skin's own swing limits it, and not even that while bristles stiffer than the skin hold.
+    """
+    f = friction
+    sticking = slip_m_s == 0.0
+    damper = f.skin_n_s_m + force_n * (f.viscous_s_m + (f.bristle_s_m if sticking else 0.0))
+    spring = f.skin_n_m - (force_n * f.bristle_1_m if sticking else 0.0)
+    if spring <= 0:
+        return math.inf
+    return (damper + math.sqrt(damper**2 + 4 * f.mass_kg * spring)) / spring
+
+
+SEMI_IMPLICIT = Integrator('semi_implicit', semi_implicit, semi_implicit_limit_s)
+
+
+# --------------------
+# Longest step with which an integrator stays stable; longer steps are refused.
+
+MARGIN = 0.5  # share of the border up to which a step is accepted
+
+
+def max_slip_m_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
+    """Return the speed that a tip reaches at most when it slips: that of the base and that of the skin let go.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        m/s.
+    """
+    drop_n = (friction.static - friction.kinetic) * force_n
+    return speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
+
+
+def max_stable_step_s(integrator: Integrator, friction: StickSlip, speed_m_s: float, force_n: float) -> float:
+    """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface.
+
+    Parameters
+    ----------
+    integrator
+        What integrates.
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        s.
+    """
+    slip_m_s = max(max_slip_m_s(friction, speed_m_s, force_n), friction.stribeck_m_s)
+    cases = ((0.0, force_n), (slip_m_s, force_n), (slip_m_s, 0.0))
+    return min(integrator.limit_s(friction, slip, force) for slip, force in cases)
+
+
+def check_step(integrator: Integrator, friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
+    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all.
+
+    Parameters
+    ----------
+    integrator
+        What integrates.
+    friction
+        Friction of the surface, and the skin.
+    step_s
+        Length of an integration step.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+
+    Raises
+    ------
+    InvalidParameter
+        If the step is not above 0 or too long.
+    """
+    if not step_s > 0:
+        raise InvalidParameter(f'a step of {step_s} s; it must be above 0')
+    allowed_s = MARGIN * max_stable_step_s(integrator, friction, speed_m_s, force_n)
+    if step_s > allowed_s:
+        raise InvalidParameter(
+            f'a step of {1e6 * step_s:.3g} µs; {integrator.name} allows at most {1e6 * allowed_s:.3g} µs at '
+            f'{force_n:.3g} N and {speed_m_s:.3g} m/s with this skin and these bristles: take a shorter step_s, or a '
+            'heavier or softer skin'
+        )
+
+
+# --------------------
+# Drag tips over a surface, step by step: one scan in plain floats, or many at once in arrays.
+
+FEW = 40  # scans; up to so many are faster one after another in floats than together in arrays
+
+
+def drag(
+    friction: StickSlip,
+    speed_m_s: Array,
+    force_n: Array,
+    step_s: float,
+    *,
+    integrator: Integrator = SEMI_IMPLICIT,
+    start: Tip = AT_REST,
+    force_before_n: Value = 0.0,
+) -> Tip:
+    """Return the state at the end of each step.
+
+    Parameters
+    ----------
+    speed_m_s, force_n : (..., n)
+        Speed of the base along the path and normal force, at the end of each of n steps. Leading axes are scans.
+    step_s
+        Length of a step.
+    integrator
+        What integrates.
+    start, force_before_n
+        State of the tip and force before the first step, (...).
+    friction
+        Friction of the surface, and the skin.
+
+    Returns
+    -------
+    Tip of arrays (..., n)
+
+    Raises
+    ------
+    InvalidParameter
+        If the step is beyond the border of the integrator.
+    InvalidData
+        If a speed or force is not finite, or a force is below 0.
+    """
+    check_drive(speed_m_s, force_n)
+    if not speed_m_s.size:
+        return Tip(*(np.zeros_like(speed_m_s) for _ in range(3)))
+    check_step(integrator, friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
+    return drag_unchecked(
+        friction, speed_m_s, force_n, step_s, integrator=integrator, start=start, force_before_n=force_before_n
+    )
+
+
+def drag_unchecked(
+    friction: StickSlip,
+    speed_m_s: Array,
+    force_n: Array,
+    step_s: float,
+    *,
+    integrator: Integrator,
+    start: Tip = AT_REST,
+    force_before_n: Value = 0.0,
+) -> Tip:
+    """Do as `drag` does, whatever comes of it; to find the borders.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s : (..., n)
+        Speed of the base at the end of each step.
+    force_n : (..., n)
+        Normal force at the end of each step.
+    step_s
+        Length of an integration step.
+    integrator
+        What integrates.
+    start
+        State of the tip before the first step.
+    force_before_n : (...)
+        Force before the first step.
+
+    Returns
+    -------
+    Tip of arrays (..., n)
+    """
+    before = np.concatenate([np.broadcast_to(force_before_n, speed_m_s.shape[:-1])[..., None], force_n[..., :-1]], -1)
+    kept = np.divide(
+        before, force_n, out=np.ones_like(before), where=force_n > before
+    )  # of the bending, see bristle.py
+    prepare = integrator.prepare
+    if math.prod(speed_m_s.shape[:-1]) <= FEW:
+        return _few(prepare(friction, step_s, math.exp), start, speed_m_s, force_n, kept)
+    return _many(prepare(friction, step_s, np.exp), start, speed_m_s, force_n, kept)
+
+
+def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
+    """Return the force of the skin on the tip: what the finger senses along the surface.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    tip
+        State of the tip, arrays (..., n).
+    speed_m_s : (..., n)
+        Speed of the base.
+
+    Returns
+    -------
+    (..., n)
+        Force in N.
+    """
+    pull: Array = friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s)
+    return pull
+
+
+def check_drive(speed_m_s: Array, force_n: Array) -> None:
+    """Raise InvalidData for speeds and forces that no finger has.
+
+    Parameters
+    ----------
+    speed_m_s, force_n : (..., n)
+        For each step.
+
+    Raises
+    ------
+    InvalidData
+        If the shapes differ, a number is not finite, or a force is below 0.
+    """
+    if speed_m_s.shape != force_n.shape:
+        raise InvalidData(f'speeds {speed_m_s.shape} and forces {force_n.shape}; give one of each for every step')
+    if not (np.isfinite(speed_m_s).all() and np.isfinite(force_n).all()):
+        raise InvalidData('a speed or force that is not finite; give numbers only')
+    if (force_n < 0).any():
+        raise InvalidData(f'a force of {force_n.min():.3g} N; a finger presses with 0 or more')
+
+
+def _few(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array) -> Tip:
+    """Return the states of a few scans, (..., n), one after another in plain floats."""
+    shape = speed_m_s.shape
+    starts = [np.broadcast_to(value, shape[:-1]).ravel().tolist() for value in start]
+    drives = [values.reshape(-1, shape[-1]).tolist() for values in (speed_m_s, force_n, kept)]
+    states = [_one(step, first, *drive) for first, *drive in zip(zip(*starts, strict=True), *drives, strict=True)]
+    return _tip(np.moveaxis(np.array(states), -1, 0).reshape(3, *shape))
+
+
+def _one(
+    step: Step, start: tuple[float, ...], speed_m_s: list[float], force_n: list[float], kept: list[float]
+) -> list[State]:
+    """Return the state at the end of each step."""
+    stretch, slip, bend = start
+    states: list[State] = []
+    note = states.append
+    for speed, force, share in zip(speed_m_s, force_n, kept, strict=True):
+        stretch, slip, bend = state = step(stretch, slip, bend * share, speed, force)
+        note(state)
+    return states
+
+
+def _many(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array) -> Tip:
+    """Return the states of many scans, (..., n)."""
+    shape = speed_m_s.shape[:-1]
+    stretch, slip, bend = (np.array(np.broadcast_to(value, shape), dtype=np.float64) for value in start)
+    states = np.empty((3, speed_m_s.shape[-1], *shape))
+    drives = (np.ascontiguousarray(np.moveaxis(values, -1, 0)) for values in (speed_m_s, force_n, kept))
+    for i, (speed, force, share) in enumerate(zip(*drives, strict=True)):
+        stretch, slip, bend = states[:, i] = step(stretch, slip, bend * share, speed, force)
+    return _tip(np.moveaxis(states, 1, -1))
+
+
+def _tip(states: Array) -> Tip:
+    return Tip(states[0], states[1], states[2])
+
+
+# --------------------
+# The Stribeck curve: friction that falls from its value at rest to that of sliding.
+
+FADED = 6.0  # at so many Stribeck speeds the curve is flat
+
+
+def coefficient(friction: StickSlip, speed_m_s: Array) -> Array:
+    """Return the coefficient of friction of steady sliding, without the viscous part: in kinetic to static.
+
+    kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
+    Source: Bo & Pavelescu 1982; Armstrong-Hélouvry et al. 1994.
+
+    Parameters
+    ----------
+    speed_m_s : (...)
+        Speed of the tip over the surface, of either sign.
+
+    Returns
+    -------
+    (...)
+        Coefficient at each speed.
+    """
+    share: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
+    return friction.kinetic + (friction.static - friction.kinetic) * share
+
+
+def steady_force_n(friction: StickSlip, speed_m_s: Array, force_n: float) -> Array:
+    """Return the friction of steady sliding, against the movement, with the viscous part.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s : (...)
+        Speeds of the tip, of either sign.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    (...)
+        Force in N, of the sign of the speed.
+    """
+    speed = np.asarray(speed_m_s)
+    force: Array = force_n * (np.sign(speed) * coefficient(friction, speed) + friction.viscous_s_m * speed)
+    return force
+
+
+def slope_s_m(friction: StickSlip, speed_m_s: Array) -> Array:
+    """Return by how much the coefficient grows with a speed ≥ 0, viscous part included; mostly negative.
+
+    Parameters
+    ----------
+    speed_m_s : (...)
+        Speed of the tip over the surface, at least 0.
+
+    Returns
+    -------
+    (...)
+        Slope in s/m at each speed.
+    """
+    speed = np.asarray(speed_m_s)
+    fading = coefficient(friction, speed) - friction.kinetic
+    slope: Array = friction.viscous_s_m - 2 * speed / friction.stribeck_m_s**2 * fading
+    return slope
+
+
+def critical_speed_m_s(friction: StickSlip, force_n: float) -> float:
+    """Return the speed from which steady sliding is stable: the skin damps more than the falling friction drives.
+
+    The highest speed with skin damping + force·slope = 0; 0 if sliding is stable at all speeds.
+    """
+
+    def damping(speed_m_s: float) -> float:
+        return friction.skin_n_s_m + force_n * float(slope_s_m(friction, np.array(speed_m_s)))
+
+    speeds = np.linspace(0.0, FADED * friction.stribeck_m_s, 1000)
+    driven = np.flatnonzero([damping(speed) < 0 for speed in speeds])
+    if not len(driven):
+        return 0.0
+    last = driven[-1]
+    if last + 1 == len(speeds):
+        return float(speeds[-1])
+    return float(brentq(damping, speeds[last], speeds[last + 1]))
+
+
+# --------------------
+# The vibration of a slowly dragged tip, by formula: it sticks until the skin pulls enough, then slips half a swing.
+
+NUDGE = 1e-9  # m/s, so small that only the linear movement is seen
+BEND_NUDGE = 1e-7  # share of the bending
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """How long a tip sticks and slips, and how far the force on the skin swings."""
+
+    stick_s: float
+    slip_s: float
+    swing_n: float
+
+    @property
+    def period_s(self) -> float:
+        """Time from one letting go to the next."""
+        return self.stick_s + self.slip_s
+
+
+def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> LimitCycle:
+    """Return the cycle of a drag that is slow against the Stribeck speed and the swing of the tip.
+
+    The tip lets go at static·force and swings about kinetic·force; without damping it comes to rest as far below, hence
+    the period 2·(static − kinetic)·force / (stiffness·speed) + half a period of the skin. Damping shortens the swing.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    LimitCycle
+        Times in s, and the swing of the force in N.
+    """
+    drop_n = (friction.static - friction.kinetic) * force_n
+    natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)
+    damping = min(friction.skin_n_s_m / (2 * friction.mass_kg * natural_1_s), 1 - 1e-9)
+    root = math.sqrt(1 - damping**2)
+    swing_n = drop_n * (1 + math.exp(-math.pi * damping / root))
+    return LimitCycle(swing_n / (friction.skin_n_m * speed_m_s), math.pi / (natural_1_s * root), swing_n)
+
+
+def nudged(friction: StickSlip, base_m_s: float, force_n: float) -> Tip:
+    """Return the state of steady sliding (or rest, at 0) with the speed of the tip and the bend off by a nudge.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    base_m_s
+        Speed of the base; 0 for a tip at rest.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    Tip
+        In floats.
+    """
+    curve = float(coefficient(friction, np.array(base_m_s))) if base_m_s else 0.0
+    off = BEND_NUDGE * (curve or friction.kinetic)
+    stretch_m = force_n * (curve + friction.viscous_s_m * base_m_s) / friction.skin_n_m
+    return Tip(stretch_m, base_m_s + NUDGE, (curve + off) / friction.bristle_1_m)
+
+
+# --------------------
+# Force that a sensor measures from stick-slip along a trajectory, block by block.
+
+JUMP_M_S = 3.0  # what moves faster than this was put elsewhere, it did not slide
+
+
+class TipDrag:
+    """Follow the tip of a finger that is dragged along a path; what lies between the blocks is continuous.
+
+    Parameters
+    ----------
+    friction
+        Of the surface, and the skin.
+    rate_hz
+        Points of the path a second; several steps are taken between two points where `step_s` asks for it.
+    stretched : number or (...)
+        How far the skin is stretched at the first point, as a share of what makes it let go: a slide need not begin
+        with a touch.
+
+    Raises
+    ------
+    InvalidParameter
+        If the step is beyond the border of stability.
+    """
+
+    def __init__(self, friction: StickSlip, rate_hz: float, stretched: float | Array = 0.0) -> None:
+        self.friction = friction
+        self._rate_hz = rate_hz
+        check_step(SEMI_IMPLICIT, friction, friction.step_s, 0.0, 0.0)
+        self._substeps = max(1, math.ceil(1 / (rate_hz * friction.step_s) - 1e-9))
+        self._step_s = 1 / (rate_hz * self._substeps)
+        self._stretched = np.asarray(stretched, dtype=np.float64)
+        self._tip = AT_REST
+        self._before: tuple[Array, Array, Array, Array] | None = None  # x, y, speed and force, (..., 1)
+        self._forward: tuple[Array, Array] | None = None  # the direction that counts as forward, (..., 1)
+
+    def advance(self, path: Trajectory) -> Array:
+        """Return the force that the sensor senses beside the shape of the surface, (..., n), N."""
+        if not len(path):
+            return np.zeros_like(path.x_m)
+        speed_m_s, force_n = self._along(path), np.maximum(path.force_n, 0.0)
+        _, _, speed_before, force_before = self._before or self._first(force_n[..., :1])
+        speeds, forces = self._between(speed_before, speed_m_s), self._between(force_before, force_n)
+        tip = drag(self.friction, speeds, forces, self._step_s, start=self._tip, force_before_n=force_before[..., 0])
+        self._tip = Tip(*(values[..., -1] for values in tip))
+        self._before = path.x_m[..., -1:], path.y_m[..., -1:], speed_m_s[..., -1:], force_n[..., -1:]
+        sensed_n: Array = self.friction.force_coupling * pull_n(self.friction, tip, speeds)
+        return sensed_n[..., self._substeps - 1 :: self._substeps]
+
+    def _first(self, force_n: Array) -> tuple[Array, Array, Array, Array]:
+        """Return what was before the first point, (..., 1) each, and let the tip hang there."""
+        nothing = np.zeros_like(force_n)
+        if not self._stretched.any():
+            return (nothing,) * 4
+        pull_n = self._stretched * self.friction.static * force_n[..., 0]
+        bend_m = self._stretched * self.friction.static / self.friction.bristle_1_m
+        self._tip = Tip(pull_n / self.friction.skin_n_m, np.zeros_like(pull_n), bend_m)
+        return nothing, nothing, nothing, force_n
+
+    def _along(self, path: Trajectory) -> Array:
+        """Return the speed at each point, (..., n); below 0 while the path goes back the way it came."""
+        x_m, y_m = self._before[:2] if self._before else (path.x_m[..., :1], path.y_m[..., :1])
+        dx_m, dy_m = np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)
+        speed_m_s: Array = np.hypot(dx_m, dy_m) * self._rate_hz
+        speed_m_s[speed_m_s > JUMP_M_S] = 0.0
+        speed_m_s *= self._signs(dx_m, dy_m, speed_m_s > 0)
+        return speed_m_s
+
+    def _signs(self, dx_m: Array, dy_m: Array, moving: NDArray[np.bool_]) -> Array:
+        """Return +1 or −1 at each point, (..., n): the sign changes where the path turns by more than a right angle."""
+        known = self._forward or (np.zeros_like(dx_m[..., :1]),) * 2
+        x, y = (np.concatenate(pair, axis=-1) for pair in zip(known, (dx_m, dy_m), strict=True))
+        numbers = np.arange(1, dx_m.shape[-1] + 1)
+        last = np.maximum.accumulate(np.where(moving, numbers, 0), axis=-1)  # at each point, the last that moved
+        before = np.concatenate([np.zeros_like(last[..., :1]), last[..., :-1]], axis=-1)
+        along = dx_m * np.take_along_axis(x, before, -1) + dy_m * np.take_along_axis(y, before, -1)
+        signs: Array = np.cumprod(np.where(moving & (along < 0), -1.0, 1.0), axis=-1)
+        # What counts as forward stays, whatever way the tip goes at the end of the block.
+        end = last[..., -1:]
+        self._forward = (
+            signs[..., -1:] * np.take_along_axis(x, end, -1),
+            signs[..., -1:] * np.take_along_axis(y, end, -1),
+        )
+        return signs
+
+    def _between(self, before: Array, values: Array) -> Array:
+        """Return values at the end of each step, straight from point to point, (..., n · steps between points)."""
+        if self._substeps == 1:
+            return values
+        known = np.concatenate([before, values[..., :-1]], axis=-1)[..., None]
+        shares = np.arange(1, self._substeps + 1) / self._substeps
+        steps: Array = known + (values[..., None] - known) * shares
+        return steps.reshape(*values.shape[:-1], -1)
+
+
+# --------------------
+# Friction that only ever slides.
+
+CREEP_M_S = 1e-3  # below about this speed friction builds up, so that nothing jumps where a slide begins
+
+
+@dataclass(frozen=True)
+class SlidingFriction:
+    """A Stribeck curve without memory: the skin is pulled along as at a steady speed, and never hangs.
+
+    For surfaces on which nothing sticks, hundreds of times cheaper than `StickSlip`.
+
+    Raises
+    ------
+    InvalidParameter
+        If friction is lower at rest than in fast sliding.
+    """
+
+    static: float = param(0.6, 'Sets the coefficient of friction of slow sliding.', low=0.0, high=5.0)
+    kinetic: float = param(0.5, 'Sets the coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
+    stribeck_m_s: float = param(
+        0.05,
+        'Sets the Stribeck speed over which friction falls from static to kinetic; a larger value falls more slowly.',
+        unit='m/s',
+        low=1e-4,
+        high=10.0,
+    )
+    viscous_s_m: float = param(
+        0.0, 'Sets the growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0
+    )
+    force_coupling: float = param(
+        0.2,
+        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
+        low=-10.0,
+        high=10.0,
+    )
+
+    def __post_init__(self) -> None:
+        self.curve()
+
+    def curve(self) -> StickSlip:
+        """Return the same curve as that of bristles."""
+        return StickSlip(self.static, self.kinetic, self.stribeck_m_s, self.viscous_s_m, bristle_s_m=0.0)
+
+
+class SlidingDrag:
+    """Follow a finger that slides along a path; what lies between the blocks is continuous.
+
+    Parameters
+    ----------
+    friction
+        Of the surface.
+    rate_hz
+        Points of the path a second.
+    """
+
+    def __init__(self, friction: SlidingFriction, rate_hz: float) -> None:
+        self._curve = friction.curve()
+        self._force_coupling = friction.force_coupling
+        self._rate_hz = rate_hz
+        self._before: tuple[Array, Array] | None = None
+
+    def advance(self, path: Trajectory) -> Array:
+        """Return the force that the sensor senses, (..., n) N: of one sign, whichever way the finger goes."""
+        if not len(path):
+            return np.zeros_like(path.x_m)
+        x_m, y_m = self._before or before_first(path)
+        self._before = path.x_m[..., -1:], path.y_m[..., -1:]
+        speed_m_s = np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)) * self._rate_hz
+        built_up = speed_m_s / np.hypot(speed_m_s, CREEP_M_S)
+        force_coupling: Array = (
+            self._force_coupling
+            * np.maximum(path.force_n, 0.0)
+            * built_up
+            * steady_force_n(self._curve, speed_m_s, 1.0)
+        )
+        return force_coupling
+
+
+# --------------------
+# The kinds of friction by name, each off unless a surface asks for it, and what follows a finger with them.
+
+FRICTIONS: Mapping[str, type] = {
+    'sliding_friction': SlidingFriction,  # a Stribeck curve, without memory
+    'stick_slip': StickSlip,  # bristles (LuGre): the skin hangs and lets go
+}
+
+
+class Drag(Protocol):
+    """What a finger senses of the friction along its path, block by block."""
+
+    def advance(self, path: Trajectory) -> Array:
+        """Return the force that the sensor senses beside the shape of the surface, (..., n) N.
+
+        Parameters
+        ----------
+        path
+            The next points of the trajectory.
+
+        Returns
+        -------
+        (..., n)
+            N.
+        """
+
+
+def _stick_slip_drag(
+    friction: StickSlip, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
+) -> Drag:
+    # Slides that are cut out of longer ones begin with the skin at any point of its cycle, not all at the same.
+    return TipDrag(friction, rate_hz, stretched=rng.uniform(0.0, 1.0, batch_shape))
+
+
+def _sliding_drag(
+    friction: SlidingFriction, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
+) -> Drag:
+    return SlidingDrag(friction, rate_hz)
+
+
+DRAGS: Mapping[type, Callable[[Any, float, np.random.Generator, tuple[int, ...]], Drag]] = {
+    StickSlip: _stick_slip_drag,
+    SlidingFriction: _sliding_drag,
+}
+
+
+def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]) -> Drag:
+    """Return what follows a finger over a surface.
+
+    Parameters
+    ----------
+    friction
+        One of `FRICTIONS`.
+    rate_hz
+        Points of the path a second.
+    rng
+        Decides how far the skin is stretched where a slide begins under load.
+    batch_shape
+        () for one slide, (count,) for many at once.
+
+    Returns
+    -------
+    Drag
+        Follows the path from its first point on.
+    """
+    return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)
+
+
+def sliding_coefficient(friction: StickSlip | SlidingFriction, speed_m_s: Array) -> Array:
+    """Return tangential over normal force of a finger that slides steadily.
+
+    Parameters
+    ----------
+    friction
+        One of `FRICTIONS`.
+    speed_m_s : (...)
+        Speed along the surface.
+
+    Returns
+    -------
+    (...)
+        The Stribeck curve at the speed, without dimension.
+
+    Examples
+    --------
+    >>> sliding_coefficient(SlidingFriction(static=0.6, kinetic=0.5), np.array([10.0])).round(3).tolist()  # fast
+    [0.5]
+    """
+    curve = friction.curve() if isinstance(friction, SlidingFriction) else friction
+    return steady_force_n(curve, speed_m_s, 1.0)

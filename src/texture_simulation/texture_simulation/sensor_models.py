@@ -1,0 +1,1037 @@
+"""How each finger turns contact into samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal as filters
+
+from texture_core.types import Array, Samples
+from texture_drivers import anyskin, biotac, daq, papillarray, pvdf, tsf85
+from texture_drivers.biotac import FULL_SCALE, PAC, SLOT_RATE_HZ, BioTacLayout
+from texture_drivers.biotac import LAYOUTS as BIOTACS
+from texture_drivers.pvdf import ChargeLeak
+from texture_drivers.tsf85 import LAYOUTS, RATE_HZ, TSF85, Tsf85Layout
+from texture_drivers.tsf85 import LAYOUTS as TSF85S
+from texture_simulation.contact import SkinContact
+from texture_simulation.effects import BatchShape, SignalEffect
+from texture_simulation.path import Filter, Trajectory, before_first
+from texture_simulation.scene import Scene
+from texture_simulation.surfaces import Surface
+
+# --------------------
+# From exact values to what a converter sends, with the effects on the way.
+
+Integer = TypeVar('Integer', bound=np.integer[Any])
+
+
+class Converter:
+    """Turn samples of one stream into whole counts within a range.
+
+    Parameters
+    ----------
+    scene
+        Whose effects on the signal are applied.
+    rng
+        Their randomness.
+    rate_hz, channels
+        Of the stream.
+    limits
+        Least and most count.
+    batch_shape
+        () for one slide, (count,) for many at once.
+    slow
+        Whether it is the slow stream beside the fast one.
+    scale
+        Counts of this converter for one count of the effects, which are those of a TSF-85.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        rng: np.random.Generator,
+        rate_hz: float,
+        channels: int,
+        limits: tuple[int, int],
+        *,
+        batch_shape: BatchShape,
+        slow: bool = False,
+        scale: float = 1.0,
+    ) -> None:
+        self._limits = limits
+        self._scale = scale
+        self._filters = [
+            effect.start_signal(rng, rate_hz, batch_shape, channels, slow=slow)
+            for effect in scene.effects_of(SignalEffect)
+        ]
+
+    def exact(self, counts: Samples) -> Samples:
+        """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole.
+
+        Parameters
+        ----------
+        counts : (..., n_samples, n_channels)
+            What the sensor measures, in counts that need not be whole.
+
+        Returns
+        -------
+        (..., n_samples, n_channels)
+            Counts.
+        """
+        if self._filters:
+            counts = counts / self._scale
+            for apply in self._filters:
+                counts = apply(counts)
+            counts = counts * self._scale
+        whole = np.rint(counts)
+        return np.clip(whole, *self._limits, out=whole)
+
+    def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
+        """Return the same as whole numbers.
+
+        Parameters
+        ----------
+        counts : (..., n_samples, n_channels)
+            What the sensor measures, in counts that need not be whole.
+        kind
+            Integer type of numpy.
+
+        Returns
+        -------
+        (..., n_samples, n_channels)
+            Counts of the type `kind`.
+        """
+        whole: NDArray[Integer] = self.exact(counts).astype(kind)
+        return whole
+
+
+# --------------------
+# What every simulated sensor has in common.
+
+
+class SensorModel(Protocol):
+    """Turns a path, block by block, into what the sensor publishes; what lies between the blocks is continuous."""
+
+    touch: SkinContact
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return samples by topic, (..., n_samples, n_channels) in the unit the driver publishes.
+
+        Parameters
+        ----------
+        path
+            The next points, whole steps of the sensor.
+        slow
+            Whether the slow stream is wanted, too.
+
+        Returns
+        -------
+        mapping
+            Topic → (..., n_samples, n_channels).
+        """
+
+
+@dataclass(frozen=True)
+class SimulatedStream:
+    """What a topic holds."""
+
+    topic: str
+    sensor: str
+    channels: tuple[str, ...]
+    unit: str
+    rate_hz: float
+    delay_s: float = 0.0  # of the first sample, after the beginning
+
+
+class MakeModel(Protocol):
+    """How a model is made."""
+
+    def __call__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> SensorModel:
+        """Return a model.
+
+        Parameters
+        ----------
+        scene, surface
+            How the finger senses, and what.
+        rng
+            All randomness: where a sample is touched, what the effects do.
+        finger
+            Which individual of the sensor: its traits are its own and stay the same.
+        batch_shape
+            () for one slide at a time, (count,) for many at once.
+        settled
+            Whether its filters have forgotten how the touch began.
+
+        Returns
+        -------
+        SensorModel
+        """
+
+
+@dataclass(frozen=True)
+class SensorKind:
+    """A simulated sensor.
+
+    Parameters
+    ----------
+    make
+        The model.
+    path_rate_hz
+        Points of the path a second.
+    step_points
+        Points of a whole step: a path must consist of such.
+    streams
+        What it publishes; the fast one first.
+    """
+
+    make: MakeModel
+    path_rate_hz: float
+    step_points: int
+    streams: tuple[SimulatedStream, ...]
+
+    @property
+    def fast(self) -> SimulatedStream:
+        """The fast stream."""
+        return self.streams[0]
+
+
+def individual_rng(finger: int) -> np.random.Generator:
+    """Return the randomness out of which an individual of a sensor is made."""
+    return np.random.default_rng([finger, 7])
+
+
+# --------------------
+# What a BioTac fingertip measures while it goes along a path.
+#
+# PAC: pressure of the fluid between 10 and 1040 Hz. PDC: that pressure itself. Electrodes: the fluid over them, which
+# the
+# load squeezes away. TDC, TAC: the finger is cooled by what it touches. Bands and resolutions of the pressures are
+# those
+# of the manual; the sensitivities are ours, in the order of magnitude of public recordings of slides at 10 N.
+
+BIOTAC_OVERSAMPLING = (
+    1  # points of the path in a slot: at 0.4 m/s and below the skin blurs what 4.4 kHz would fold down
+)
+BIOTAC_PATH_RATE_HZ = BIOTAC_OVERSAMPLING * SLOT_RATE_HZ
+PA_PER_N = 1500.0  # fluid pressure
+PAC_PA, PDC_PA = 0.37, 36.5  # of a count
+PAC_BASELINE, PDC_BASELINE = 2030.0, 2200.0  # PAC idles at mid-scale: 2020 to 2035 in the QuickStart Guide's sample
+PAC_BAND = np.concatenate(
+    [
+        filters.butter(1, 10.0, 'highpass', fs=BIOTAC_PATH_RATE_HZ, output='sos'),
+        filters.butter(2, 1040.0, 'lowpass', fs=BIOTAC_PATH_RATE_HZ, output='sos'),
+    ]
+)
+PAC_POINTS = slice(
+    2 * BIOTAC_OVERSAMPLING - 1, None, 2 * BIOTAC_OVERSAMPLING
+)  # PAC is sampled in every second slot, at its end
+ELECTRODE_BASELINE = (2800.0, 3400.0)  # range of the electrodes without load
+ELECTRODE_COUNTS_PER_N = 400.0  # of the electrode under the load; falls off with the distance
+ELECTRODE_PITCH_M = 3e-3
+COLUMNS = 4
+BIOTAC_CONTACT_RADIUS_M = 5e-3
+ELECTRODE_BLUR_M = 1.5e-3
+TDC_BASELINE, TAC_BASELINE = 2400.0, 2100.0
+TDC_FALL = 30.0  # counts, after a long touch
+TAC_PER_TDC_S = 20.0
+TOUCH_S = 4.0  # time constant of cooling and warming
+EFFECT_SCALE = 0.1  # counts of 12 bits; an idle PAC stays within a few (QuickStart Guide), a TSF-85 within some tens
+BIOTAC_LIMITS = (0, FULL_SCALE)
+
+
+class BioTacModel:
+    """Turn a path, frame by frame, into the sensor's counts; see `sensors.model.MakeModel` for the arguments.
+
+    Parameters
+    ----------
+    layout
+        Kind of BioTac.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        layout: BioTacLayout,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, BIOTAC_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        self._layout = layout
+        self._band = Filter(PAC_BAND, settled=settled)
+        step = 1 - np.exp(-layout.frame_s / TOUCH_S)
+        self._cool = Filter(np.array([[step, 0.0, 0.0, 1.0, step - 1, 0.0]]))
+        self._cooled: Array | None = None  # share of the fall of temperature, (..., 1)
+        row, column = np.divmod(np.arange(layout.electrodes)[:, None], COLUMNS)
+        self._x_m = (column - (COLUMNS - 1) / 2) * ELECTRODE_PITCH_M
+        self._y_m = (row - (layout.electrodes // COLUMNS) / 2) * ELECTRODE_PITCH_M
+        self._baseline = individual_rng(finger).uniform(*ELECTRODE_BASELINE, (layout.electrodes, 1))
+        slow = len(layout.slow_slots)
+        self._fast = Converter(
+            scene, rng, layout.pac_rate_hz, 1, BIOTAC_LIMITS, batch_shape=batch_shape, scale=EFFECT_SCALE
+        )
+        self._slow = Converter(
+            scene,
+            rng,
+            layout.frame_rate_hz,
+            slow,
+            BIOTAC_LIMITS,
+            batch_shape=batch_shape,
+            slow=True,
+            scale=EFFECT_SCALE,
+        )
+
+    @property
+    def points_per_frame(self) -> int:
+        """Points of the path, at 4.4 kHz, that one frame takes."""
+        return points_per_frame(self._layout)
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return PAC, and the slow channels if wanted, in counts."""
+        placed, pressure_pa = self._pressure_pa(path)
+        fast = {'signal': self._fast.exact(self._pac(pressure_pa))}
+        return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
+
+    def advance(self, path: Trajectory) -> NDArray[np.uint16]:
+        """Return what is measured along the next piece of path.
+
+        Parameters
+        ----------
+        path
+            Points at 4.4 kHz, whole frames of them; slot i is sampled at point i.
+
+        Returns
+        -------
+        (n_frames, n_slots) counts
+        """
+        streams = self.streams(path)
+        frames = streams['signal_static']
+        counts = np.empty((*frames.shape[:-1], len(self._layout.slots)), dtype=np.uint16)
+        pac = [channel == PAC for channel in self._layout.slots]
+        counts[..., pac] = streams['signal'].reshape(*frames.shape[:-1], self._layout.pac_per_frame)
+        counts[..., list(self._layout.slow_slots)] = frames
+        return counts
+
+    def _pressure_pa(self, path: Trajectory) -> tuple[Trajectory, Array]:
+        """Return where the skin goes, and the pressure in the finger there, (..., n)."""
+        placed = self.touch.placed(path)
+        return placed, PA_PER_N * (placed.force_n + self.touch.variation_n(placed))
+
+    def _pac(self, pressure_pa: Array) -> Samples:
+        """Return PAC, (..., n_samples, 1) counts."""
+        return PAC_BASELINE + self._band(pressure_pa)[..., PAC_POINTS, None] / PAC_PA
+
+    def _frames(self, placed: Trajectory, pressure_pa: Array) -> Samples:
+        """Return the slow channels at the start of each frame, (..., n_frames, n_slow_channels) counts."""
+        starts = slice(0, None, self.points_per_frame)
+        at = placed.at(starts)
+        pdc = PDC_BASELINE + pressure_pa[..., starts, None] / PDC_PA
+        electrodes = np.swapaxes(self._electrodes(at), -1, -2)
+        return np.concatenate([*self._temperatures(at.force_n > 0), pdc, electrodes], axis=-1)
+
+    def _temperatures(self, touching: NDArray[np.bool_]) -> tuple[Samples, Samples]:
+        """Return the temperature and its flow at each frame, (..., n_frames, 1) counts each: a lag of first order."""
+        cooled = self._cool(touching.astype(np.float64))
+        before = np.zeros_like(cooled[..., :1]) if self._cooled is None else self._cooled
+        rate_1_s = np.diff(cooled, prepend=before) / self._layout.frame_s
+        self._cooled = cooled[..., -1:] if cooled.shape[-1] else self._cooled
+        return (
+            (TDC_BASELINE - TDC_FALL * cooled)[..., None],
+            (TAC_BASELINE - TAC_PER_TDC_S * TDC_FALL * rate_1_s)[..., None],
+        )
+
+    def _electrodes(self, at: Trajectory) -> Array:
+        """Return the electrodes at each frame, (..., n_electrodes, n_frames) counts: low where the load is."""
+        force_n = at.force_n[..., None, :]
+        radius_m = self.touch.patch_share * BIOTAC_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
+        x_m, y_m = (
+            np.asarray(centre)[..., None, :] if np.ndim(centre) else centre for centre in self.touch.centre_m(at)
+        )
+        nearness = np.maximum(0.0, 1 - ((self._x_m - x_m) ** 2 + (self._y_m - y_m) ** 2) / radius_m**2)
+        texture_n = self.touch.static_variation_n(at, ELECTRODE_BLUR_M, (self._x_m, self._y_m))
+        # Squeezing stiffens: the fluid over an electrode thins out, and never vanishes.
+        load = np.maximum(ELECTRODE_COUNTS_PER_N * nearness * (force_n + texture_n), 0.0)
+        counts: Array = self._baseline / (1 + load / self._baseline)
+        return counts
+
+
+def points_per_frame(layout: BioTacLayout) -> int:
+    """Return how many points of the path, at 4.4 kHz, one frame takes."""
+    return BIOTAC_OVERSAMPLING * len(layout.slots)
+
+
+def biotac_kind(layout: BioTacLayout) -> SensorKind:
+    """Return a kind of BioTac."""
+    return SensorKind(
+        make=partial(BioTacModel, layout=layout),
+        path_rate_hz=BIOTAC_PATH_RATE_HZ,
+        step_points=points_per_frame(layout),
+        streams=(
+            SimulatedStream('signal', biotac.PAC_SENSOR, (PAC,), biotac.UNIT, layout.pac_rate_hz, 1 / SLOT_RATE_HZ),
+            SimulatedStream(
+                'signal_static', biotac.SLOW_SENSOR, layout.slow_channels, biotac.UNIT, layout.frame_rate_hz
+            ),
+        ),
+    )
+
+
+# --------------------
+# What the finger of Jamali & Sammut 2010 measures while it goes along a path.
+#
+# Four PVDF films and four strain gauges lie at random places in two layers of silicone. Each senses the pressure over
+# its
+# place, the blunter the deeper it lies: a film its changes (the charge leaks), a gauge the pressure itself. All pass
+# a
+# low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper tells none.
+
+DAQ_RATE_HZ = daq.RATE_HZ
+# A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
+# that 2.5 kHz would fold down; what is faster is blurred more (`skin_contact.py`).
+DAQ_OVERSAMPLING = 1
+DAQ_PATH_RATE_HZ = DAQ_OVERSAMPLING * DAQ_RATE_HZ
+FILMS, GAUGES = 4, 4
+ELEMENTS = FILMS + GAUGES
+DAQ_CHANNELS = tuple(
+    f'{element}_{layer}_{number}' for element in ('pvdf', 'strain') for layer in ('outer', 'inner') for number in (1, 2)
+)  # as in the driver's daq.yaml
+LAYER_BLUR_M = (1.5e-4, 4e-4)  # outer, inner; half of the films and half of the gauges lie in each
+DAQ_BLUR_M = np.repeat(np.tile(LAYER_BLUR_M, 2), ELEMENTS // 4)[:, None]
+PLACE_M = 4e-3  # largest distance of a place from the middle, along each side
+VOLT_PER_N = (2.0, 6.0)  # range of the sensitivities
+VOLT_PER_COUNT = 10.0 / 2**15
+LEAK_HZ = 1.0  # corner of the films' amplifiers
+DAQ_LEAK = filters.butter(1, LEAK_HZ, 'highpass', fs=DAQ_PATH_RATE_HZ, output='sos')
+DAQ_BAND = filters.butter(4, 500.0, 'lowpass', fs=DAQ_PATH_RATE_HZ, output='sos')
+DAQ_LIMITS = (-(2**15), 2**15 - 1)
+
+
+class DaqModel:
+    """Turn a path, block by block, into the converter's counts; see `sensors.model.MakeModel` for the arguments."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, DAQ_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        self._offset_m, self.volt_per_n = _elements(finger)
+        self._leak, self._band = Filter(DAQ_LEAK, settled=settled), Filter(DAQ_BAND, settled=settled)
+        self._converter = Converter(scene, rng, DAQ_RATE_HZ, ELEMENTS, DAQ_LIMITS, batch_shape=batch_shape)
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the 8 channels in V, (..., n_samples, 8)."""
+        return {daq.TOPIC: VOLT_PER_COUNT * self._converter.exact(self._exact(path))}
+
+    def advance(self, path: Trajectory) -> NDArray[np.int16]:
+        """Return what is measured along the next piece of path.
+
+        Parameters
+        ----------
+        path
+            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample; a sample is taken at the last of its points.
+
+        Returns
+        -------
+        (n_points / OVERSAMPLING, 8) counts: films then gauges, of each the outer ones first
+        """
+        return self._converter.counts(self._exact(path), np.int16)
+
+    def _exact(self, path: Trajectory) -> Samples:
+        pressed_n = self._pressed_n(self.touch.placed(path))
+        pressed_n[..., :FILMS, :] = self._leak(pressed_n[..., :FILMS, :])
+        sensed_n = self._band(pressed_n)[..., DAQ_OVERSAMPLING - 1 :: DAQ_OVERSAMPLING]
+        return np.swapaxes(sensed_n, -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
+
+    def _pressed_n(self, placed: Trajectory) -> Array:
+        """Return the force that each element senses, (..., 8, n)."""
+        return placed.force_n[..., None, :] + self.touch.variation_n(placed, DAQ_BLUR_M, self._offset_m)
+
+
+@lru_cache(maxsize=16)
+def _elements(finger: int) -> tuple[tuple[Array, Array], Array]:
+    """Return where the elements of a finger lie, x and y, (8, 1) m each, and their sensitivities, (8,) V/N."""
+    made = individual_rng(finger)
+    offset_m = (made.uniform(-PLACE_M, PLACE_M, (ELEMENTS, 1)), made.uniform(-PLACE_M, PLACE_M, (ELEMENTS, 1)))
+    return offset_m, made.uniform(*VOLT_PER_N, ELEMENTS) * made.choice([-1.0, 1.0], ELEMENTS)
+
+
+DAQ_KIND = SensorKind(
+    make=DaqModel,
+    path_rate_hz=DAQ_PATH_RATE_HZ,
+    step_points=DAQ_OVERSAMPLING,
+    streams=(SimulatedStream(daq.TOPIC, daq.SENSOR, DAQ_CHANNELS, 'V', DAQ_RATE_HZ),),
+)
+
+
+# --------------------
+# Forces on the elements of a finger with a slow array: normal and tangential, along a path.
+
+FRICTION = 0.5  # share of the normal force that drags the skin while it slides
+CREEP_M_S = 1e-3  # speed at which half of that is reached
+CROSSTALK = 0.1  # standard deviation of what an axis of an element senses of another one
+REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of the middle's share
+
+
+class PressedElements:
+    """Return what each element senses of the force on the skin.
+
+    The force spreads over the elements like a bell; each senses its share, blurred as it lies, and its axes are not
+    quite at right angles. All these numbers are ours.
+
+    Parameters
+    ----------
+    x_m, y_m : (n_elements,)
+        Where the elements lie.
+    blur_m
+        Length over which each averages.
+    rate_hz
+        Points of the path a second.
+    finger
+        Which individual of the sensor.
+    """
+
+    def __init__(self, x_m: Array, y_m: Array, blur_m: float, rate_hz: float, finger: int) -> None:
+        made = individual_rng(finger)
+        self._offset_m = x_m[:, None], y_m[:, None]
+        self._blur_m = np.full((len(x_m), 1), blur_m)
+        self._rate_hz = rate_hz
+        share = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
+        self._share = (share / share.sum())[:, None]
+        self._coupling: Array = np.eye(3) + CROSSTALK * made.standard_normal((len(x_m), 3, 3))
+        self._before: tuple[Array, Array] | None = None
+
+    def forces_n(self, touch: SkinContact, path: Trajectory) -> Array:
+        """Return the force that each element senses along the next points of a path.
+
+        Returns
+        -------
+        (..., n_elements, 3, n) N
+            Along x, y, and into the finger.
+        """
+        placed = touch.placed(path)
+        pressed_n = placed.force_n[..., None, :] + touch.variation_n(placed, self._blur_m, self._offset_m)
+        normal_n = self._share * pressed_n
+        x, y = self._drag_directions(placed)
+        forces_n = np.stack([x[..., None, :] * normal_n, y[..., None, :] * normal_n, normal_n], axis=-2)
+        return np.asarray(self._coupling @ forces_n)
+
+    def _drag_directions(self, placed: Trajectory) -> tuple[Array, Array]:
+        """Return the share of the normal force that drags along x and y, (..., n) each."""
+        x_m, y_m = self._before or before_first(placed)
+        self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
+        x_m_s = self._rate_hz * np.diff(placed.x_m, prepend=x_m)
+        y_m_s = self._rate_hz * np.diff(placed.y_m, prepend=y_m)
+        scale = FRICTION / (np.hypot(x_m_s, y_m_s) + CREEP_M_S)
+        return scale * x_m_s, scale * y_m_s
+
+
+def grid_m(places: tuple[tuple[float, float], ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return x and y of places, (n,) each.
+
+    Returns
+    -------
+    (n,)
+        x, m.
+    (n,)
+        y, m.
+    """
+    x_m, y_m = np.array(places).T
+    return x_m, y_m
+
+
+# --------------------
+# What an AnySkin measures while it goes along a path: the field of its magnetic skin at five magnetometers.
+#
+# Where the skin is pressed and dragged the field changes in proportion to the force. The microtesla per newton, the
+# field without load and the bandwidth of the skin are ours: none are published.
+
+ANYSKIN_RATE_HZ = anyskin.USUAL_RATE_HZ
+ANYSKIN_OVERSAMPLING = 10
+ANYSKIN_PATH_RATE_HZ = ANYSKIN_OVERSAMPLING * ANYSKIN_RATE_HZ
+SPACING_M = 5e-3
+ANYSKIN_PLACES_M = ((0.0, 0.0), (SPACING_M, 0.0), (-SPACING_M, 0.0), (0.0, SPACING_M), (0.0, -SPACING_M))
+ANYSKIN_BLUR_M = 4e-4
+ANYSKIN_BAND = filters.butter(4, 40.0, 'lowpass', fs=ANYSKIN_PATH_RATE_HZ, output='sos')
+UT_PER_N = 600.0
+UNLOADED_UT = 1500.0  # each axis of the field without load lies within plus and minus this
+UT_PER_COUNT = 0.15
+ANYSKIN_LIMITS = (
+    -(2**15) * 10,
+    2**15 * 10,
+)  # ±49 mT: the magnetometer's range is wider than 16 bits at its finest step
+
+
+class AnySkinModel:
+    """Turn a path, block by block, into the field; see `sensors.model.MakeModel` for the arguments."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, ANYSKIN_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        x_m, y_m = grid_m(ANYSKIN_PLACES_M)
+        self._elements = PressedElements(x_m, y_m, ANYSKIN_BLUR_M, ANYSKIN_PATH_RATE_HZ, finger)
+        self._band = Filter(ANYSKIN_BAND, settled=settled)
+        channels = 3 * len(ANYSKIN_PLACES_M)
+        self._unloaded_ut = individual_rng(finger).uniform(-UNLOADED_UT, UNLOADED_UT, channels)
+        self._converter = Converter(scene, rng, ANYSKIN_RATE_HZ, channels, ANYSKIN_LIMITS, batch_shape=batch_shape)
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the field in µT, (..., n_samples, 15)."""
+        return {anyskin.SIGNAL: self.advance(path)}
+
+    def advance(self, path: Trajectory) -> Array:
+        """Return what is measured along the next piece of path.
+
+        Parameters
+        ----------
+        path
+            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample; a sample is taken at the last of its points.
+
+        Returns
+        -------
+        (..., n_points / OVERSAMPLING, 15) µT
+        """
+        forces_n = self._band(self._elements.forces_n(self.touch, path))[
+            ..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING
+        ]
+        by_channel = np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
+        counts = (self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT
+        return UT_PER_COUNT * self._converter.exact(counts)
+
+
+ANYSKIN_KIND = SensorKind(
+    make=AnySkinModel,
+    path_rate_hz=ANYSKIN_PATH_RATE_HZ,
+    step_points=ANYSKIN_OVERSAMPLING,
+    streams=(
+        SimulatedStream(
+            anyskin.SIGNAL,
+            anyskin.FIELD_SENSOR,
+            anyskin.field_channels(anyskin.MAGNETOMETERS),
+            anyskin.FIELD_UNIT,
+            ANYSKIN_RATE_HZ,
+        ),
+    ),
+)
+
+
+# --------------------
+# What a PapillArray measures while it goes along a path: force and displacement of its nine pillars.
+#
+# The stiffness and the bandwidth of the pillars are ours, and so is how the force spreads over them.
+
+PAPILLARRAY_PATH_RATE_HZ = 1000.0  # of the device, too
+PAPILLARRAY_RATE_HZ = 500.0
+PAPILLARRAY_OVERSAMPLING = 2
+PITCH_M = 5e-3
+PAPILLARRAY_PLACES_M = tuple((PITCH_M * column, PITCH_M * row) for row in (-1, 0, 1) for column in (-1, 0, 1))
+PAPILLARRAY_BLUR_M = 3e-4
+PAPILLARRAY_BAND = filters.butter(4, 200.0, 'lowpass', fs=PAPILLARRAY_PATH_RATE_HZ, output='sos')
+STIFFNESS_N_MM = 1.5
+N_PER_COUNT = 1e-5
+PAPILLARRAY_LIMITS = (-2_000_000, 2_000_000)  # ±20 N
+COUNTS_PER_EFFECT = 100.0  # one count of the effects is 1 mN
+PAPILLARRAY_CHANNELS = papillarray.pillar_channels(len(PAPILLARRAY_PLACES_M))
+
+
+class PapillArrayModel:
+    """Turn a path, block by block, into forces and displacements; see `sensors.model.MakeModel` for the arguments."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, PAPILLARRAY_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        x_m, y_m = grid_m(PAPILLARRAY_PLACES_M)
+        self._elements = PressedElements(x_m, y_m, PAPILLARRAY_BLUR_M, PAPILLARRAY_PATH_RATE_HZ, finger)
+        self._band = Filter(PAPILLARRAY_BAND, settled=settled)
+        axes = 3 * len(PAPILLARRAY_PLACES_M)
+        self._converter = Converter(
+            scene,
+            rng,
+            PAPILLARRAY_PATH_RATE_HZ,
+            axes,
+            PAPILLARRAY_LIMITS,
+            batch_shape=batch_shape,
+            scale=COUNTS_PER_EFFECT,
+        )
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return forces (N) and displacements (mm) of the pillars, (..., n_samples, 54)."""
+        measured = self.advance(path)[..., PAPILLARRAY_OVERSAMPLING - 1 :: PAPILLARRAY_OVERSAMPLING, :, :]
+        return {papillarray.SIGNAL: measured.reshape(*measured.shape[:-2], -1)}
+
+    def advance(self, path: Trajectory) -> Array:
+        """Return what is measured along the next piece of path.
+
+        Parameters
+        ----------
+        path
+            Points at `PATH_RATE_HZ`.
+
+        Returns
+        -------
+        (..., n_points, 9, 6) N and mm
+            A step for each point, 1000 a second.
+        """
+        forces_n = self._band(self._elements.forces_n(self.touch, path))
+        by_axis = np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
+        measured_n = N_PER_COUNT * self._converter.exact(by_axis / N_PER_COUNT)
+        measured_n = measured_n.reshape(*measured_n.shape[:-1], len(PAPILLARRAY_PLACES_M), 3)
+        return np.concatenate([measured_n, measured_n / STIFFNESS_N_MM], axis=-1)
+
+
+PAPILLARRAY_KIND = SensorKind(
+    make=PapillArrayModel,
+    path_rate_hz=PAPILLARRAY_PATH_RATE_HZ,
+    step_points=PAPILLARRAY_OVERSAMPLING,
+    streams=(
+        SimulatedStream(papillarray.SIGNAL, papillarray.PILLARS_SENSOR, PAPILLARRAY_CHANNELS, '', PAPILLARRAY_RATE_HZ),
+    ),
+)
+
+
+# --------------------
+# What the PVDF finger of Hu et al. 2014 measures while it goes along a path.
+#
+# The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses
+# the
+# slow part. The gains are ours: the paper tells none.
+
+PVDF_OVERSAMPLING = 1  # at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more
+PVDF_PATH_RATE_HZ = PVDF_OVERSAMPLING * pvdf.FILM_RATE_HZ
+PC_PER_C = 1e12
+PVDF_LEAK = ChargeLeak(pvdf.RESISTANCE_OHM, pvdf.CAPACITANCE_F, pvdf.D33_PC_N / PC_PER_C)
+# Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
+KEPT = math.exp(-1 / (PVDF_LEAK.time_constant_s * PVDF_PATH_RATE_HZ))
+LEAK_SECTIONS = np.array([[1.0, -1.0, 0.0, 1.0, -KEPT, 0.0]])
+FILM_BAND = np.concatenate([filters.butter(2, 800.0, 'lowpass', fs=PVDF_PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
+FORCE_BAND = filters.butter(2, 20.0, 'lowpass', fs=PVDF_PATH_RATE_HZ, output='sos')
+POINTS_PER_FORCE = round(PVDF_PATH_RATE_HZ / pvdf.FORCE_RATE_HZ)
+PVDF_LIMITS = (-(2**15), 2**15 - 1)
+
+
+class PvdfModel:
+    """Turn a path, block by block, into the controller's counts; see `sensors.model.MakeModel` for the arguments."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, PVDF_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        self._film = Filter(FILM_BAND, settled=settled)
+        self._force_band = Filter(FORCE_BAND, settled=settled)
+        self._points = 0
+        self._fast = Converter(scene, rng, pvdf.FILM_RATE_HZ, 1, PVDF_LIMITS, batch_shape=batch_shape)
+        self._slow = Converter(scene, rng, pvdf.FORCE_RATE_HZ, 1, PVDF_LIMITS, batch_shape=batch_shape, slow=True)
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the charge of the film in pC, and the force in N if wanted, (..., n_samples, 1) each."""
+        force_n = self._pressed_n(path)
+        fast = {pvdf.FILM_TOPIC: pvdf.FILM_PC_PER_COUNT * self._fast.exact(self._charge(force_n))}
+        if not slow:
+            return fast
+        return {**fast, pvdf.FORCE_TOPIC: pvdf.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
+
+    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
+        """Return what is measured along the next piece of path.
+
+        Parameters
+        ----------
+        path
+            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample of the film; a sample is taken at the last of its points.
+
+        Returns
+        -------
+        film : (n_points / OVERSAMPLING,) counts
+        force : (n_force,) counts
+            Those whose time, at 64 Hz from the very first point on, lies in this piece.
+        """
+        force_n = self._pressed_n(path)
+        film = self._fast.counts(self._charge(force_n), np.int16)
+        return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
+
+    def _charge(self, force_n: Array) -> Samples:
+        """Return the counts of the charge, (..., n_samples, 1)."""
+        charge_pc = pvdf.D33_PC_N * self._film(force_n)[..., PVDF_OVERSAMPLING - 1 :: PVDF_OVERSAMPLING, None]
+        return np.asarray(charge_pc / pvdf.FILM_PC_PER_COUNT)
+
+    def _force(self, force_n: Array) -> Samples:
+        """Return the counts of the force sensor, (..., n_force, 1)."""
+        slow_n = self._force_band(force_n)
+        first = -self._points % POINTS_PER_FORCE
+        self._points += force_n.shape[-1]
+        return slow_n[..., first::POINTS_PER_FORCE, None] / pvdf.FORCE_N_PER_COUNT
+
+    def _pressed_n(self, path: Trajectory) -> Array:
+        placed = self.touch.placed(path)
+        return placed.force_n + self.touch.variation_n(placed)
+
+
+PVDF_KIND = SensorKind(
+    make=PvdfModel,
+    path_rate_hz=PVDF_PATH_RATE_HZ,
+    step_points=PVDF_OVERSAMPLING,
+    streams=(
+        SimulatedStream(pvdf.FILM_TOPIC, pvdf.FILM_SENSOR, pvdf.FILM_CHANNELS, 'pC', pvdf.FILM_RATE_HZ),
+        SimulatedStream(pvdf.FORCE_TOPIC, pvdf.FORCE_SENSOR, pvdf.FORCE_CHANNELS, 'N', pvdf.FORCE_RATE_HZ),
+    ),
+)
+
+
+# --------------------
+# What a TSF-85 fingertip measures while it goes along a path.
+#
+# Dynamic channel: rate of change of the force on the skin, 50 to 450 Hz, sampled at 1 kHz. Static channel: the
+# pressure
+# on the taxels. The counts per newton are ours: none are published.
+
+TSF85_OVERSAMPLING = 2  # so that what lies above the band is filtered and not folded into it
+TSF85_PATH_RATE_HZ = TSF85_OVERSAMPLING * RATE_HZ
+COUNTS_PER_N_S = 60.0
+TSF85_BAND = np.concatenate(
+    [
+        filters.butter(1, 50.0, 'highpass', fs=TSF85_PATH_RATE_HZ, output='sos'),
+        filters.butter(4, 450.0, 'lowpass', fs=TSF85_PATH_RATE_HZ, output='sos'),
+    ]
+)
+STATIC_COUNTS_PER_N = 3000.0
+STATIC_BASELINE = (9000.0, 30000.0)  # range met in the field, without load
+TAXEL_PITCH_M = 4e-3
+TAXEL_BLUR_M = 1e-3
+TSF85_CONTACT_RADIUS_M = 6e-3  # of the pressed area at 1 N
+FAST_LIMITS, SLOW_LIMITS = (-(2**15), 2**15 - 1), (0, 2**16 - 1)
+
+
+class Tsf85Model:
+    """Turn a path, block by block, into the sensor's counts; see `sensors.model.MakeModel` for the arguments.
+
+    Parameters
+    ----------
+    layout
+        Kind of fingertip: how many taxels, and how often they are read.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        layout: Tsf85Layout = TSF85,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, TSF85_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        self._static_rate_hz = layout.static_rate_hz
+        self._force_before_n: Array | None = None
+        self._band = Filter(TSF85_BAND, settled=settled)
+        self._points = 0
+        rows, columns = np.divmod(np.arange(layout.rows * layout.columns), layout.columns)
+        self._taxel_x_m = (columns[:, None] - (layout.columns - 1) / 2) * TAXEL_PITCH_M
+        self._taxel_y_m = (rows[:, None] - (layout.rows - 1) / 2) * TAXEL_PITCH_M
+        self._baseline = individual_rng(finger).uniform(*STATIC_BASELINE, len(rows))
+        self._fast = Converter(scene, rng, RATE_HZ, 1, FAST_LIMITS, batch_shape=batch_shape)
+        self._slow = Converter(
+            scene, rng, layout.static_rate_hz, len(rows), SLOW_LIMITS, batch_shape=batch_shape, slow=True
+        )
+
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the dynamic channel, and the taxels if wanted, in counts."""
+        placed = self.touch.placed(path)
+        fast = {'signal': self._fast.exact(self._dynamic(placed))}
+        return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
+
+    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+        """Return what is measured along the next piece of path.
+
+        Parameters
+        ----------
+        path
+            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample; a sample is taken at the last of its points.
+
+        Returns
+        -------
+        dynamic : (n_points / OVERSAMPLING,) counts
+        images : (n_images, n_taxels) counts
+            Those whose time, from the very first point on, lies in this piece.
+        """
+        placed = self.touch.placed(path)
+        dynamic = self._fast.counts(self._dynamic(placed), np.int16)
+        return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
+
+    def _dynamic(self, placed: Trajectory) -> Samples:
+        force_n = placed.force_n + self.touch.variation_n(placed)
+        before = force_n[..., :1] if self._force_before_n is None else self._force_before_n
+        self._force_before_n = force_n[..., -1:]
+        rate_n_s = np.diff(force_n, prepend=before) * TSF85_PATH_RATE_HZ
+        return self._band(COUNTS_PER_N_S * rate_n_s)[..., TSF85_OVERSAMPLING - 1 :: TSF85_OVERSAMPLING, None]
+
+    def _images(self, placed: Trajectory) -> Samples:
+        at = placed.at(self._image_points(len(placed)))
+        texture_n = self.touch.static_variation_n(at, TAXEL_BLUR_M, (self._taxel_x_m, self._taxel_y_m))
+        pressed_n = self._shares(at.force_n) * (at.force_n[..., None, :] + texture_n)
+        return self._baseline + STATIC_COUNTS_PER_N * np.swapaxes(pressed_n, -1, -2)
+
+    def _image_points(self, n_points: int) -> NDArray[np.intp]:
+        """Return which of the next points of the path fall on a tick of the static channel."""
+        end = self._points + n_points
+        ticks = np.arange(self._tick_from(self._points), self._tick_from(end))
+        points: NDArray[np.intp] = (
+            np.floor(ticks * TSF85_PATH_RATE_HZ / self._static_rate_hz).astype(np.intp) - self._points
+        )
+        self._points = end
+        return points
+
+    def _tick_from(self, point: int) -> int:
+        """Return the first tick of the static channel at or after a point of the path."""
+        return math.ceil(point * self._static_rate_hz / TSF85_PATH_RATE_HZ)
+
+    def _shares(self, force_n: Array) -> Array:
+        """Return the share of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact, as Hertz'."""
+        radius_m = TSF85_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[..., None, :]
+        dome = np.maximum(0.0, 1 - (self._taxel_x_m**2 + self._taxel_y_m**2) / radius_m**2)
+        shares: Array = dome / np.maximum(dome.sum(axis=-2, keepdims=True), 1e-9)
+        return shares
+
+
+def tsf85_kind(layout: Tsf85Layout) -> SensorKind:
+    """Return a kind of TSF-85."""
+    return SensorKind(
+        make=partial(Tsf85Model, layout=layout),
+        path_rate_hz=TSF85_PATH_RATE_HZ,
+        step_points=TSF85_OVERSAMPLING,
+        streams=(
+            SimulatedStream('signal', tsf85.DYNAMIC_SENSOR, tsf85.DYNAMIC_CHANNELS, tsf85.UNIT, RATE_HZ),
+            SimulatedStream(
+                'signal_static', tsf85.STATIC_SENSOR, layout.static_channels, tsf85.UNIT, layout.static_rate_hz
+            ),
+        ),
+    )
+
+
+# --------------------
+# The simulated sensors by name: the `sensor` of a scene.
+
+SENSORS: Mapping[str, SensorKind] = {
+    'tsf85': tsf85_kind(TSF85S['tsf85']),  # 28 taxels at 60 Hz, dynamic channel at 1 kHz
+    'tsf85_3x4': tsf85_kind(TSF85S['tsf85_3x4']),  # 12 taxels at 25 Hz, dynamic channel at 1 kHz
+    'daq': DAQ_KIND,  # 4 PVDF films and 4 strain gauges at 2.5 kHz
+    'biotac': biotac_kind(BIOTACS['biotac']),  # PAC at 2.2 kHz, 19 electrodes, pressure, temperature at 100 Hz
+    'pvdf': PVDF_KIND,  # film at 4096 Hz with leaking charge, force at 64 Hz
+    'anyskin': ANYSKIN_KIND,  # field at 5 magnetometers, 100 Hz
+    'papillarray': PAPILLARRAY_KIND,  # force and displacement of 9 pillars, 500 Hz
+}
+
+
+# --------------------
+# Two fingers of a TSF-85 that slide together.
+
+
+class TwoContacts:
+    """The contacts of two fingers that touch one surface, as one."""
+
+    def __init__(self, contacts: Sequence[SkinContact]) -> None:
+        self._contacts = contacts
+
+    @property
+    def surface(self) -> Surface:
+        """What is touched."""
+        return self._contacts[0].surface
+
+    @surface.setter
+    def surface(self, surface: Surface) -> None:
+        for contact in self._contacts:
+            contact.surface = surface
+
+    def relocate(self) -> None:
+        """Let each finger touch another place from now on."""
+        for contact in self._contacts:
+            contact.relocate()
+
+
+class Tsf85Pair:
+    """Two fingers of a TSF-85 that move as one, each an individual that touches a place of its own."""
+
+    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
+        self._models = [
+            Tsf85Model(scene.of_finger(finger), surface, rng, LAYOUTS['tsf85'], finger=finger) for finger in (0, 1)
+        ]
+        self.touch = TwoContacts([model.touch for model in self._models])
+
+    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+        """Return what both measure along the next piece of path: (n_samples, 2) and (n_images, 2, n_taxels) counts."""
+        dynamic, images = zip(*(model.advance(path) for model in self._models), strict=True)
+        return np.stack(dynamic, axis=-1), np.stack(images, axis=1)
+
+
+# --------------------
+# Two BioTacs on one board that slide together; the third place of the board is empty.
+
+SERIALS = ('BT-0', 'BT-1', '')  # by place; '' where there is no finger
+
+
+class BioTacHand:
+    """Two BioTacs that move as one, each an individual that touches a place of its own."""
+
+    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> None:
+        self._models = [
+            BioTacModel(scene.of_finger(place), surface, rng, layout, finger=place)
+            for place, serial in enumerate(SERIALS)
+            if serial
+        ]
+        self.touch = TwoContacts([model.touch for model in self._models])
+
+    @property
+    def points_per_frame(self) -> int:
+        """Points of the path, at 4.4 kHz, that one frame takes."""
+        return self._models[0].points_per_frame
+
+    def advance(self, path: Trajectory) -> NDArray[np.uint16]:
+        """Return what all places measure along the next piece of path, (n_frames, n_slots, n_places) counts."""
+        measured = [model.advance(path) for model in self._models]
+        empty = [np.zeros_like(measured[0])] * (len(SERIALS) - len(measured))
+        return np.stack([*measured, *empty], axis=-1)

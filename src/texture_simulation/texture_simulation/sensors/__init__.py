@@ -1,1 +1,0 @@
-"""What a sensor makes of being touched."""

@@ -1,1 +1,0 @@
-"""Stick-slip: a fingertip that hangs on its skin and is dragged over a surface with friction."""

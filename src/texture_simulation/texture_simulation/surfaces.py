@@ -1,0 +1,628 @@
+"""Height profiles of simulated surfaces."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.config import param
+from texture_core.errors import InvalidParameter
+from texture_core.types import AnyArray, Array
+from texture_simulation.path import interpolated_field
+
+# --------------------
+# The shape of an object below its relief: how it is curved where a finger slides.
+
+
+@dataclass(frozen=True)
+class Curved:
+    """An object that is a ball, or curved like one, where the finger slides."""
+
+    radius_m: float = param(
+        0.035,
+        'Sets the radius of curvature of the object; a smaller one makes the contact smaller and softer.',
+        unit='m',
+        low=0.002,
+        high=10.0,
+    )
+
+
+FLAT = Curved(math.inf)
+
+
+# --------------------
+# The profile across ridges that all have the same pitch, as its Fourier series.
+
+MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this share is left out
+SHAPES = ('sine', 'square')
+
+
+def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: float) -> Array:
+    """Return the height of ridges one unit high, less its mean, (..., n).
+
+    Harmonic n is weakened by exp(−(2π·n·blur/pitch)²/2), the transfer function of the Gaussian.
+
+    Parameters
+    ----------
+    across_m : (..., n)
+        Place across the ridges; 0 is the middle of one.
+    blur_m : (..., n) or (..., 1)
+    pitch_m, shape, duty
+        Of the ridges; a square one takes the share `duty` of the pitch.
+
+    Returns
+    -------
+    (..., n)
+        From -1 to 1.
+    """
+    cosine = np.cos(2 * np.pi / pitch_m * across_m)
+    first_share = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
+    amplitudes = _amplitudes(pitch_m, shape, duty, float(blur_m.min(initial=pitch_m)))
+    height = amplitudes[0] * first_share * cosine
+    if len(amplitudes) == 1:
+        return np.asarray(height)
+    twice, wave, before = 2 * cosine, cosine, np.ones_like(cosine)
+    share, ratio, square = first_share, first_share**3, first_share**2
+    for amplitude in amplitudes[1:]:
+        # cos((n+1)φ) = 2·cos φ·cos nφ − cos((n−1)φ) and q^((n+1)²) = q^(n²)·q^(2n+1): far cheaper than cos and exp.
+        wave, before = twice * wave - before, wave
+        share, ratio = share * ratio, ratio * square
+        height += amplitude * share * wave
+    return np.asarray(height)
+
+
+def _amplitudes(pitch_m: float, shape: str, duty: float, blur_m: float) -> list[float]:
+    """Return the amplitudes of the harmonics that are measured at all, from the first on."""
+    if shape == 'sine':
+        return [0.5]
+    finest = pitch_m / (2 * np.pi * blur_m) * math.sqrt(-2 * math.log(MIN_TRANSFER))
+    orders = range(1, max(2, math.ceil(finest)))
+    return [2 / (np.pi * order) * math.sin(np.pi * order * duty) for order in orders]
+
+
+# --------------------
+# Concentric rings.
+
+
+@dataclass(frozen=True)
+class Circles:
+    """Concentric rings: blurred as straight ridges are, which is right but within a pitch or so of the centre."""
+
+    pitch_m: float = param(
+        2e-3,
+        'Sets the distance between rings; a larger pitch lowers the frequency of the signal.',
+        unit='m',
+        low=1e-5,
+        high=0.1,
+    )
+    depth_m: float = param(
+        2e-4,
+        'Sets the height of the rings above the grooves; a larger depth gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.01,
+    )
+    centre_x_m: float = param(
+        0.05, 'Sets the x coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
+    )
+    centre_y_m: float = param(
+        0.05, 'Sets the y coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
+    )
+    shape: str = param('sine', "Sets the cross-section of the rings, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Sets the share of the pitch that a square ring takes.', low=0.05, high=0.95)
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        radius_m = np.hypot(x_m - self.centre_x_m, y_m - self.centre_y_m)
+        return self.depth_m * profile(radius_m, blur_m, self.pitch_m, self.shape, self.duty)
+
+
+# --------------------
+# Parallel ridges.
+
+
+@dataclass(frozen=True)
+class Grating:
+    """Parallel ridges, `angle_rad` from +x towards +y: a slide along +x meets v·cos(angle)/pitch of them a second."""
+
+    pitch_m: float = param(
+        2e-3,
+        'Sets the distance between ridges; a larger pitch lowers the frequency of the signal.',
+        unit='m',
+        low=1e-5,
+        high=0.1,
+    )
+    depth_m: float = param(
+        2e-4,
+        'Sets the height of the ridges above the grooves; a larger depth gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.01,
+    )
+    angle_rad: float = param(
+        0.0, 'Sets the direction across the ridges, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
+    )
+    shape: str = param('sine', "Sets the cross-section of the ridges, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Sets the share of the pitch that a square ridge takes.', low=0.05, high=0.95)
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        across_m = x_m * math.cos(self.angle_rad) + y_m * math.sin(self.angle_rad)
+        return self.depth_m * profile(across_m, blur_m, self.pitch_m, self.shape, self.duty)
+
+
+# --------------------
+# Bumps or hollows in rows and columns.
+
+MEAN = {'sine': 0.5}
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Posts in rows and columns, or a net of ribs between hollows.
+
+    The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
+    """
+
+    pitch_x_m: float = param(
+        2e-3,
+        'Sets the distance of posts along the first direction; a larger pitch lowers the frequency of the signal.',
+        unit='m',
+        low=1e-5,
+        high=0.1,
+    )
+    pitch_y_m: float = param(
+        2e-3,
+        'Sets the distance of posts along the second direction, across the first one.',
+        unit='m',
+        low=1e-5,
+        high=0.1,
+    )
+    depth_m: float = param(
+        2e-4, 'Sets the height of posts or ribs; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
+    )
+    angle_rad: float = param(
+        0.0, 'Sets the first direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
+    )
+    shape: str = param('sine', "Sets the cross-section of the posts or hollows, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Sets the share of the pitch that a post or a hollow takes.', low=0.05, high=0.95)
+    relief: str = param(
+        'posts', "Sets what stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
+    )
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
+        mean = MEAN.get(self.shape, self.duty)
+        along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)
+        across = profile(y_m * cosine - x_m * sine, blur_m, self.pitch_y_m, self.shape, self.duty)
+        sign = 1.0 if self.relief == 'posts' else -1.0
+        # Less its own mean; in place, which costs half as much.
+        along += mean
+        across += mean
+        along *= across
+        along -= mean**2
+        along *= sign * self.depth_m
+        return along
+
+
+# --------------------
+# A surface: heights over a plane, blurred by the contact of a soft finger.
+#
+# A surface is a sum of terms. Each kind of term is a frozen dataclass with a method that gives its height at places
+# (x, y), blurred by a Gaussian of standard deviation `blur_m`: detail finer than the contact is averaged out.
+
+MIN_BLUR_M, MAX_BLUR_M = 5e-5, 2e-3
+
+
+class Term(Protocol):
+    """A kind of relief."""
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same.
+
+        Parameters
+        ----------
+        x_m : (..., n)
+            Positions along x.
+        y_m : (..., n)
+            Positions along y.
+        blur_m : (..., n) or (..., 1)
+            Standard deviation of the contact that averages.
+
+        Returns
+        -------
+        (..., n)
+            m, of zero mean.
+        """
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A named sum of terms, the friction on it (`frictions.py`; without one, the skin glides), and its curvature."""
+
+    name: str
+    terms: tuple[Term, ...]
+    friction: Any = None
+    shape: Curved = FLAT
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions."""
+        blur_m = np.clip(blur_m, MIN_BLUR_M, MAX_BLUR_M)
+        height = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape, blur_m.shape))
+        for term in self.terms:
+            height += term.height_m(x_m, y_m, blur_m)
+        return height
+
+
+# --------------------
+# Random relief, made once as periodic tiles and interpolated in them.
+
+SIDE = 256  # points along each side of a tile; a power of two
+POINTS_PER_WAVE = 4  # of the shortest wave
+# The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
+TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
+BLURS_M = np.geomspace(MIN_BLUR_M, MAX_BLUR_M, 10)  # tiles are made for these and interpolated between
+MIN_POINTS_FOR_OWN_TILE = (
+    20_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
+)
+TILE_POINTS = (SIDE + 1) ** 2
+
+
+class RandomRelief(Protocol):
+    """A kind of random relief; hashable, so that its tiles are made once."""
+
+    @property
+    def spacing_m(self) -> float:
+        """Distance of the tile's points."""
+
+    def sharp(self) -> Array:
+        """Return the height over one tile, (SIDE, SIDE) m, not blurred, going on periodically.
+
+        Returns
+        -------
+        (SIDE, SIDE)
+            m.
+        """
+
+    def __hash__(self) -> int:
+        """Return what tells it from others."""
+
+
+def tile_height(random: RandomRelief, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+    """Return the height of random relief at places, (..., n); `blur_m` is (..., n) or (..., 1).
+
+    Parameters
+    ----------
+    random
+        Kind of relief.
+    x_m : (..., n)
+        Positions along x.
+    y_m : (..., n)
+        Positions along y.
+    blur_m : (..., n) or (..., 1)
+        Standard deviation of the contact that averages.
+
+    Returns
+    -------
+    (..., n)
+        m.
+    """
+    cosine, sine = math.cos(TURN_RAD) / random.spacing_m, math.sin(TURN_RAD) / random.spacing_m
+    rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
+    level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
+    many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_OWN_TILE
+    if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_OWN_TILE <= rows.size:
+        height = _bilinear(_mixed(random, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
+        return np.asarray(height, dtype=np.float64)
+    low = level.astype(np.intp)
+    both = _bilinear(_pairs(random), low, rows, columns)
+    return np.asarray(both.real + (level - low) * (both.imag - both.real), dtype=np.float64)
+
+
+def _bilinear(tiles: AnyArray, number: NDArray[np.intp], rows: Array, columns: Array) -> AnyArray:
+    """Return tiles between their points; rows and columns go on periodically.
+
+    Written in place, which takes two thirds of the time.
+
+    Parameters
+    ----------
+    tiles : (n_tiles * (SIDE + 1)**2,) in single precision, real or complex
+        Flat, one after the other, the first row and column of each again at its end.
+    number : (..., n) or (..., 1)
+        Which of the tiles.
+    rows, columns : (..., n)
+    """
+    row, column = np.floor(rows), np.floor(columns)
+    down, right = (rows - row).astype(np.float32), (columns - column).astype(np.float32)
+    at = row.astype(np.intp)
+    at &= SIDE - 1
+    at *= SIDE + 1
+    place = column.astype(np.intp)
+    place &= SIDE - 1
+    at += place
+    if len(tiles) > TILE_POINTS:
+        at += TILE_POINTS * number
+    upper = _between(tiles, at, right)
+    at += SIDE + 1
+    lower = _between(tiles, at, right)
+    lower -= upper
+    lower *= down
+    upper += lower
+    return upper
+
+
+def _between(tiles: AnyArray, at: NDArray[np.intp], share: NDArray[np.float32]) -> AnyArray:
+    """Return values between points and those after them."""
+    value, after = tiles.take(at), tiles[1:].take(at)
+    after -= value
+    after *= share
+    value += after
+    return value
+
+
+@lru_cache(maxsize=64)
+def _mixed(random: RandomRelief, levels: tuple[float, ...]) -> AnyArray:
+    """Return one tile for each of some levels of blur."""
+    tiles = []
+    for level in levels:
+        low = int(level)
+        share = level - low
+        pair = _pairs(random)[low * TILE_POINTS : (low + 1) * TILE_POINTS].view(np.float32).reshape(-1, 2)
+        tiles.append(pair @ np.array([1.0 - share, share], dtype=np.float32))
+    return np.concatenate(tiles)
+
+
+@lru_cache(maxsize=32)
+def _pairs(random: RandomRelief) -> AnyArray:
+    """Return the tiles of all levels of blur, each with the next blunter one as imaginary part: found at once.
+
+    All are made at once, 4.8 MB a relief: what a emulator holds does not grow with what it has measured.
+    """
+    spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
+    blurred = [_blurred(spectrum, wave_1_m, blur_m) for blur_m in BLURS_M]
+    return _flat([sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]).astype(np.complex64)
+
+
+def _flat(tiles: list[AnyArray]) -> AnyArray:
+    """Return tiles one after the other, each with its first row and column again at its end."""
+    return np.concatenate([np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in tiles])
+
+
+def _blurred(spectrum: NDArray[np.complex128], wave_1_m: Array, blur_m: float) -> Array:
+    """Return a tile, (SIDE, SIDE) m, under one of the blurs."""
+    weak = np.exp(-0.5 * (2 * np.pi * wave_1_m * blur_m) ** 2)
+    return np.asarray(np.fft.irfft2(spectrum * weak, s=(SIDE, SIDE)))
+
+
+def waves_1_m(spacing_m: float) -> Array:
+    """Return the wave number of each coefficient of a tile's spectrum, (SIDE, SIDE // 2 + 1) 1/m.
+
+    Parameters
+    ----------
+    spacing_m
+        Distance of two points of the tile.
+
+    Returns
+    -------
+    (SIDE, SIDE // 2 + 1)
+        1/m.
+    """
+    waves: Array = np.hypot(np.fft.fftfreq(SIDE, spacing_m)[:, None], np.fft.rfftfreq(SIDE, spacing_m)[None, :])
+    return waves
+
+
+# --------------------
+# Grains glued to a sheet.
+
+POINTS_PER_GRAIN = 4
+SIZES = (0.5, 1.5)  # range of the grains' heights, of the mean
+
+
+@dataclass(frozen=True)
+class Sandpaper:
+    """Round grains at random places, of random height; where they overlap they add up.
+
+    Sizes of FEPA grades: P60 269 µm, P80 201, P120 125, P240 58.5, P400 35 (ISO 6344).
+    """
+
+    grain_m: float = param(
+        2e-4, 'Sets the diameter of a grain; a larger grain gives lower frequencies.', unit='m', low=2e-5, high=0.01
+    )
+    grain_height_m: float = param(
+        5e-5,
+        'Sets the mean height of a grain above the sheet; a larger height gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.005,
+    )
+    cover: float = param(0.5, 'Sets the share of the sheet that lies under grains.', low=0.02, high=2.0)
+    seed: int = param(0, 'Sets the seed of the places and heights of the grains.', low=0)
+
+    @property
+    def spacing_m(self) -> float:
+        """Distance of the tile's points."""
+        return self.grain_m / POINTS_PER_GRAIN
+
+    def sharp(self) -> Array:
+        """Return the height over one tile, (SIDE, SIDE) m, less its mean."""
+        rng = np.random.default_rng(self.seed)
+        grain_points = np.pi / 4 * POINTS_PER_GRAIN**2
+        tops = np.zeros((SIDE, SIDE))
+        count = round(self.cover * SIDE**2 / grain_points)
+        np.add.at(tops, tuple(rng.integers(0, SIDE, (2, count))), rng.uniform(*SIZES, count))
+        away = np.minimum(np.arange(SIDE), SIDE - np.arange(SIDE))
+        dome = np.maximum(0.0, 1 - (away[:, None] ** 2 + away**2) / (POINTS_PER_GRAIN / 2) ** 2)
+        height = self.grain_height_m * np.fft.irfft2(np.fft.rfft2(tops) * np.fft.rfft2(dome), s=(SIDE, SIDE))
+        return np.asarray(height - height.mean())
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        return tile_height(self, x_m, y_m, blur_m)
+
+
+# --------------------
+# Random roughness on many scales.
+
+
+@dataclass(frozen=True)
+class SelfAffine:
+    """Random roughness: power ∝ k^(−2−2·hurst) between two wavelengths, the same in all directions.
+
+    Along any line its power falls as 1/f^s with s = 1 + 2·hurst.
+    """
+
+    rms_m: float = param(
+        1e-5,
+        'Sets the standard deviation of the height; a larger value gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=1e-3,
+    )
+    hurst: float = param(0.8, 'Sets the Hurst exponent: 1 is smooth on small scales, 0 is jagged.', low=0.0, high=1.0)
+    longest_m: float = param(6e-3, 'Sets the longest wavelength of the relief.', unit='m', low=1e-4, high=0.1)
+    shortest_m: float = param(4e-4, 'Sets the shortest wavelength of the relief.', unit='m', low=1e-5, high=0.01)
+    seed: int = param(0, 'Sets the seed of the random relief.', low=0)
+
+    def __post_init__(self) -> None:
+        if not 1 < self.longest_m / self.shortest_m <= SIDE / POINTS_PER_WAVE / 2:
+            raise InvalidParameter(
+                f'roughness with waves from {self.shortest_m} m to {self.longest_m} m; the longest must be above the '
+                f'shortest and at most {SIDE // POINTS_PER_WAVE // 2} times as long'
+            )
+
+    @property
+    def spacing_m(self) -> float:
+        """Distance of the tile's points."""
+        return self.shortest_m / POINTS_PER_WAVE
+
+    def sharp(self) -> Array:
+        """Return the height over one tile, (SIDE, SIDE) m."""
+        wave = waves_1_m(self.spacing_m)
+        present = (wave >= 1 / self.longest_m) & (wave <= 1 / self.shortest_m)
+        amplitude = np.where(present, np.where(present, wave, 1.0) ** (-1.0 - self.hurst), 0.0)
+        noise = np.fft.rfft2(np.random.default_rng(self.seed).standard_normal((SIDE, SIDE)))
+        height = np.fft.irfft2(noise * amplitude, s=(SIDE, SIDE))
+        return np.asarray(height * (self.rms_m / height.std()))
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        return tile_height(self, x_m, y_m, blur_m)
+
+
+# --------------------
+# Cloth: yarns that go over and under each other.
+
+# Plane waves of 6 to 18 mm that shift the yarns from their even places.
+WAVES_1_M = 2 * np.pi * np.array([[90.0, 40.0], [-55.0, 130.0], [60.0, -75.0], [25.0, 50.0]])
+PHASES = np.array([[0.7, 2.6, 4.4, 1.1], [5.9, 0.2, 3.3, 2.0]])
+
+KNOT_M = 2.5e-4  # straight between such places the shift is wrong by 1 % at most
+
+
+@dataclass(frozen=True)
+class Weave:
+    """Two sets of yarns: those met when sliding along x stand `pitch_x_m` apart.
+
+    Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
+    in a plain weave (`repeat` 2). Each wave is blurred by its own factor, which is exact. `irregular_m` shifts the
+    yarns by slow waves, as in linen: its lines are broader the finer they are.
+    """
+
+    pitch_x_m: float = param(
+        8e-4,
+        'Sets the distance of the yarns that a slide along x crosses; a larger pitch lowers the frequency.',
+        unit='m',
+        low=5e-5,
+        high=0.05,
+    )
+    pitch_y_m: float = param(
+        8e-4,
+        'Sets the distance of the yarns that a slide along y crosses; a larger pitch lowers the frequency.',
+        unit='m',
+        low=5e-5,
+        high=0.05,
+    )
+    thickness_x_m: float = param(
+        1e-4,
+        'Sets how far the yarns crossed along x stand out; a larger value gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.01,
+    )
+    thickness_y_m: float = param(
+        1e-4,
+        'Sets how far the yarns crossed along y stand out; a larger value gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.01,
+    )
+    repeat: int = param(
+        2, 'Sets the number of yarns after which the weave repeats: 2 is plain, more is a twill.', low=2, high=12
+    )
+    irregular_m: float = param(
+        0.0,
+        'Sets the standard deviation of the yarn positions; a larger value broadens the spectral lines.',
+        unit='m',
+        low=0.0,
+        high=0.005,
+    )
+    seed: int = param(0, 'Sets the seed of the yarn positions.', low=0)
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        x_m, y_m = self._even(x_m, y_m)
+        across_x, across_y = 2 * np.pi / self.pitch_x_m * x_m, 2 * np.pi / self.pitch_y_m * y_m
+        weak_x = np.exp(-0.5 * (2 * np.pi * blur_m / self.pitch_x_m) ** 2)
+        weak_y = np.exp(-0.5 * (2 * np.pi * blur_m / self.pitch_y_m) ** 2)
+        height = 0.25 * self.thickness_x_m * weak_x * np.cos(across_x)
+        height += 0.25 * self.thickness_y_m * weak_y * np.cos(across_y)
+        weak = (weak_x * weak_y) ** (1 / self.repeat**2)
+        over = self._over(across_x, across_y)
+        return np.asarray(height + 0.25 * (self.thickness_x_m + self.thickness_y_m) * weak * over)
+
+    def _over(self, across_x: Array, across_y: Array) -> Array:
+        """Return where which thread lies above, from -1 to 1."""
+        if self.repeat == 2:
+            return np.asarray(np.cos(across_x / 2) * np.cos(across_y / 2))
+        return np.asarray(0.5 * np.cos((across_x + across_y) / self.repeat))
+
+    def _even(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Return where places would lie if the yarns were even."""
+        if not self.irregular_m:
+            return x_m, y_m
+        if not x_m.shape[-1]:
+            return x_m, y_m
+        turns = PHASES + np.random.default_rng(self.seed).uniform(0, 2 * np.pi, PHASES.shape)
+        scale_m = self.irregular_m * math.sqrt(2 / len(WAVES_1_M))
+        x_and_y = interpolated_field(lambda x, y: _shift(x, y, turns), x_m, y_m, KNOT_M)
+        return x_m + scale_m * x_and_y.real, y_m + scale_m * x_and_y.imag
+
+
+def _shift(x_m: Array, y_m: Array, turns: Array) -> AnyArray:
+    """Return sums of plane waves, (..., n): those along x as the real part, those along y as the imaginary one."""
+    shift = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape), dtype=np.complex128)
+    for (kx, ky), turn_x, turn_y in zip(WAVES_1_M, *turns, strict=True):
+        angle = kx * x_m + ky * y_m
+        shift += np.cos(angle + turn_x) + 1j * np.cos(angle + turn_y)
+    return shift
+
+
+# --------------------
+# Kinds of relief by name.
+
+KINDS: Mapping[str, type] = {
+    'grating': Grating,  # parallel ridges
+    'grid': Grid,  # posts in rows and columns, or a net
+    'circles': Circles,  # concentric rings
+    'weave': Weave,  # cloth
+    'self_affine': SelfAffine,  # random roughness on many scales
+    'sandpaper': Sandpaper,  # grains of one size
+}

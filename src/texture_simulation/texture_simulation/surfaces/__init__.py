@@ -1,1 +1,0 @@
-"""The shape of surfaces: one file a kind of relief, and what is common to them."""
