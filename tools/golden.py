@@ -42,7 +42,6 @@ from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED = ROOT / 'tools' / 'golden.json'
-CONFIG = ROOT / 'src' / 'texture_estimation' / 'config'
 DATA = Path(os.environ.get('TEXTURE_DATA') or ROOT.parent / 'shared' / 'data')
 
 SEED = 20
@@ -209,8 +208,8 @@ def rows(only: str = '') -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder:
             bags = _bags(source, Path(folder))
             for recipe in recipes:
-                grades = (CONFIG / 'roughness' / f'{recipe}.yaml').exists()
-                found[f'{recipe} on {name}'] = (_graded if grades else _recognised)(recipe, bags)
+                ask = _graded if every_recipe()[recipe] == 'roughness' else _recognised
+                found[f'{recipe} on {name}'] = ask(recipe, bags)
     return found
 
 
@@ -219,9 +218,10 @@ def available(source: Source) -> bool:
     return not source.data_set or (DATA / source.data_set).is_dir()
 
 
-def every_recipe() -> list[str]:
-    """Return the names of all shipped recipes."""
-    return sorted(path.stem for kind in ('recipes', 'roughness') for path in (CONFIG / kind).glob('*.yaml'))
+def every_recipe() -> dict[str, str]:
+    """Return all shipped recipes in the order of their names, with their kind: 'recipes' or 'roughness'."""
+    files = sorted(ROOT.glob('src/*/config/recipes/*.yaml')) + sorted(ROOT.glob('src/*/config/roughness/*.yaml'))
+    return {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
 
 
 def _recipes(source: Source) -> list[str]:
