@@ -29,16 +29,13 @@ from typing import Any
 import numpy as np
 
 # All that the golden set knows of the suite: after a move only these lines change.
-from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.evidence import RoughnessAccumulator
-from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
-from texture_estimation.roughness.training import train_grades
+from texture_estimation.roughness import RoughnessAccumulator, load_roughness_recipe, read_grades, train_grades
+from texture_estimation.training import train
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import training_examples
-from texture_recordings.slide_dataset import SlideDataset
-from texture_simulation.simulated_bags import SlidePlan, write_simulated
+from texture_recordings.dataset import SlideDataset
+from texture_simulation.offline import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED = ROOT / 'tools' / 'golden.json'
