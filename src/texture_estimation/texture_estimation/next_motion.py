@@ -293,9 +293,9 @@ class NextTouchModel:
         """
         if not motions:
             raise InvalidParameter('there is no motion to choose from; name at least one that was trained')
-        known_motions = [NextTouch(motion, self.information(log_posterior, motion, rng)) for motion in motions]
-        most = max(choice.information for choice in known_motions)
-        return min((c for c in known_motions if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
+        choices = [NextTouch(motion, self.information(log_posterior, motion, rng)) for motion in motions]
+        most = max(choice.information for choice in choices)
+        return min((c for c in choices if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
 
     def check(self, values: Array) -> None:
         """Raise InvalidData if the update with these mean features, (n_features,), is not finite.
@@ -478,17 +478,15 @@ def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     """Return the exponent of the likelihoods that makes slides held out most probable: they are not quite Gaussian."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
 
-    parameters, least = _parts(cells), len(np.unique(cells))
-    known_motions: list[Array] = [np.zeros((0, n_textures))]
+    parts, least = _parts(cells), len(np.unique(cells))
+    likelihoods: list[Array] = [np.zeros((0, n_textures))]
     truths = [cells[:0]]
     for part in range(PARTS):
-        own, others = parameters == part, parameters != part
+        own, others = parts == part, parts != part
         if own.any() and np.count_nonzero(others) > least:
-            known_motions.append(
-                _fit(values[others], cells[others], n_textures).log_likelihoods(values[own], cells[own])
-            )
+            likelihoods.append(_fit(values[others], cells[others], n_textures).log_likelihoods(values[own], cells[own]))
             truths.append(cells[own] % n_textures)
-    log_likelihoods, truth = np.concatenate(known_motions), np.concatenate(truths)
+    log_likelihoods, truth = np.concatenate(likelihoods), np.concatenate(truths)
     if not len(truth):
         return 1.0
 

@@ -843,8 +843,8 @@ def is_clearly_worse(means: Array, incumbent: Array) -> bool:
         Scores of the rival on the same halves.
     """
     difference = means - incumbent
-    parallel_map = max(float(difference.std(ddof=1)), MIN_SCATTER) / np.sqrt(len(difference))
-    return bool(difference.mean() + _quantile(len(difference) - 1) * parallel_map < 0.0)
+    standard_error = max(float(difference.std(ddof=1)), MIN_SCATTER) / np.sqrt(len(difference))
+    return bool(difference.mean() + _quantile(len(difference) - 1) * standard_error < 0.0)
 
 
 @lru_cache
@@ -1913,8 +1913,8 @@ def algorithm_for(
 def _first_points(space: SearchSpace, population: int, seed: int, start: Sequence[Individual]) -> Array:
     """Return the first generation, (population, n_variables)."""
     given = np.array([space.encode(individual) for individual in start]).reshape(-1, len(space.names))[:population]
-    sample_rows = np.random.default_rng(seed).random((population - len(given), len(space.names)))
-    return np.concatenate([given, sample_rows])
+    drawn = np.random.default_rng(seed).random((population - len(given), len(space.names)))
+    return np.concatenate([given, drawn])
 
 
 # --------------------

@@ -327,10 +327,10 @@ class LabelledFeatures:
         used = [vector for vector in vectors if not vector.last and surfaces.get(vector.exploration_id)]
         if not used:
             raise InvalidData('there is no window of a labelled surface; record slides with a surface named')
-        group_similar = sorted({vector.feature_set for vector in used})
-        if len(group_similar) > 1:
+        fingerprints = sorted({vector.feature_set for vector in used})
+        if len(fingerprints) > 1:
             raise ModelMismatch(
-                f'the windows are described in different ways: {"; ".join(group_similar)}; use those of one kind'
+                f'the windows are described in different ways: {"; ".join(fingerprints)}; use those of one kind'
             )
         return cls(
             values=np.stack([vector.values for vector in used]),

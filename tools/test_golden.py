@@ -1,0 +1,35 @@
+"""The suite says of fixed slides what it said when the golden set was stored; see golden.py on what to do if not."""
+
+from __future__ import annotations
+
+import json
+
+import golden
+import pytest
+
+
+def test_every_recipe_is_in_the_golden_set() -> None:
+    stored = {row.partition(' on ')[0] for row in json.loads(golden.STORED.read_text())}
+    assert stored == set(golden.every_recipe())
+
+
+@pytest.mark.parametrize('source', golden.SOURCES)
+def test_the_recipes_say_what_they_said(source: str) -> None:
+    if not golden.available(golden.SOURCES[source]):
+        pytest.skip(f'no recorded data in {golden.DATA}; set TEXTURE_DATA to its folder')
+    assert golden.check(f' on {source}') == []
+
+
+def test_a_number_that_differs_beyond_rounding_is_named() -> None:
+    stored = {'final': {'confidence': 0.5, 'label': 'cork'}, 'features': [[1.0, 2.0]]}
+    assert (
+        list(
+            golden.differences(stored, {'final': {'confidence': 0.5 + 1e-9, 'label': 'cork'}, 'features': [[1.0, 2.0]]})
+        )
+        == []
+    )
+    changed = {'final': {'confidence': 0.5, 'label': 'felt'}, 'features': [[1.0, 2.001]]}
+    assert list(golden.differences(stored, changed)) == [
+        '/features/0/1: stored 2.0, found 2.001',
+        '/final/label: stored cork, found felt',
+    ]
