@@ -14,8 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 
-from texture_core.types import Array
-from texture_core.types import TextureEstimate
+from texture_core.types import Array, TextureEstimate
 from texture_estimation.model import load_model
 from texture_evaluation.charts import COLOURS
 from texture_evaluation.evaluate import run_model
