@@ -42,7 +42,7 @@ def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_reported_line
         (['--population', '1'], 'population'),
         (['--grades', 'ets_roughness', '--per-pair'], 'leave --per-pair or --grades out'),
         (['-o', '/nowhere/at/all.yaml'], "there is no folder '/nowhere/at'"),
-        (['--search', 'ets-ann'], "the recipe has no 'learner/ann_pairs/hidden'"),
+        (['--search', 'ets-ann'], "the recipe has no 'learner/texture_papers.roberge:AnnPairs/hidden'"),
     ],
 )
 def test_a_mistake_is_answered_with_one_sentence(arguments, sentence, tmp_path: Path, capsys) -> None:

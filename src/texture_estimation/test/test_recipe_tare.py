@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.config import folder
+from texture_core.config import shipped
 from texture_core.types import Array
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import load_roughness_recipe
@@ -16,9 +16,9 @@ from texture_features.feature_set import InputFeatures
 
 LOADERS = {'recipes': load_recipe, 'roughness': load_roughness_recipe}
 RECIPES = {
-    path.stem: load(path.stem).feature_set.inputs
+    name: load(name).feature_set.inputs
     for kind, load in LOADERS.items()
-    for path in sorted(folder('texture_estimation', f'config/{kind}').glob('*.yaml'))
+    for name in sorted(shipped('texture_estimation', f'config/{kind}'))
 }
 RATE_HZ, SAMPLES = 1000.0, 1000
 CHANNELS = ('a', 'b', 'c', 'd')

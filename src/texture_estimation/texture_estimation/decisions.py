@@ -798,7 +798,7 @@ class NoveltyDetector:
 
     Examples
     --------
-    >>> held_out = [np.random.default_rng(0).standard_normal((99, 3))] * len(EFFECTIVE_WINDOWS)
+    >>> held_out = [np.random.default_rng(0).standard_normal((99, 3))] * len(NOVELTY_WINDOWS)
     >>> detector = NoveltyDetector.fit({}, held_out, false_rejection_rate=0.1)
     >>> scores = [detector.novelty_score(row.tolist(), 1.0) for row in held_out[0]]
     >>> sum(score > detector.threshold(1.0) for score in scores) <= 10  # of 99
@@ -826,7 +826,7 @@ class NoveltyDetector:
         ----------
         distances
             Fitted to all slides.
-        held_out : of each of EFFECTIVE_WINDOWS (n_slides, n_scores)
+        held_out : of each of NOVELTY_WINDOWS (n_slides, n_scores)
             Scores of slides when they were held out and labelled rightly.
         false_rejection_rate
             Fraction of the slides over known surfaces that may be taken for unknown: of new slides like those held out,

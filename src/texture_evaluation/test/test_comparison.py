@@ -16,7 +16,7 @@ from texture_recordings.tables import import_tables, load_mapping
 SMALL = """
 windows: {length_s: 0.5, hop_s: 0.25}
 inputs: {signal: {features: [%s]}}
-learner: naive_bayes
+learner: {sklearn: {estimator: 'sklearn.naive_bayes:GaussianNB'}}
 """
 
 

@@ -35,7 +35,7 @@ def test_each_recipe_learns_distinct_simulated_surfaces_and_recognises_them(name
     recipe = load_recipe(name)
     # The slides are shorter than the windows of some papers.
     length_s = min(0.5, recipe.feature_set.windows.length_s)
-    windows = replace(recipe.feature_set.windows, length_s=length_s, hop_s=0.1, skip_s=0.0)
+    windows = replace(recipe.feature_set.windows, length_s=length_s, hop_s=min(0.1, length_s), skip_s=0.0)
     training = replace(recipe.training, hop_s=min(0.25, recipe.training.hop_s))
     recipe = replace(recipe, feature_set=replace(recipe.feature_set, windows=windows), training=training)
     examples = SlideDataset.from_bags([simulated], '1-4').features(
