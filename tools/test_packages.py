@@ -54,8 +54,8 @@ OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_
 # and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
 OPTIONAL = {
     'texture_recordings': {
-        'python3-scipy': {'importers.ntp21', 'tables.tables'},
-        'texture_features': {'commands.segment', 'segment', 'slide_dataset', 'slide_samples', 'tables.import_tables'},
+        'python3-scipy': {'public_sets', 'tables'},
+        'texture_features': {'commands.segment', 'dataset', 'segment', 'tables'},
     }
 }
 # What launch files need, which no module imports.

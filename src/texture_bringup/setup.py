@@ -33,8 +33,15 @@ def executables() -> list[str]:
 
 
 def commands() -> list[str]:
-    """Return one sub-command of `texture` for each module of commands/, named as the module (import_ as 'import')."""
-    return [f'{module.rstrip("_")} = {NAME}.commands.{module}' for module in modules('commands')]
+    """Return the sub-commands of `texture`: one for each module of commands/, named as it (import_ as 'import').
+
+    A module for which package.xml has <export><commands module="services">stop tare</commands></export> holds an
+    object for each of these instead.
+    """
+    several = {item.get('module'): item.text.split() for item in PACKAGE.iter('commands')}
+    listed = [f'{name} = {NAME}.commands.{module}:{name}' for module, names in several.items() for name in names]
+    alone = [module for module in modules('commands') if module not in several]
+    return listed + [f'{module.rstrip("_")} = {NAME}.commands.{module}' for module in alone]
 
 
 def extras() -> dict[str, list[str]]:

@@ -2,11 +2,15 @@ import os
 import re
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
+from std_srvs.srv import Trigger
 
+from texture_bringup import operator as operators
 from texture_bringup.command import installed, main, summary
+from texture_core.ros_testing import LocalGraph
 
 pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
@@ -32,7 +36,7 @@ def test_every_module_of_a_folder_commands_is_a_sub_command() -> None:
         for path in Path(__file__).resolve().parents[2].glob('*/texture_*/commands/[a-z]*.py')
     }
     assert len(modules) > 10
-    assert modules == {command.value for command in installed().values()}
+    assert modules == {command.module for command in installed().values()}
 
 
 def prefix() -> Path:
@@ -80,11 +84,6 @@ def test_every_sub_command_explains_itself(name, capsys) -> None:
     assert summary(installed()[name]) in ' '.join(capsys.readouterr().out.split())
 
 
-def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
-    assert main(['launch', 'emulator', '--show-args']) == 0
-    assert 'surface:=glass' in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
@@ -107,13 +106,6 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count('\n') == 1
-
-
-def test_a_launch_needs_a_file_and_no_arguments(capsys) -> None:
-    with pytest.raises(SystemExit):
-        main(['launch'])
-    said = capsys.readouterr().err
-    assert 'required: file\n' in said
 
 
 def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:
@@ -149,3 +141,60 @@ def test_a_shell_completes_sub_commands_and_options(line, wanted):
 def test_an_unknown_motion_is_refused_before_an_explorer_is_waited_for(capsys):
     assert main(['explore', 'linear_slid']) == 2
     assert "did you mean 'linear_slide'" in capsys.readouterr().err
+
+
+class Answering:
+    """Stand in for the operator: note what is called, and answer."""
+
+    def __init__(self, answer):
+        self.answer, self.namespaces, self.called = answer, [], []
+
+    def __call__(self, namespace):
+        self.namespaces.append(namespace)
+        return self
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def call(self, service, _advice):
+        self.called.append(service)
+        return self.answer
+
+
+SERVICES = [name for name, command in installed().items() if command.module.endswith('commands.services')]
+
+
+@pytest.mark.parametrize(('name', 'success'), [*((name, True) for name in SERVICES), ('stop', False)])
+def test_a_command_calls_its_service_and_ends_with_its_success(name, success, monkeypatch, capsys):
+    operator = Answering((success, 'as it is'))
+    monkeypatch.setattr('texture_bringup.operator.Operator', operator)
+    assert main([name, '--namespace', 'left']) == (0 if success else 1)
+    assert capsys.readouterr().out == 'as it is\n'
+    assert (operator.namespaces, operator.called) == (['left'], [name.replace('-', '_')])
+
+
+@pytest.mark.realtime
+def test_a_service_that_no_node_offers_is_one_sentence_and_exit_code_2(monkeypatch, capsys):
+    monkeypatch.setattr(operators, 'OFFERED_S', 0.2)
+    monkeypatch.setenv('ROS_DOMAIN_ID', '97')
+    assert main(['stop', '--namespace', 'left']) == 2
+    said = capsys.readouterr().err
+    assert "no node offers the service '/left/stop'" in said
+    assert said.count('\n') == 1
+
+
+@pytest.mark.realtime
+def test_the_answer_of_a_running_node_is_printed(monkeypatch, capsys):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '97')
+    with LocalGraph(97, deadline_s=60.0) as graph:
+        graph.peer.create_service(Trigger, 'recover', lambda _request, _answer: Trigger.Response(message='it burns'))
+        codes = []
+        asking = threading.Thread(target=lambda: codes.append(main(['recover'])))
+        asking.start()
+        graph.until(lambda: bool(codes))
+        asking.join()
+    assert codes == [1]
+    assert capsys.readouterr().out == 'it burns\n'

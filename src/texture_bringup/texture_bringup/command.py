@@ -1,7 +1,8 @@
 """The `texture` command: everything a user does with the suite, one sub-command each.
 
 A package brings its sub-commands as modules of its folder `commands`: the shared `setup.py` declares each as an entry
-point of the group `texture.commands`. A package of somebody else may declare some in the same way.
+point of the group `texture.commands`, and each object of a module for which the manifest lists several. A package of
+somebody else may declare some in the same way.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 
 
 class Module(Protocol):
-    """What a module of a sub-command holds."""
+    """What a module of a sub-command holds, or an object in one."""
 
     def configure(self, parser: argparse.ArgumentParser) -> None:
         """Add the arguments of the sub-command."""
@@ -47,8 +48,11 @@ def installed() -> Mapping[str, EntryPoint]:
 def summary(command: EntryPoint) -> str:
     """Return what a sub-command does: the first line of its module, which is read and not imported.
 
-    All of them together import numpy, scikit-learn and matplotlib, which would take seconds.
+    All of them together import numpy, scikit-learn and matplotlib, which would take seconds. A module with several has
+    an object for each, which knows it.
     """
+    if command.attr:
+        return str(command.load().summary)
     spec = importlib.util.find_spec(command.module)
     loader = cast(importlib.abc.InspectLoader | None, spec.loader if spec else None)
     source = loader.get_source(command.module) if loader else None

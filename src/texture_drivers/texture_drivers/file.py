@@ -14,7 +14,7 @@ from typing import BinaryIO, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import MB, Arrays, Budget, open_regular, param, read_array, take_all
+from texture_core.config import Arrays, open_regular, param, read_array
 from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, Samples, TactileSignal
 from texture_drivers.sensor import SensorParams, load_settings
@@ -129,7 +129,6 @@ def rate_from_times(time_s: Array) -> float:
 # --------------------
 # Recordings in files that other programs write: CSV, WAV, NumPy.
 
-MAX_BYTES = 2000 * MB  # of a file
 # What the readers of numpy and scipy raise at files that are damaged or something else, found by trying.
 READ_ERRORS = (
     ValueError,
@@ -185,7 +184,7 @@ def load_wav(file: BinaryIO) -> FileRecording:
 
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', wavfile.WavFileWarning)  # chunks of no interest
-        rate_hz, samples = wavfile.read(io.BytesIO(take_all(file, MAX_BYTES)))
+        rate_hz, samples = wavfile.read(file)
     if samples.dtype == np.uint8:  # WAV's only unsigned format
         samples = samples.astype(np.int16) - 128
         full_scale = 128.0
@@ -196,17 +195,7 @@ def load_wav(file: BinaryIO) -> FileRecording:
 
 def load_npy(file: BinaryIO) -> FileRecording:
     """Return an array of shape (n_samples, n_channels) or (n_samples,)."""
-    return FileRecording(_columns(read_array(file, Budget(_values_bytes(file)))))
-
-
-def _values_bytes(file: BinaryIO) -> int:
-    """Return how many bytes the values may come to as float64, of a file that is not compressed: a byte each at least.
-
-    The file is at its beginning afterwards.
-    """
-    n_bytes = file.seek(0, io.SEEK_END)
-    file.seek(0)
-    return 8 * n_bytes
+    return FileRecording(_columns(read_array(file)))
 
 
 def load_npz(file: BinaryIO) -> FileRecording:

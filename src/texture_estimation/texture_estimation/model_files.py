@@ -268,7 +268,7 @@ def _check_parts(file: Archive, trusted: Sequence[str], estimators: bool) -> lis
         if kind in ('ObjectNode', 'TreeNode'):
             found.add(name)
         if kind == 'NdArrayNode' and node.get('type') == 'numpy':
-            file.array(str(node['file']), records=estimators)
+            file.array(str(node['file']))
     return sorted(found)
 
 

@@ -1,12 +1,7 @@
 """Every reader of the catalogue passes the same checks by being listed."""
 
 import os
-import resource
-import struct
 import sys
-import time
-import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -110,70 +105,6 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
                 assert path.name in str(error)
 
 
-HUGE = 300_000_000  # values: 2.4 GB
-ZEROS = bytes(8_000_000)
-
-
-def huge_parquet(path: Path) -> None:
-    table = pa.table({'x': np.zeros(HUGE // 300)})
-    with pa.parquet.ParquetWriter(path, table.schema) as writer:
-        for _ in range(300):
-            writer.write_table(table)
-
-
-def huge_hdf5(path: Path) -> None:
-    with h5py.File(path, 'w') as file:
-        file.create_dataset('x', shape=(HUGE,), dtype='f8', compression='gzip')  # chunks that were never written
-
-
-def huge_mat(path: Path, megavalues: int) -> None:
-    """Claim a column of `HUGE` values, and hold some of them, compressed."""
-    scipy.io.savemat(path, {'x': X})
-    head = struct.pack('<IIII', 6, 8, 6, 0) + struct.pack('<IIii', 5, 8, HUGE, 1) + b'\1\0\1\0x\0\0\0'
-    head += struct.pack('<II', 9, 8 * HUGE)
-    packer = zlib.compressobj(1)
-    packed = packer.compress(struct.pack('<II', 14, len(head) + 8 * HUGE) + head)
-    packed += b''.join(packer.compress(ZEROS) for _ in range(megavalues)) + packer.flush()
-    path.write_bytes(path.read_bytes()[:128] + struct.pack('<II', 15, len(packed)) + packed)
-
-
-def numpy_header(count: int) -> bytes:
-    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({count},), }}".ljust(117) + '\n'
-    return b'\x93NUMPY\1\0' + struct.pack('<H', len(text)) + text.encode()
-
-
-def huge_npz(path: Path) -> None:
-    with zipfile.ZipFile(path, 'w', zipfile.ZIP_DEFLATED, compresslevel=1) as archive, archive.open('x.npy', 'w') as x:
-        x.write(numpy_header(HUGE // 2))
-        for _ in range(HUGE // 2_000_000):
-            x.write(ZEROS)
-
-
-HOSTILE: dict[str, Callable[[Path], object]] = {
-    'unpacks.parquet': huge_parquet,
-    'unwritten.h5': huge_hdf5,
-    'unpacks.mat': lambda path: huge_mat(path, 150),
-    'claims.mat': lambda path: huge_mat(path, 0),
-    'claims.npy': lambda path: path.write_bytes(numpy_header(10**12)),
-    'unpacks.npz': huge_npz,
-    'one_line.csv': lambda path: path.write_bytes(b'1;' * 30_000_000),
-    'sparse.csv': lambda path: (path.write_bytes(b'x\n'), os.truncate(path, 2 * 10**9)),
-}
-
-
-@pytest.mark.parametrize('name', HOSTILE)
-def test_a_file_that_takes_the_machine_is_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
-    path = tmp_path / name
-    HOSTILE[name](path)
-    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    began_s = time.monotonic()
-    with TableFiles() as files, pytest.raises(InvalidData, match=rf"^'{name}' .*; \w+"):
-        for table in files.tables(path.suffix, path, name, mapping()):
-            table.read(table.names[:1], [])
-    assert time.monotonic() - began_s < 60.0  # of which reading takes at most 10 s, but of the long text
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 50_000
-
-
 def test_a_file_that_takes_too_long_is_refused_and_the_next_one_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -184,25 +115,6 @@ def test_a_file_that_takes_too_long_is_refused_and_the_next_one_is_read(
             list(files.tables('.csv', path, 'a.csv', mapping()))
         monkeypatch.undo()
         assert [table.names for table in files.tables('.csv', path, 'a.csv', mapping())] == [['x', 'y']]
-
-
-def test_a_wide_parquet_file_is_read_in_time(tmp_path: Path) -> None:
-    pa.parquet.write_table(pa.table({f'c{number}': X for number in range(5000)}), tmp_path / 'a.parquet')
-    with TableFiles() as files:
-        for table in files.tables('.parquet', tmp_path / 'a.parquet', 'a', mapping()):
-            np.testing.assert_array_equal(table.read(table.names, []).numbers['c4999'], X)
-
-
-def test_groups_of_hdf5_that_link_to_each_other_are_read_once(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / 'a.h5', 'w') as file:
-        groups = [file.create_group(f'g{number}') for number in range(60)]
-        for group in groups:
-            for other in groups:
-                group[f'to{other.name[1:]}'] = other
-        groups[-1]['x'] = X
-    with TableFiles() as files:
-        [names] = [table.names for table in files.tables('.h5', tmp_path / 'a.h5', 'a', mapping())]
-    assert len(names) == 1
 
 
 @each

@@ -1,17 +1,14 @@
-"""Read and write bags (MCAP) of the suite's messages, within limits."""
+"""Read and write bags (MCAP) of the suite's messages, of any origin."""
 
 from __future__ import annotations
 
 import io
 import logging
 import os
-import re
 import struct
 import sys
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any, BinaryIO, NamedTuple, get_type_hints
 from zlib import crc32
@@ -19,7 +16,6 @@ from zlib import crc32
 import apsw
 import numpy as np
 import yaml
-from lz4.frame import LZ4FrameDecompressor
 from numpy.typing import NDArray
 from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import (
@@ -29,16 +25,14 @@ from rosbags.rosbag2 import (
     ReaderError,
     StoragePlugin,
     Writer,
-    reader,
     storage_mcap,
-    storage_sqlite3,
 )
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
-from texture_core.config import MB, Budget, FileRefused, folder, open_regular, parse_yaml, read_text, unpacked_limit
+from texture_core.config import FileRefused, folder, open_regular, parse_yaml, read_text
 from texture_core.errors import InvalidData
 from texture_core.types import (
     NANOSECONDS,
@@ -52,45 +46,23 @@ from texture_core.types import (
 )
 
 # --------------------
-# Limits for bags of any origin where rosbags has none: what unpacks, how often, and which files are opened at all.
-#
-# An MCAP file without its end, of a recorder that was killed, is opened as if it ended behind its last whole chunk.
-#
-# rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory; it believes
-# the
-# index of an MCAP file, in which a chunk may stand a hundred thousand times; and what an SQLite file computes is not
-# bounded by its size.
+# Which files of a bag are opened: regular ones, and an MCAP file without its end, of a recorder that was killed, as if
+# it ended behind its last whole chunk.
 
 if sys.version_info >= (3, 14):
-    from compression.zstd import ZstdDecompressor, ZstdError
+    from compression.zstd import ZstdError
 else:
-    from backports.zstd import ZstdDecompressor, ZstdError
+    from backports.zstd import ZstdError
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
-# Each record in a chunk becomes objects of 150 bytes, however little it takes in the file.
-RECORDS_AT_LEAST = 16
-PACKED_RECORD_BYTES = 8
 CHUNK = 0x06
-CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
+CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
 RECORD_HEAD = struct.Struct('<BQ')
 MAGIC = b'\x89MCAP0\r\n'
 # The end of a file: the footer with the place of the summary, which is 0 if there is none, and its checksum; the magic.
 END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
 FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
-# Signals are read in 10 µs each, other messages in 25 µs, and each becomes objects of up to 1.5 kB; a bag of 5 MB may
-# hold so many signals, or a third of it of other messages, and larger ones another for every 8 bytes.
-SIGNALS_AT_LEAST, OTHERS_COUNT = 200_000, 3
-SHORT_BYTES, TEXTS_BYTES = 512, 64  # of other messages; longer ones may hold a text, which takes 1 µs, in each 8 bytes
-SMALL_BAG_BYTES, SIGNAL_BYTES = 5 * MB, 8
-# Windows are cut from time that was sampled, however few samples that takes. Signals of the suite take 1 kB/s or more.
-RECORDED_AT_LEAST_S, BYTES_PER_S = 3600.0, 300
-# SQLite counts its own steps; reading a row three times takes fewer than a hundred, and a row 30 bytes or more.
-MAX_STEPS = 10_000_000
-STEPS_PER_BYTE = 4
-STEPS_AT_ONCE = 100_000
-MAX_TABLES = 100
-COMPUTED = re.compile(r'\bAS\s*\(|\bVIEW\b|\bVIRTUAL\b|\bTRIGGER\b', re.IGNORECASE)
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
@@ -108,7 +80,7 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
-        file = open_regular(self)
+        file = open_regular(self, None)
         if self.suffix != '.mcap' or _has_end(file):
             return file
         end = _end_of_chunks(file)
@@ -199,109 +171,6 @@ def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
     return True
 
 
-def check_storage(path: Path) -> None:
-    """Raise FileRefused or OSError unless a file of a bag is a regular one, within the limits."""
-    with open_regular(path) as file:
-        if path.suffix == '.mcap':
-            _check_mcap(file)
-        elif path.suffix == '.db3':
-            _check_sqlite(path)
-
-
-def check_index(storage: Any) -> None:
-    """Raise FileRefused if the index of an opened MCAP file names a part of the file twice.
-
-    Raises
-    ------
-    FileRefused
-        If it does.
-    """
-    budget = _budget(Path(storage.path).stat().st_size)
-    end = 0
-    for chunk in sorted(storage.chunks, key=lambda chunk: int(chunk.chunk_start_offset)):
-        if chunk.chunk_start_offset < end:
-            raise FileRefused('it has an index in which chunks overlap')
-        end = chunk.chunk_start_offset + RECORD_HEAD.size + CHUNK_HEAD.size + chunk.compressed_size
-        budget.spend(chunk.uncompressed_size)
-
-
-def messages_budget(files: Iterable[Path]) -> Budget:
-    """Return how many bytes the messages of a bag may have: a damaged or altered file may give the same ones again."""
-    return _budget(sum(file.stat().st_size for file in files))
-
-
-class MessageLimit:
-    """How many messages a bag may still have.
-
-    Parameters
-    ----------
-    files
-        Files of the bag.
-
-    Examples
-    --------
-    >>> limit = MessageLimit([])  # of an empty bag
-    >>> for _ in range(SIGNALS_AT_LEAST):
-    ...     limit.spend(100, is_signal=True)
-    >>> try:
-    ...     limit.spend(100, is_signal=True)
-    ... except FileRefused as error:
-    ...     print(error)
-    it has more messages than a bag of 0 MB may hold; split the recording
-    """
-
-    def __init__(self, files: Iterable[Path]) -> None:
-        self._file_bytes = sum(file.stat().st_size for file in files)
-        self._left = SIGNALS_AT_LEAST + max(0, self._file_bytes - SMALL_BAG_BYTES) // SIGNAL_BYTES
-
-    def spend(self, n_bytes: int, is_signal: bool) -> None:
-        """Count a message; FileRefused if there are more than the size of the bag allows.
-
-        Raises
-        ------
-        FileRefused
-            If there are more.
-        """
-        self._left -= 1 if is_signal else OTHERS_COUNT + max(0, n_bytes - SHORT_BYTES) // TEXTS_BYTES
-        if self._left < 0:
-            raise FileRefused(
-                f'it has more messages than a bag of {self._file_bytes / MB:.3g} MB may hold; split the recording'
-            )
-
-
-def check_duration(path: Path, signals: Iterable[TactileSignal]) -> None:
-    """Raise FileRefused if the signals of a bag stand for much more time than its size can tell of.
-
-    Raises
-    ------
-    FileRefused
-        If they do.
-    """
-    size = sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]) if file.is_file())
-    seconds: defaultdict[str, float] = defaultdict(float)
-    for signal in signals:
-        seconds[signal.sensor] += len(signal.samples) / signal.sampling_rate_hz
-    most_s = RECORDED_AT_LEAST_S + size / BYTES_PER_S
-    longest_s = max(seconds.values(), default=0.0)
-    if longest_s > most_s:
-        raise FileRefused(
-            f'it has {longest_s / 3600:.3g} h of samples, and a bag of {size / MB:.3g} MB may have '
-            f'{most_s / 3600:.3g} h; check the sampling rate of its signals'
-        )
-
-
-def _budget(file_bytes: int) -> Budget:
-    return Budget(unpacked_limit(file_bytes))
-
-
-def _check_mcap(file: BinaryIO) -> None:
-    size = file.seek(0, 2)
-    budget = _budget(size)
-    for kind, _, head in _records(file, size):
-        if kind == CHUNK and len(head) == CHUNK_HEAD.size:
-            budget.spend(CHUNK_HEAD.unpack(head)[2])
-
-
 def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
     """Yield the kind, the length and the first bytes of each record; what is damaged is left to who reads on."""
     at = len(MAGIC)
@@ -313,76 +182,6 @@ def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
         kind, length = RECORD_HEAD.unpack_from(head)
         yield kind, length, head[RECORD_HEAD.size :]
         at += RECORD_HEAD.size + length
-
-
-def _check_sqlite(path: Path) -> None:
-    """Refuse what computes its content: what is stored is no more than the file holds."""
-    connection = apsw.Connection(
-        f'file:{path}?immutable=1', flags=apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI
-    )  # fmt: skip
-    try:
-        definitions = connection.execute('SELECT sql FROM sqlite_master LIMIT ?', (MAX_TABLES + 1,)).fetchall()
-    finally:
-        connection.close()
-    if len(definitions) > MAX_TABLES or any(COMPUTED.search(str(sql)) for (sql,) in definitions):
-        raise FileRefused('it has tables that are computed, which no bag has')
-
-
-class _Steps:
-    """How many steps of SQLite a connection may still take."""
-
-    def __init__(self, most: int) -> None:
-        self._left = most
-
-    def __call__(self) -> bool:
-        """Count; True ends the query with an error."""
-        self._left -= STEPS_AT_ONCE
-        return self._left < 0
-
-
-def _limit_sqlite(connection: apsw.Connection) -> None:
-    size = Path(connection.filename).stat().st_size
-    connection.limit(apsw.SQLITE_LIMIT_LENGTH, max(size, MB))
-    connection.set_progress_handler(_Steps(MAX_STEPS + STEPS_PER_BYTE * size), STEPS_AT_ONCE)
-
-
-def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
-    """Return a chunk that claims to unpack to `size`; one byte more is enough to tell that it does not."""
-    if size > unpacked_limit(len(data)):
-        raise ReaderError(f'a chunk of {len(data)} bytes claims to unpack to {size}')
-    content = bytes(decompressor.decompress(data, max_length=size + 1))
-    most = RECORDS_AT_LEAST + len(data) // PACKED_RECORD_BYTES
-    if next(islice(_starts(content), most, None), None) is not None:
-        raise ReaderError(f'a chunk of {len(data)} bytes unpacks to more than {most} records')
-    return content
-
-
-def _starts(content: bytes) -> Iterator[int]:
-    """Yield where the records of a chunk begin."""
-    at, end = 0, len(content) - RECORD_HEAD.size
-    while at <= end:
-        yield at
-        at += RECORD_HEAD.size + RECORD_HEAD.unpack_from(content, at)[1]
-
-
-def _no_quality_of_service(_text: Any) -> list[Any]:
-    """Return nothing: the suite reads no quality of service from bags, and reading it takes seconds if it is long."""
-    return []
-
-
-def set_limits() -> None:
-    """Set the limits in rosbags and SQLite, for this process."""
-    storage_mcap.DECOMPRESSORS.update(
-        zstd=lambda data, size: _unpacked(ZstdDecompressor(), data, size),
-        lz4=lambda data, size: _unpacked(LZ4FrameDecompressor(), data, size),
-    )
-    for module in (reader, storage_mcap, storage_sqlite3):
-        module.parse_qos = _no_quality_of_service  # type: ignore[attr-defined]
-    if _limit_sqlite not in apsw.connection_hooks:
-        apsw.connection_hooks.append(_limit_sqlite)
-
-
-set_limits()
 
 
 # --------------------
@@ -865,12 +664,8 @@ def _read(
         checked = CheckedPath(_cut_off_file(path) or path)
         files = _files(checked)
         for file in files:
-            check_storage(file)
-        budget, limit = messages_budget(files), MessageLimit(files)
+            open_regular(file, None).close()
         with Reader(checked) as reader:
-            for storage in getattr(reader.storage, 'storages', [reader.storage]):
-                if hasattr(storage, 'chunks'):
-                    check_index(storage)
             own = reader.connections if foreign else connections_below(path, reader.connections, namespace)
             names = topic_names(c.topic for c in reader.connections if c.msgtype in MESSAGES)
             connections = [c for c in own if chosen(c, names.get(c.topic, c.topic))]
@@ -879,8 +674,6 @@ def _read(
             missing = sum(connection.msgcount for connection in connections)
             for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
                 missing -= 1
-                budget.spend(len(data))
-                limit.spend(len(data), connection.msgtype == TYPES[TactileSignal])
                 name = names.get(connection.topic, connection.topic)
                 yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import FileRefused, writing
+from texture_core.config import writing
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.types import (
     NANOSECONDS,
@@ -36,7 +36,7 @@ from texture_core.types import (
 from texture_features.examples import LabelledFeatures
 from texture_features.feature import WindowBatch
 from texture_features.windows import CutWindow, WindowEvent, WindowParams, cut_recording
-from texture_recordings.bags import check_duration, find_bags, read_bag
+from texture_recordings.bags import find_bags, read_bag
 
 if TYPE_CHECKING:
     from texture_features.augmentation import Augmentation, AugmentedFeatures
@@ -470,10 +470,6 @@ def find_slides(
 def _slides_of(path: Path, namespace: str | None, topics: Sequence[str]) -> list[LabelledSlide]:
     """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
     messages = list(read_bag(path, (*topics, STATES), namespace))
-    try:
-        check_duration(path, (value for topic, _, value in messages if topic in topics))
-    except FileRefused as error:
-        raise InvalidData(f"the bag '{path}' cannot be used: {error}") from error
     reported = [message for message in messages if message[0] == STATES and message[2].exploration_id]
     groups = [list(group) for _, group in groupby(reported, key=lambda message: message[2].exploration_id)]
     starts: list[int | None] = [group[0][1] for group in groups]

@@ -1,0 +1,267 @@
+from __future__ import annotations
+
+import io
+import os
+import socket
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.config import (
+    MAX_CHARACTERS,
+    MAX_FILE_BYTES,
+    Archive,
+    Arrays,
+    FileRefused,
+    find,
+    find_file,
+    folder,
+    from_mapping,
+    load_card,
+    load_yaml,
+    markdown_table,
+    open_regular,
+    param,
+    parse_json,
+    parse_yaml,
+    read_array,
+    read_bounded,
+    read_text,
+)
+from texture_core.errors import InvalidParameter, UnknownName
+
+
+def test_a_name_is_looked_up() -> None:
+    assert find({'hjorth': 1}, 'hjorth', 'feature') == 1
+
+
+def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(UnknownName, match="no feature 'hjort'; did you mean 'hjorth'"):
+        find({'hjorth': 1, 'level': 2}, 'hjort', 'feature')
+
+
+def test_a_users_class_is_imported() -> None:
+    assert find({}, 'numpy:sqrt', 'feature') is np.sqrt
+
+
+@pytest.mark.parametrize('name', ['no_such_module:Thing', 'numpy:no_such_thing', '.:x', ':x', 'a..b:x'])
+def test_what_cannot_be_imported_is_said(name: str) -> None:
+    with pytest.raises(UnknownName, match='module:Class'):
+        find({}, name, 'feature')
+
+
+@pytest.mark.parametrize('name', ['antigravity:fly', 'unittest.__main__:main', 'numpy.__main__:x'])
+def test_programs_and_parts_of_python_are_not_imported_for_a_name(name: str) -> None:
+    with pytest.raises(UnknownName, match='part or a program of Python'):
+        find({}, name, 'feature')
+    assert name.partition(':')[0] not in sys.modules
+
+
+def test_a_path_of_the_user_wins(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.yaml'
+    path.write_text('')
+    assert find_file(str(path), 'texture_core', 'config', 'recipe') == path
+
+
+def test_a_shipped_file_is_found_by_name_in_an_installation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shipped = tmp_path / 'share' / 'some_package' / 'config'
+    shipped.mkdir(parents=True)
+    (shipped / 'good.yaml').write_text('')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path}')
+    assert folder('some_package', 'config') == shipped
+    assert find_file('good', 'some_package', 'config', 'recipe') == shipped / 'good.yaml'
+    with pytest.raises(UnknownName, match="no recipe 'goood'; did you mean 'good'"):
+        find_file('goood', 'some_package', 'config', 'recipe')
+
+
+@pytest.mark.parametrize('name', ['mine.yaml', 'some/folder/mine'])
+def test_a_missing_file_of_the_user_is_not_called_an_unknown_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UnknownName, match=f"there is no file '{name}' in '{tmp_path}'"):
+        find_file(name, 'texture_core', 'config', 'recipe')
+
+
+@dataclass(frozen=True)
+class Params:
+    length_s: float = param(0.5, 'Length of one window.', unit='s', low=0.01, high=10.0)
+    count: int = param(3, 'How many.', low=1)
+    shape: str = param('sine', 'Shape.', choices=('sine', 'square'))
+    loud: bool = param(False, 'Say more.')
+
+
+def test_what_is_not_named_keeps_its_default() -> None:
+    assert from_mapping(Params, {'count': 5}) == Params(count=5)
+
+
+def test_a_whole_number_serves_where_a_number_is_needed() -> None:
+    assert from_mapping(Params, {'length_s': 1}).length_s == 1.0
+
+
+@pytest.mark.parametrize(
+    ('values', 'sentence'),
+    [
+        ({'length_s': 20.0}, '0.01 to 10.0 s'),
+        ({'length_s': float('nan')}, '0.01 to 10.0 s'),
+        ({'length_s': 'long'}, 'a number is needed'),
+        ({'count': 0}, 'at least 1'),
+        ({'count': 2.5}, 'a whole number is needed'),
+        ({'count': True}, 'a whole number is needed'),
+        ({'shape': 'round'}, 'one of sine, square'),
+        ({'loud': 1}, 'true or false is needed'),
+        ({'lenght_s': 1.0}, "did you mean 'length_s'?"),
+        ([1, 2], 'a mapping'),
+    ],
+)
+def test_a_bad_value_is_refused_with_what_is_allowed(values: object, sentence: str) -> None:
+    with pytest.raises(InvalidParameter) as refusal:
+        from_mapping(Params, values, where='recipe x')  # type: ignore[arg-type]
+    assert sentence in str(refusal.value)
+    assert str(refusal.value).startswith('recipe x: ')
+
+
+def test_the_table_names_default_unit_and_range() -> None:
+    assert '| `length_s` | `0.5` s | 0.01 to 10.0 s | Length of one window. |' in markdown_table(Params)
+
+
+LAUGHS = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
+    f'{b}: &{b} [{", ".join([f"*{a}"] * 9)}]\n' for a, b in zip('abcdefghi', 'bcdefghij', strict=True)
+)
+BAD = {
+    'aliases that multiply': LAUGHS,
+    'a list within itself': '&a [*a]',
+    'deep nesting': '[' * 100_000,
+    'too much': 'x' * (MAX_CHARACTERS + 1),
+    'a Python object': '!!python/object/apply:os.system [exit 1]',
+    'no date': 'a: 2024-99-99',
+    'cut off': '{a: ',
+    'two documents': 'a: 1\n---\nb: 2',
+    'a list as a key': '? [1]\n: 2',
+}
+
+
+@pytest.mark.parametrize('what', BAD)
+def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -> None:
+    file = tmp_path / 'file.yaml'
+    file.write_text(BAD[what])
+    with pytest.raises(InvalidParameter, match=r"scene '.*' is no YAML that can be read: ") as caught:
+        load_yaml(file, 'scene')
+    assert '\n' not in str(caught.value)
+
+
+def test_yaml_is_read_with_its_aliases() -> None:
+    assert parse_yaml('a: &a {x: 1}\nb: {<<: *a, y: 2}\nc: [*a, *a]') == {
+        'a': {'x': 1}, 'b': {'x': 1, 'y': 2}, 'c': [{'x': 1}, {'x': 1}],
+    }  # fmt: skip
+    assert parse_yaml('# nothing') is None
+
+
+def test_bytes_that_are_no_text_and_a_missing_file_are_refused(tmp_path: Path) -> None:
+    (tmp_path / 'image.yaml').write_bytes(b'\xff\xd8\xff')
+    for name in ('image.yaml', 'missing.yaml'):
+        with pytest.raises(InvalidParameter, match=name):
+            load_yaml(tmp_path / name, 'scene')
+
+
+@pytest.mark.parametrize('text', ['[' * 100_000, '{"recipe"', '[]', '3', '"x"', '\x00'])
+def test_a_bad_card_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / 'card.json').write_text(text)
+    with pytest.raises(InvalidParameter, match='model card'):
+        load_card(tmp_path / 'card.json')
+
+
+def test_json_is_read() -> None:
+    assert parse_json('{"a": [1, null]}') == {'a': [1, None]}
+
+
+# Only regular files are read, and no more of them than is allowed.
+
+
+def make_device(path: Path) -> None:
+    path.symlink_to('/dev/zero')
+
+
+def make_socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(str(path))
+
+
+ODD: dict[str, Callable[[Path], None]] = {'device': make_device, 'named pipe': os.mkfifo, 'socket': make_socket}
+
+
+@pytest.mark.parametrize('kind', ODD)
+def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
+    ODD[kind](tmp_path / 'odd')
+    for path in (tmp_path / 'odd', tmp_path / 'link'):
+        if path.name == 'link':
+            path.symlink_to(tmp_path / 'odd')
+        with pytest.raises(FileRefused, match=f'it is a {kind}; a regular file is needed'):
+            open_regular(path)
+
+
+def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError):
+        open_regular(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        open_regular(tmp_path / 'missing')
+
+
+def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('äöü')
+    assert read_bounded(tmp_path / 'file', 6) == 'äöü'.encode()
+    assert read_text(tmp_path / 'file', 6) == 'äöü'
+    with pytest.raises(FileRefused, match=r'it has more than 5e-06 MB'):
+        read_bounded(tmp_path / 'file', 5)
+
+
+@pytest.mark.parametrize('array', [np.arange(6.0).reshape(2, 3), np.asfortranarray(np.eye(3)), np.array(['a', 'bc'])])
+def test_an_array_is_what_numpy_wrote(array: np.ndarray, tmp_path: Path) -> None:
+    np.save(tmp_path / 'a.npy', array)
+    with open_regular(tmp_path / 'a.npy') as file:
+        read = read_array(file)
+    assert read.dtype == array.dtype
+    np.testing.assert_array_equal(read, array)
+
+
+HEADERS = {
+    'huge': "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000, 30)}",
+    'cut off': "{'descr': '<f8', 'fortran_order': False, 'shape': (10, 30)}",
+    'objects': "{'descr': '|O', 'fortran_order': False, 'shape': (1,)}",
+    'unfinished': "{'descr': '<f8', 'shape': (",
+    'a call': "__import__('os').abort()",
+}
+
+
+@pytest.mark.parametrize('what', HEADERS)
+def test_an_array_of_python_objects_or_without_its_values_is_refused(what: str) -> None:
+    header = HEADERS[what].encode() + b'\n'
+    with pytest.raises(FileRefused, match=r'^it '):
+        read_array(io.BytesIO(b'\x93NUMPY\x01\x00' + len(header).to_bytes(2, 'little') + header))
+
+
+def test_an_archive_that_unpacks_to_more_than_a_gigabyte_is_refused() -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, 'w', zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr('a', b'some')
+    content, directory = file.getvalue(), file.getvalue().index(b'PK\x01\x02') + 24
+    lying = content[:directory] + (MAX_FILE_BYTES + 1).to_bytes(4, 'little') + content[directory + 4 :]
+    assert Archive(file).read('a') == b'some'
+    with pytest.raises(FileRefused, match='unpacks to more than 1000 MB'):
+        Archive(io.BytesIO(lying))
+
+
+def test_arrays_of_an_archive_are_those_that_numpy_wrote() -> None:
+    file = io.BytesIO()
+    np.savez_compressed(file, a=np.arange(3), zeros=np.zeros(5))
+    arrays = Arrays(file)
+    assert arrays.names == ('a', 'zeros')
+    assert 'a' in arrays
+    np.testing.assert_array_equal(arrays['a'], np.arange(3))
+    with pytest.raises(KeyError):
+        arrays['b']

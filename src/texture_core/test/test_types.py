@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import math
+import socket
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from texture_core import errors
+from texture_core.errors import InvalidData
+from texture_core.types import (
+    LOOPBACK,
+    MAX_CHARACTERS,
+    FingerSender,
+    FingerState,
+    SlideMotion,
+    TactileSignal,
+    checked_label,
+    group_similar,
+    lost_samples,
+    quaternion,
+    quaternion_matrix,
+    rotation_matrix,
+    rotation_vector,
+)
+
+
+def batch(first: int, count: int, **changes: object) -> TactileSignal:
+    values = {
+        'stamp_ns': 0,
+        'sensor': 'tsf85/dynamic',
+        'channels': ('dynamic',),
+        'units': ('count',),
+        'sampling_rate_hz': 1000.0,
+        'first_sample': first,
+        'samples': np.zeros((count, 1), dtype=np.float32),
+        **changes,
+    }
+    return TactileSignal(**values)  # type: ignore[arg-type]
+
+
+def test_ten_samples_at_one_kilohertz_last_ten_milliseconds() -> None:
+    assert batch(0, 10).end_ns == 10_000_000
+
+
+def test_a_jump_of_the_index_is_a_loss() -> None:
+    assert lost_samples([batch(0, 10), batch(10, 10), batch(25, 10)]) == 5
+
+
+@pytest.mark.parametrize(
+    'changes',
+    [
+        {'samples': np.zeros(10, dtype=np.float32)},
+        {'samples': np.zeros((10, 2), dtype=np.float32)},
+        {'sampling_rate_hz': 0.0},
+        {'sampling_rate_hz': float('nan')},
+        {'sampling_rate_hz': 1e12},
+        {'first_sample': -1},
+        {'units': ('count', 'count')},
+    ],
+)
+def test_a_signal_that_contradicts_itself_is_refused(changes: dict[str, object]) -> None:
+    with pytest.raises(InvalidData, match='tsf85/dynamic'):
+        batch(0, 10, **changes)
+
+
+@pytest.mark.parametrize(
+    ('units', 'common'), [(('Pa', 'Pa'), 'Pa'), (('Pa', 'N'), ''), ((), '')], ids=['equal', 'different', 'unknown']
+)
+def test_the_common_unit_is_that_of_all_channels(units: tuple[str, ...], common: str) -> None:
+    signal = batch(0, 10, channels=('a', 'b'), units=units, samples=np.zeros((10, 2), dtype=np.float32))
+    assert signal.common_unit == common
+
+
+@pytest.mark.parametrize('label', ['', 'cork', 'woven cloth', 'Kork Nr. 3 (fein)', 'höckrig', 'x' * MAX_CHARACTERS])
+def test_a_plain_label_is_taken_as_it_is(label: str) -> None:
+    assert checked_label(label) == label
+
+
+def test_white_space_around_a_label_is_removed() -> None:
+    assert checked_label(' cork\n') == 'cork'
+
+
+@pytest.mark.parametrize('label', ['../../etc/x', 'a\\b', 'bell\x07', 'two\nlines'])
+def test_a_label_that_names_a_path_or_cannot_be_printed_is_refused(label: str) -> None:
+    with pytest.raises(InvalidData, match='slash, a backslash or a character that cannot be printed'):
+        checked_label(label)
+
+
+def test_a_long_label_is_refused_with_its_length_and_the_sentence_stays_short() -> None:
+    with pytest.raises(InvalidData, match='has 100000 characters; at most 100') as raised:
+        checked_label('x' * 100_000)
+    assert len(str(raised.value)) < 200
+
+
+def test_a_quarter_turn_about_z_brings_x_to_y() -> None:
+    assert rotation_matrix([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_a_quaternion_turns_as_the_rotation_vector_does() -> None:
+    half = 0.35
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    quaternion = (*(np.sin(half) * axis), np.cos(half))
+    assert quaternion_matrix(quaternion) == pytest.approx(rotation_matrix(2 * half * axis))
+    assert quaternion_matrix(np.array(quaternion) * 3.0) == pytest.approx(rotation_matrix(2 * half * axis))
+
+
+def test_a_quaternion_of_length_zero_is_no_rotation() -> None:
+    assert np.isnan(quaternion_matrix((0.0, 0.0, 0.0, 0.0))).all()
+
+
+@pytest.mark.parametrize('angle_rad', [0.0, 1e-9, 0.3, 2.0, np.pi - 1e-9, np.pi])
+@pytest.mark.parametrize('axis', [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, 0.0, 0.8), (-2 / 3, 1 / 3, 2 / 3)])
+def test_the_rotation_vector_of_a_matrix_gives_the_matrix_again(angle_rad: float, axis: tuple[float, ...]) -> None:
+    matrix = rotation_matrix(angle_rad * np.array(axis))
+    vector = rotation_vector(matrix)
+    assert rotation_matrix(vector) == pytest.approx(matrix, abs=1e-12)
+    assert np.linalg.norm(vector) == pytest.approx(angle_rad, abs=1e-8)
+
+
+@pytest.mark.parametrize('turned', [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.3, -0.2, 0.9), (np.pi, 0.0, 0.0)])
+def test_a_quaternion_turns_as_its_rotation_vector(turned: tuple[float, ...]) -> None:
+    assert quaternion_matrix(quaternion(turned)) == pytest.approx(rotation_matrix(turned), abs=1e-12)
+
+
+ASKED = SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0)
+
+
+def test_what_an_arm_misses_of_the_motion_asked_for_makes_no_other_kind() -> None:
+    missed = [
+        replace(ASKED, speed_m_s=0.098, force_n=2.2, direction_rad=0.02),
+        ASKED,
+        replace(ASKED, speed_m_s=0.103, force_n=1.9, direction_rad=math.tau - 0.02),
+    ]
+    assert group_similar(missed) == [ASKED] * 3
+
+
+@pytest.mark.parametrize(
+    'other',
+    [{'direction_rad': 3.0}, {'direction_rad': 0.4}, {'speed_m_s': 0.05}, {'force_n': 1.0}, {'motion': 'circular'}],
+)
+def test_other_directions_speeds_forces_and_names_are_other_kinds(other: dict[str, float]) -> None:
+    assert group_similar([ASKED, replace(ASKED, **other)]) == [ASKED, replace(ASKED, **other)]
+
+
+def test_a_kind_is_as_long_as_its_middle_slide() -> None:
+    slides = [replace(ASKED, duration_s=seconds) for seconds in (0.9, 1.0, 9.0)]
+    assert group_similar(slides) == [ASKED] * 3
+
+
+def test_a_state_survives_the_wire() -> None:
+    state = FingerState(123_456_789_012, 0.1, -0.2, 0.003, 0.05, 0.0, -0.01, 1.5)
+    assert FingerState.from_bytes(state.to_bytes()) == state
+
+
+@pytest.mark.parametrize('data', [b'', b'TTF1', b'X' * 68, FingerState(1).to_bytes() + b'\0'])
+def test_a_foreign_datagram_is_no_state(data: bytes) -> None:
+    assert FingerState.from_bytes(data) is None
+
+
+def test_the_bench_is_reported_if_it_has_a_port_and_need_not_listen() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind((LOOPBACK, 0))
+        emulator.settimeout(10.0)
+        sender, silent = FingerSender(emulator.getsockname()[1]), FingerSender(0)
+        for _ in range(2):
+            silent.send(FingerState(0))
+            sender.send(FingerState(7))
+            assert FingerState.from_bytes(emulator.recv(256)) == FingerState(7)
+            sender.close()
+    sender.send(FingerState(8))
+    sender.close()
+
+
+def test_an_error_is_one_line_whatever_others_said() -> None:
+    assert str(InvalidData("'file' cannot be read: bad\n  line 3\n    ^")) == "'file' cannot be read: bad line 3 ^"
+
+
+def test_a_long_error_is_its_beginning() -> None:
+    text = str(InvalidData('came ' + 'x' * 10_000))
+    assert text.startswith('came xxx') and text.endswith('…') and len(text) == errors.MAX_CHARACTERS
