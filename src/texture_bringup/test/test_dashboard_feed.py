@@ -6,18 +6,13 @@ import pytest
 from texture_bringup.dashboard import (
     BINS,
     DEFAULTS,
-    MAX_EXPLORATIONS,
-    MAX_FRAMES,
     MAX_LIGHTS,
     POINTS,
     SILENT_S,
     Feed,
-    History,
     NodeStatuses,
     Ring,
-    envelope,
     offered,
-    places_of,
     spectrum_db,
 )
 from texture_core.errors import MotionRefused
@@ -51,32 +46,10 @@ def test_a_ring_keeps_the_newest_and_leaves_a_gap_where_samples_are_lost() -> No
     assert ring.lost == 2
 
 
-def test_a_burst_longer_than_the_ring_and_an_endless_gap_take_no_more_memory() -> None:
-    ring = Ring(0.01)
-    ring.update(batch(0, range(50)))
-    np.testing.assert_array_equal(ring.newest(1.0), range(40, 50))
-    ring.update(batch(2**60, [7]))
-    assert ring.newest(1.0)[-1] == 7
-    assert len(ring.newest(1.0)) == 10
-
-
-def test_an_envelope_loses_no_peak() -> None:
-    samples = np.zeros(2000)
-    samples[[777, 1234]] = 5, -3
-    low, high = envelope(samples, 100)
-    assert (len(low), high.max(), low.min()) == (100, 5, -3)
-
-
 def test_a_sine_of_amplitude_one_is_a_line_of_zero_decibels() -> None:
     levels = spectrum_db(np.sin(2 * np.pi * 125 * np.arange(512) / 1000), 128)
     assert np.argmax(levels) == pytest.approx(128 * 125 / 500, abs=1)
     assert levels.max() == pytest.approx(0.0, abs=0.1)
-
-
-def test_taxels_lie_where_their_names_say_else_in_a_square() -> None:
-    assert places_of(('taxel_0_0', 'taxel_6_3')) == [(0, 0), (6, 3)]
-    assert places_of(('a', 'b', 'c')) == [(0, 0), (0, 1), (1, 0)]
-    assert places_of(()) == []
 
 
 def test_taxels_are_shown_from_their_rest_and_a_touch_does_not_move_it() -> None:
@@ -86,22 +59,6 @@ def test_taxels_are_shown_from_their_rest_and_a_touch_does_not_move_it() -> None
     for k in range(1, 200):
         feed.on_static(batch(k, [130.0, 50.0], 60.0, ('taxel_0_0', 'taxel_0_1')))
     assert json.loads(feed.frame(0.0))['taxels']['values'] == [30.0, 0.0]
-
-
-def test_noise_without_contact_stays_pale_and_a_touch_does_not() -> None:
-    feed, rng = Feed(), np.random.default_rng(0)
-    names = tuple(f'taxel_0_{k}' for k in range(12))
-    for k in range(300):
-        feed.on_static(batch(k, rng.normal(500.0, 8.0, 12), 60.0, names))
-    taxels = json.loads(feed.frame(0.0))['taxels']
-    assert 5 * 8.0 < taxels['least_range'] < 20 * 8.0
-    assert np.abs(taxels['values']).max() < taxels['least_range'] / 2
-    feed.on_static(batch(300, [np.inf] * 12, 60.0, names))
-    feed.on_state(sliding('a'))
-    for k in range(301, 400):
-        feed.on_static(batch(k, [900.0] * 12, 60.0, names))
-    touched = json.loads(feed.frame(0.0))['taxels']
-    assert min(touched['values']) > touched['least_range'] == taxels['least_range']
 
 
 @pytest.mark.parametrize(
@@ -120,12 +77,6 @@ def test_before_an_estimate_the_page_shows_why_there_is_none(reports, expected) 
     assert json.loads(feed.frame(1.0))['texture']['missing'] == expected
     feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.9))
     assert json.loads(feed.frame(1.0))['texture']['missing'] == ''
-
-
-def test_an_empty_frame_is_json_without_nan() -> None:
-    frame = json.loads(Feed().frame(0.0), parse_constant=pytest.fail)
-    assert frame['state']['phase'] == 'idle'
-    assert frame['past'] == frame['lights'] == []
 
 
 def test_a_frame_shows_what_came_and_stays_small() -> None:
@@ -164,18 +115,6 @@ def test_a_past_exploration_is_replayed_in_the_frames_that_were_shown() -> None:
     replay = json.loads(feed.history.replay('a'))
     assert [frame['texture']['label'] for frame in replay['frames'][:3]] == ['label0', 'label1', 'label2']
     assert feed.history.replay('b') is None
-
-
-def test_the_history_is_bounded_however_many_and_however_long_the_explorations_are() -> None:
-    history = History()
-    for number in range(3 * MAX_EXPLORATIONS):
-        history.add(f'e{number}', {}, '{}')
-    for frame in range(5 * MAX_FRAMES):
-        history.add('long', {}, str(frame))
-    assert len(history.listed()) == MAX_EXPLORATIONS
-    replay = json.loads(history.replay('long'))
-    assert len(replay['frames']) <= MAX_FRAMES
-    assert set(np.diff(replay['frames'])) == {replay['stride']}
 
 
 def test_a_failing_node_and_a_silent_one_are_red() -> None:

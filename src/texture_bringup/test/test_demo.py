@@ -14,7 +14,7 @@ import pytest
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo import DemoPlan, ProgressLog, RecognisedSlide, demonstrate, is_refused, table
+from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate, is_refused
 from texture_core.ros_testing import killed_on_error
 from texture_core.types import TextureEstimate
 
@@ -29,18 +29,6 @@ def started(log: Path) -> list[int]:
     return [int(number) for number in re.findall(r'started \(process (\d+)\)', log.read_text())]
 
 
-def test_the_table_shows_a_mistake() -> None:
-    right = TextureEstimate(0, 'a', 'glass', known=True, confidence=0.99, evidence_s=0.7)
-    wrong = TextureEstimate(0, 'b', 'glass', known=True, confidence=0.6, evidence_s=1.2)
-    unknown = TextureEstimate(0, 'c', 'leather', known=False, confidence=0.5, evidence_s=1.2)
-    rows = [RecognisedSlide('glass', right), RecognisedSlide('leather', wrong), RecognisedSlide('leather', unknown)]
-    assert [row.right for row in rows] == [True, False, False]
-    _, first, second, third = table(rows, {'a': 0.012})
-    assert first.split() == ['glass', 'glass', '✓', '0.990', '0.7', 's', '12', 'ms']
-    assert second.split() == ['leather', 'glass', '✗', '0.600', '1.2', 's', '–']
-    assert '✗' in third
-
-
 @pytest.mark.parametrize(
     ('estimate', 'refused'),
     [
@@ -51,24 +39,6 @@ def test_the_table_shows_a_mistake() -> None:
 )
 def test_a_refusal_names_the_condition_and_claims_nothing(estimate: TextureEstimate, refused: bool) -> None:
     assert is_refused(estimate) is refused
-
-
-def test_each_chapter_of_the_story_begins_with_the_time() -> None:
-    times = iter([100.0, 107.4])
-    out = io.StringIO()
-    progress = ProgressLog(lambda: next(times), out)
-    progress.section('Learning')
-    progress.part('glass', first=True)
-    progress.part(' recorded', last=True)
-    assert out.getvalue() == '\n[  7 s]  Learning\n        glass recorded\n'
-
-
-def test_a_story_that_breaks_off_leaves_no_line_open() -> None:
-    out = io.StringIO()
-    with pytest.raises(KeyboardInterrupt), ProgressLog(out=out) as progress:
-        progress.part('glass', first=True)
-        raise KeyboardInterrupt
-    assert out.getvalue().endswith('glass\n')
 
 
 @pytest.mark.ros

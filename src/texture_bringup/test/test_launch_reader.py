@@ -1,13 +1,9 @@
-import contextlib
-import os
 from pathlib import Path
 
 import pytest
 
-from texture_bringup.launcher import NodeDescription, all_arguments, command, declared_arguments, joined_namespace, read
+from texture_bringup.launcher import NodeDescription, command, declared_arguments, joined_namespace, read
 from texture_core.errors import InvalidLaunch, UnknownName
-
-NODE = '<node pkg="p" exec="e"/>'
 
 
 @pytest.fixture
@@ -176,44 +172,3 @@ def test_declared_arguments_are_listed_with_their_description(tmp_path) -> None:
 )
 def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None:
     assert joined_namespace(base, name) == joined
-
-
-HOSTILE = {
-    'nested groups': '<group>' * 20_000 + '</group>' * 20_000,
-    'many elements': "<let name='a' value='b'/>" * 6000,
-    'texts that double': "<let name='a' value='xx'/>" + "<let name='a' value='$(var a)$(var a)'/>" * 40,
-    'a variable of doubling length': "<let name='a' value='xx'/>"
-    + "<set_env name='a' value='$(env a x)$(env a x)'/>" * 40,
-    'calls within calls': "<let name='a' value='" + '$(var ' * 1000 + "'/>",
-    'a parameter nested deeply': "<node pkg='a' exec='b'><param name='a' value='" + '[' * 3000 + "'/></node>",
-    'a list nested deeply': "<node pkg='a' exec='b'><param name='a' type='list_of_int' value='"
-    + '[' * 3000
-    + "'/></node>",
-    'quotes that are not closed': """<node pkg='a' exec='b' args='it"s'/>""",
-    'two includes of itself': "<include file='{file}'/>" * 2,
-    'a comment of 300 kB': '<!--' + ' ' * 300_000 + '-->',
-}
-
-
-@pytest.mark.parametrize('what', HOSTILE)
-def test_a_launch_file_that_grows_without_end_is_refused_with_a_sentence(what: str, tmp_path: Path) -> None:
-    file = tmp_path / 'hostile.launch.xml'
-    file.write_text(f'<launch>{HOSTILE[what].replace("{file}", str(file))}</launch>')
-    with pytest.raises(InvalidLaunch):
-        read(file, {}, {})
-    with contextlib.suppress(InvalidLaunch):
-        all_arguments(file, {})
-
-
-def test_entities_that_multiply_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / 'laughs.launch.xml'
-    entities = ''.join(f'<!ENTITY {b} "{f"&{a};" * 9}">' for a, b in zip('abcdefghi', 'bcdefghij', strict=True))
-    file.write_text(f'<!DOCTYPE x [<!ENTITY a "ha">{entities}]><launch><let name="a" value="&j;"/></launch>')
-    with pytest.raises(InvalidLaunch, match='DOCTYPE'):
-        read(file, {}, {})
-
-
-def test_a_named_pipe_is_no_launch_file(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / 'pipe.launch.xml')
-    with pytest.raises(InvalidLaunch, match='named pipe'):
-        read(tmp_path / 'pipe.launch.xml', {}, {})

@@ -50,31 +50,11 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
     assert '"window_accuracy": 1.0' in figures.read_text()
 
 
-def test_a_missing_bag_is_named(data, capsys) -> None:
-    assert "no bag '/nowhere'" in refused(['evaluate', data / 'fast', '/nowhere'], capsys)
-
-
 def test_a_truncated_bag_is_named(data, capsys, tmp_path) -> None:
     shutil.copytree(data / 'glass', tmp_path / 'cut')
     (file,) = (tmp_path / 'cut').glob('*.mcap')
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     assert f"'{tmp_path / 'cut'}'" in refused(['evaluate', data / 'fast', tmp_path / 'cut'], capsys)
-
-
-def test_an_existing_bag_is_not_overwritten_by_an_import(data, capsys) -> None:
-    assert 'biotac20' in refused(['import', 'biotac', data, data], capsys)
-
-
-def test_a_missing_model_is_named(data, capsys) -> None:
-    assert '/nowhere' in refused(['evaluate', '/nowhere', data / 'glass'], capsys)
-
-
-def test_an_unknown_recipe_gets_the_nearest(data, capsys) -> None:
-    assert "did you mean 'default'?" in refused(['train', 'defualt', data / 'glass', '-o', data / 'x'], capsys)
-
-
-def test_one_surface_is_not_enough_to_learn(data, capsys) -> None:
-    assert 'at least two surfaces' in refused(['train', 'default', data / 'glass', '-o', data / 'x'], capsys)
 
 
 def test_unlabelled_slides_train_nothing(data, capsys, tmp_path) -> None:
@@ -83,10 +63,6 @@ def test_unlabelled_slides_train_nothing(data, capsys, tmp_path) -> None:
 
     changed(data / 'glass', tmp_path / 'bag', without_label)
     assert 'labelled' in refused(['train', 'default', tmp_path / 'bag', '-o', tmp_path / 'x'], capsys)
-
-
-def test_slides_that_are_not_there_are_refused(data, capsys) -> None:
-    assert '1 to 3' in refused(['evaluate', data / 'fast', data / 'glass', '--slides', '7-9'], capsys)
 
 
 def test_a_model_refuses_signals_of_another_rate(data, capsys, tmp_path) -> None:
@@ -103,3 +79,19 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
     changed(data / 'glass', tmp_path / 'bag', lambda topic, value: None if topic == 'signal_static' else value)
     assert 'signal_static' in refused(['evaluate', data / 'all', tmp_path / 'bag'], capsys)
     assert 'signal_static' in refused(['evaluate', data / 'all', data / 'glass', '--channels', 'fast'], capsys)
+
+
+@pytest.mark.parametrize(
+    ('command', 'sentence'),
+    [
+        ('evaluate fast /nowhere', "no bag '/nowhere'"),
+        ('evaluate /nowhere glass', '/nowhere'),
+        ('evaluate fast glass --slides 7-9', '1 to 3'),
+        ('train defualt glass -o x', "did you mean 'default'?"),
+        ('train default glass -o x', 'at least two surfaces'),
+        ('import biotac . .', 'biotac20'),
+    ],
+)
+def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(data)
+    assert sentence in refused(command.split(), capsys)

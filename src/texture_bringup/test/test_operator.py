@@ -71,16 +71,6 @@ def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):
         second.join()
 
 
-def test_an_operator_at_work_all_day_does_not_grow():
-    with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
-        operator.wait_for_explorer(30.0)
-        clients = []
-        for _ in range(3):
-            operator.set_parameters('explorer', {'use_sim_time': False})
-            clients.append(len(list(operator._node.clients)))
-    assert clients[0] == clients[-1]
-
-
 def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):
     monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
     with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:

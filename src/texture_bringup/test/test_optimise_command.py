@@ -5,19 +5,7 @@ import pytest
 
 from texture_bringup.command import main
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search import Generation, ScoredIndividual
-from texture_evaluation.commands.optimise import bar
 from texture_simulation.offline import SlidePlan, write_simulated
-
-
-def test_the_bar_says_how_far_how_good_and_how_long() -> None:
-    generation = Generation(
-        6, 30, ScoredIndividual((8, 'yes'), 0.8765, 0.0, 20), evaluated=110, cache_hits=7, halves=640
-    )
-    said = bar(generation, 12.3, 'cork – measured')
-    assert said == (
-        'cork – measured: [####................] 6/30  best 87.65 %  110 tried, 7 remembered, 640 halves  12 s'
-    )
 
 
 def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_reported_line_by_line(

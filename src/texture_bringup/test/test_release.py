@@ -59,11 +59,6 @@ def test_a_workflow_ends_and_may_not_write_the_repository(workflow: Path) -> Non
         assert job.get('permissions', {}).get('contents', 'read') == 'read'
 
 
-def test_there_are_workflows() -> None:
-    names = {path.stem for path in ROOT.glob('.github/workflows/*.yaml')}
-    assert names == {'checks', 'colcon', 'image', 'nightly', 'pages'}
-
-
 def test_the_profile_for_loopback_knows_no_other_address() -> None:
     profile = ElementTree.parse(ROOT / 'src/texture_bringup/config/fastdds/loopback.xml')
     named = {element.tag.partition('}')[2]: element.text for element in profile.iter()}

@@ -19,13 +19,7 @@ from texture_bringup.launcher import (
 )
 from texture_bringup.operator import Operator
 from texture_core import config as resources
-from texture_core.config import parameters_of
 from texture_evaluation.train import train_from_bags
-from texture_exploration.arms.ur import UrArmParams
-from texture_exploration.safety import (
-    SafetyLimits,
-    SignalWatchParams,
-)
 from texture_simulation.offline import SlidePlan, write_simulated
 
 DEADLINE_S = 60.0
@@ -37,7 +31,6 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 # What each motion measures like. A label other than the true one would tell that the signal is not that of the way the
 # finger went. The model knows neither circles nor strokes as slow as in the hand: there only the evidence counts.
 MOTIONS = ((LINEAR, SURFACE), (CIRCULAR, ''), (IN_HAND, ''))
-REPORTED = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
 ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75, 'ros_controllers': 95}  # and the domain of its nodes
 PATIENCE = {  # of the arm itself; the explorer would warn of a parameter that its arm has not
     'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
@@ -115,12 +108,3 @@ def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
     nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
     explorer = next(node for node in nodes if node.executable == 'explorer')
     assert explorer.parameters[-1] == file
-
-
-def test_the_example_of_a_parameter_file_says_nothing_until_it_is_uncommented():
-    text = (resources.folder('texture_bringup', 'config') / 'explorer.yaml').read_text()
-    assert yaml.safe_load(text) is None
-    [reported] = yaml.safe_load(re.sub(r'^#(?=/| {2}\S| {4}\S+: )', '', text, flags=re.MULTILINE)).values()
-    for name, value in reported['ros__parameters'].items():
-        [parameter] = [item for cls in REPORTED for item in parameters_of(cls) if item.name == name]
-        assert parameter.check(value) == value and type(value) is parameter.type

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from texture_bringup.commands.scene import caption, slide_picture, table_picture
-from texture_core.errors import UnknownName
 from texture_simulation.scene import load_scene
 from texture_simulation.scene_view import SceneView, ViewPlan, lines_hz, view
 
@@ -36,23 +35,9 @@ def test_the_skin_senses_less_than_the_surface_has() -> None:
     assert seen.blurred_m.std() < 0.9 * seen.sharp_m.std()
 
 
-def test_the_way_lies_within_the_relief_that_is_shown() -> None:
-    seen = shown('ets_circular', 'circles', radius_m=0.02)
-    left, right, bottom, top = seen.extent_m
-    assert left < seen.way.x_m.min()
-    assert seen.way.x_m.max() < right
-    assert bottom < seen.way.y_m.min()
-    assert seen.way.y_m.max() < top
-
-
 def test_pictures_of_a_slide_and_of_a_whole_scene_are_drawn(tmp_path: Path) -> None:
     line, circle = shown('hu', 'linen_1', duration_s=0.2), shown('jamali', 'tile_1', duration_s=0.3, radius_m=0.01)
     for number, seen in enumerate((line, circle)):
         assert slide_picture(seen, 'one', tmp_path / f'{number}.png').read_bytes().startswith(PNG)
     title = caption('two', 'pvdf', ViewPlan())
     assert table_picture([line, circle], title, tmp_path / 'table.png').read_bytes().startswith(PNG)
-
-
-def test_a_surface_that_the_scene_does_not_have_is_refused_with_those_it_has() -> None:
-    with pytest.raises(UnknownName, match=r"did you mean 'linen_1'.*linen_5"):
-        shown('hu', 'linen1')

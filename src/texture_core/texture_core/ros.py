@@ -43,6 +43,7 @@ from texture_core.config import Parameter, from_mapping, parameters_of, unknown_
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.types import (
     NANOSECONDS,
+    QUALITIES,
     Array,
     ExplorationRequest,
     ExplorationState,
@@ -281,16 +282,21 @@ def _descriptor(item: Parameter, *, read_only: bool) -> ParameterDescriptor:
 
 
 # --------------------
-# Quality of service of every topic of the suite, in one place.
+# Quality of service of every topic of the suite, as `texture_core.types` states it.
 
-# One second of 5 ms batches: a stalled subscriber loses samples, never holds the driver up.
-SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
-# Few and small, none may be missing: the end of an exploration travels in them.
-FEATURE_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
-# Who joins late gets the newest estimates, and so the verdict on the last exploration.
-ESTIMATE_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-# A node that starts late learns at once what is going on.
-STATE_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+def quality_of_service(topic: str) -> QoSProfile:
+    """Return the profile of a topic of the suite."""
+    quality = QUALITIES[topic]
+    return QoSProfile(
+        depth=quality.depth,
+        reliability=ReliabilityPolicy.RELIABLE if quality.reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+SENSOR_QOS, FEATURE_QOS = quality_of_service('signal'), quality_of_service('features')
+ESTIMATE_QOS, STATE_QOS = quality_of_service('texture'), quality_of_service('exploration')
 
 
 # --------------------

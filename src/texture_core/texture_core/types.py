@@ -12,12 +12,38 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import pairwise
 from statistics import median
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.errors import InvalidData
+
+# --------------------
+# Quality of service of every topic of the suite, in one place: for ROS, and for bags that are written without it.
+
+
+class Quality(NamedTuple):
+    """How many messages are kept, whether each must arrive, and whether who joins late gets them."""
+
+    depth: int
+    reliable: bool
+    latched: bool
+
+
+QUALITIES: Mapping[str, Quality] = {
+    # One second of 5 ms batches: a stalled subscriber loses samples, never holds the driver up.
+    'signal': Quality(200, reliable=False, latched=False),
+    'signal_static': Quality(200, reliable=False, latched=False),
+    # Few and small, none may be missing: the end of an exploration travels in them.
+    'features': Quality(200, reliable=True, latched=False),
+    # Who joins late gets the newest estimates, and so the verdict on the last exploration.
+    'texture': Quality(50, reliable=True, latched=True),
+    'roughness': Quality(50, reliable=True, latched=True),
+    # A node that starts late learns at once what is going on.
+    'exploration': Quality(100, reliable=True, latched=True),
+}
+
 
 # --------------------
 # Names for array types; the shape stands in the docstring of each function.

@@ -100,35 +100,3 @@ def test_a_value_that_no_magnetometer_measures_refuses_its_frame(value: float) -
     numbers, missing, parser = parsed(stream(range(4)) + impossible + stream(range(5, 9)))
     assert numbers == [0, 1, 2, 3, 5, 6, 7, 8]
     assert (sum(missing), parser.refused) == (1, 1)
-
-
-def test_an_impossible_temperature_refuses_its_frame() -> None:
-    assert 4 not in parsed(stream(range(4)) + frame(4, 120.0) + stream(range(5, 9)))[0]
-
-
-def test_line_ends_within_the_values_do_not_begin_a_frame() -> None:
-    """Shifted by whole values, all but the one that holds the real end of the frame would be possible."""
-    tricky = struct.unpack('<f', b'\r\n\xc8\x41')[0]
-    one = struct.pack('<4f', 30.0, tricky, tricky, tricky) * 5 + b'\r\n'
-    for first in range(SIZE):
-        parser = FrameParser()
-        runs = parser.feed((one * 12)[first:])
-        assert {value.tobytes() + b'\r\n' for run in runs for value in run.values} == {one}
-
-
-def test_noise_yields_nothing_and_is_not_kept() -> None:
-    parser = FrameParser()
-    noise = np.random.default_rng(0).integers(0, 256, 200_000, dtype=np.uint8).tobytes()
-    assert parser.feed(noise) == []
-    assert len(parser._buffer) < 3 * SIZE
-
-
-def test_after_a_restart_what_was_missing_is_not_told() -> None:
-    parser = FrameParser()
-    parser.feed(stream(range(5)))
-    parser.restart()
-    assert [run.missing for run in parser.feed(stream(range(50, 55))[10:])] == [0]
-
-
-def test_a_board_with_other_magnetometers_is_not_understood() -> None:
-    assert FrameParser(4).feed(stream(range(20))) == []

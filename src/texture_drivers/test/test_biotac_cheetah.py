@@ -3,7 +3,6 @@ from __future__ import annotations
 import sys
 from collections import deque
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -137,14 +136,6 @@ def test_frames_hold_what_the_biotac_answered_to_each_command(api: StandIn) -> N
     assert api.closed == 1
 
 
-def test_the_delays_of_a_slot_leave_room_for_its_bits(api: StandIn) -> None:
-    link = Cheetah(BIOTAC)
-    link.open()
-    slot_ns = api.slept_ns / 44
-    shifting_ns = (4 * 16 + 6 * 8) / 4.4e6 * 1e9  # four words and six selections at 4.4 MHz
-    assert slot_ns + shifting_ns + 3000 == pytest.approx(1e9 / 4400, abs=2)
-
-
 def test_after_a_pause_of_the_host_a_new_epoch_begins_behind_the_queue(api: StandIn) -> None:
     clock = SimpleNamespace(now=0.0)
     link = Cheetah(BIOTAC, lambda: clock.now)
@@ -171,9 +162,3 @@ def test_an_adapter_in_use_or_failing_is_reported(api: StandIn) -> None:
     api.ports = [0x8000]
     with pytest.raises(DeviceError, match='no free Cheetah adapter'):
         Cheetah(BIOTAC).open()
-
-
-def test_a_closed_adapter_cannot_be_read() -> None:
-    link: Any = Cheetah(BIOTAC)
-    with pytest.raises(DeviceError, match='not open'):
-        link.read()

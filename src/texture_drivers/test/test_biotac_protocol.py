@@ -2,10 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from texture_core.errors import InvalidData
 from texture_drivers.biotac import ERROR_WORDS, LAYOUTS, decode, sampling_command
 
 BIOTAC, BIOTAC_SP = LAYOUTS['biotac'], LAYOUTS['biotac_sp']
@@ -37,10 +34,6 @@ def test_a_frame_samples_pac_in_every_second_slot() -> None:
     assert (BIOTAC.frame_rate_hz, BIOTAC.pac_rate_hz, BIOTAC.pac_per_frame) == (100.0, 2200.0, 22)
     assert (len(BIOTAC_SP.slots), BIOTAC_SP.pac_per_frame, BIOTAC_SP.pac_rate_hz) == (54, 27, 2200.0)
     assert BIOTAC_SP.frame_rate_hz == pytest.approx(81.48, abs=0.01)
-
-
-def test_slots_are_227_microseconds_apart() -> None:
-    assert [BIOTAC.slot_time_ns(slot) for slot in (0, 1, 43)] == [0, 227_273, 9_772_727]
 
 
 @pytest.mark.parametrize('value', WORDS)
@@ -96,26 +89,3 @@ def test_every_single_flipped_bit_is_noticed() -> None:
     for bit in range(16):
         word = (int.from_bytes(WORDS[2021], 'big') ^ 1 << bit).to_bytes(2, 'big')
         assert decode((b'\x80\x00' + word) * 44, BIOTAC, fingers=1).damaged.tolist() == [44]
-
-
-def test_many_frames_follow_each_other_in_time() -> None:
-    frames = b''.join(slot(0x80, value) * 54 for value in (0, 4095, 2021))
-    replies = decode(frames, BIOTAC_SP, fingers=1)
-    assert replies.pac[:, 0].tolist() == [0] * 27 + [4095] * 27 + [2021] * 27
-    assert replies.slow.shape == (3, 27, 1)
-
-
-@pytest.mark.parametrize('size', [0, 1, 44 * 8 - 1, 44 * 8 + 8])
-def test_half_frames_are_refused(size: int) -> None:
-    with pytest.raises(InvalidData, match='multiple of 352'):
-        decode(bytes(size), BIOTAC, fingers=3)
-
-
-@given(st.integers(1, 5), st.data())
-def test_arbitrary_bytes_give_counts_in_range_or_nan(fingers: int, data: st.DataObject) -> None:
-    size = BIOTAC.frame_bytes(fingers)
-    replies = decode(data.draw(st.binary(min_size=size, max_size=size)), BIOTAC, fingers)
-    counts = np.concatenate([replies.pac, replies.slow[0]])
-    valid = counts[np.isfinite(counts)]
-    assert ((valid >= 0) & (valid <= 4095)).all()
-    assert np.isnan(counts).sum() == replies.damaged.sum()

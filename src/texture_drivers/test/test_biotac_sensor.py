@@ -140,11 +140,6 @@ def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:
         assert not any(run(sensor, 200).values())
 
 
-def test_a_place_that_the_board_lacks_is_reported() -> None:
-    with pytest.raises(DeviceError, match='places 0 to 0'):
-        run(opened(FakeLink(numbered(range(2), reply())), finger=1), 1)
-
-
 def test_a_silent_board_is_reported() -> None:
     with pytest.raises(DeviceError, match='sends no whole frames'):
         run(opened(FakeLink([])), 200)
@@ -158,10 +153,6 @@ def test_a_biotac_sp_has_24_electrodes_at_81_hz() -> None:
     assert topics['signal'][-1].samples[:, 0].tolist() == list(range(1, 54, 2))
     assert len(topics['signal_static'][-1].channels) == 27
     assert sensor.expected_rates_hz == pytest.approx({'signal': 2200.0, 'signal_static': 4400 / 54})
-
-
-def test_serial_numbers_are_details() -> None:
-    assert opened(FakeLink([])).details['serial of finger 0'] == 'BT-1'
 
 
 def bridge_frame(sequence: int, time_us: int) -> Frame:

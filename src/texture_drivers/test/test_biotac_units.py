@@ -3,16 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_drivers.biotac import BioTacScales, to_physical
+from texture_drivers.biotac import to_physical
 
 
 def test_pressures_and_voltages_come_from_counts_by_the_nominal_scales() -> None:
     values, units = to_physical(np.array([[2130.0, 100.0, 4095.0, 7.0]]), ('pac', 'pdc', 'electrode1', 'tdc'))
     assert values[0] == pytest.approx([37.0, 3650.0, 3.3, 7.0])
     assert units == ['Pa', 'Pa', 'V', 'count']
-
-
-def test_scales_are_the_users_to_set_and_bad_samples_stay_bad() -> None:
-    values, _ = to_physical(np.array([[10.0], [np.nan]]), ('pdc',), BioTacScales(pdc_pa=25.0, pdc_baseline=8.0))
-    assert values[0, 0] == 50.0
-    assert np.isnan(values[1, 0])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_drivers.timing import Arrival, StreamClock, supporting_slope
+from texture_drivers.timing import StreamClock
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -70,17 +70,6 @@ def test_a_device_that_counts_from_the_beginning_again_is_another_stream():
     run(clock, range(0, 100, 10), offset_ns=START + 25 * SECOND)
     assert clock.time_ns(0) == pytest.approx(START + 25 * SECOND, abs=1e5)
     assert clock.steps == 1
-
-
-def test_the_memory_is_bounded():
-    clock = StreamClock(1000.0)
-    run(clock, range(0, 2_000_000, 50))
-    assert len(clock._bins) <= 65
-
-
-def test_the_supporting_line_ignores_all_that_lies_above_it():
-    points = [Arrival(x, 3 + 0.5 * x + late) for x, late in enumerate([0, 7, 2, 9, 0.5, 4, 0])]
-    assert supporting_slope(points) == pytest.approx(0.5)
 
 
 def test_the_times_of_a_stream_far_too_fast_never_run_ahead_of_its_arrivals():

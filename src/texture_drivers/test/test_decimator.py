@@ -56,17 +56,3 @@ def test_after_a_gap_the_index_is_that_of_the_time() -> None:
     following, after = decimator.feed(15_007, samples[15_007:])
     assert following - (first + len(before)) >= 3007 // FACTOR
     np.testing.assert_allclose(after, samples[FACTOR * following :: FACTOR][: len(after)], atol=2e-3)
-
-
-def test_a_factor_of_one_changes_nothing() -> None:
-    samples = np.random.default_rng(0).normal(size=(50, 2)).astype(np.float32)
-    first, found = Decimator(1).feed(7, samples)
-    assert first == 7
-    np.testing.assert_array_equal(found, samples)
-
-
-def test_it_keeps_no_more_than_the_filter_needs() -> None:
-    decimator = Decimator(FACTOR)
-    for block in range(50):
-        decimator.feed(480 * block, np.zeros((480, 1), dtype=np.float32))
-    assert len(decimator._buffer) <= 2 * HALF_WIDTH * FACTOR + FACTOR

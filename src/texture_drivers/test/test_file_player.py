@@ -95,11 +95,6 @@ def test_rate_topic_and_unit_can_be_set(params):
     assert player.read()['signal_static'][0].units == ('Pa', 'Pa')
 
 
-def test_settings_may_stand_in_a_file(params, tmp_path):
-    (tmp_path / 'mine.yaml').write_text('rate_hz: 500.0\n')
-    assert FilePlayer(settle(params, str(tmp_path / 'mine.yaml'))).expected_rates_hz == {'signal': 500.0}
-
-
 @pytest.mark.parametrize(
     ('config', 'error', 'sentence'),
     [
@@ -119,9 +114,3 @@ def test_a_recording_without_a_rate_asks_for_one(params, tmp_path):
     np.save(tmp_path / 'bare.npy', SAMPLES)
     with pytest.raises(DeviceError, match='set `rate_hz`'):
         FilePlayer(dataclasses.replace(params, device=str(tmp_path / 'bare.npy'))).open()
-
-
-def test_a_file_that_is_no_recording_is_refused_at_opening(params, tmp_path):
-    (tmp_path / 'odd.wav').write_text('odd')
-    with pytest.raises(DeviceError, match=r'odd\.wav.* not usable'):
-        FilePlayer(dataclasses.replace(params, device=str(tmp_path / 'odd.wav'))).open()

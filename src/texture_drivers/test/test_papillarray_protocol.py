@@ -58,10 +58,6 @@ def test_a_packet_gives_its_counter_time_pillars_and_whole() -> None:
     np.testing.assert_allclose(found.wholes[0][0], [10, 20, 30, 1, 2, 3])
 
 
-def test_slip_of_any_length_is_passed_over() -> None:
-    assert decoded([content(5, slip=b'\x07' * 13)]).counters[0] == 5
-
-
 def test_the_first_packet_is_believed_when_the_second_is_as_long() -> None:
     parser = PapillArrayParser()
     assert counters(parser.feed(stream(range(10)))) == list(range(1, 10))
@@ -117,18 +113,3 @@ def test_a_changed_bit_is_refused(bit: int) -> None:
 )
 def test_a_content_whose_blocks_do_not_fit_has_no_layout(inner: bytes) -> None:
     assert layout_of(inner) is None
-
-
-@given(st.binary(max_size=400))
-@settings(deadline=None)
-def test_no_content_raises(inner: bytes) -> None:
-    layout_of(inner)
-    layout_of(b'\x02\x03\x00\x05\x00' + inner)
-
-
-def test_noise_is_not_kept() -> None:
-    parser = PapillArrayParser()
-    noise = np.random.default_rng(0).integers(0, 256, 100_000, dtype=np.uint8).tobytes()
-    assert parser.feed(noise) == []
-    parser.feed(START + b'\x00' * 100_000)
-    assert len(parser._buffer) <= 8192

@@ -3,10 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from texture_drivers.tsf85 import (
-    ACCELEROMETER,
     AUTOSEND,
     DYNAMIC,
-    MAX_PACKET_BYTES,
     STATIC,
     TIMESTAMP,
     Item,
@@ -46,11 +44,6 @@ def test_an_image_of_the_second_finger_has_28_big_endian_taxels() -> None:
     assert len(item.values) == 28
 
 
-def test_the_checksum_byte_means_nothing_and_a_one_shot_reply_counts_too() -> None:
-    (packet,) = Tsf85Parser().feed(INERTIAL)
-    assert packet.items == (Item(ACCELEROMETER, 0, (1, -1, 16384)),)
-
-
 def test_a_packet_comes_out_with_its_last_byte_wherever_the_stream_is_cut() -> None:
     stream = SHORT_STAMP + LONG_STAMP + IMAGE + INERTIAL
     parser = Tsf85Parser()
@@ -85,14 +78,6 @@ def test_a_packet_that_lost_a_byte_is_refused_even_if_the_stream_pauses_there() 
     assert parser.feed(SHORT_STAMP[:-1] + b'\x9a') == []
     assert len(parser.feed(SHORT_STAMP[1:])) == 1
     assert parser.packets == 1
-
-
-@given(st.lists(st.binary(max_size=400), max_size=20))
-def test_no_bytes_make_it_raise_or_keep_more_than_a_packet(pieces: list[bytes]) -> None:
-    parser = Tsf85Parser()
-    for piece in pieces:
-        parser.feed(piece)
-        assert len(parser._buffer) <= MAX_PACKET_BYTES
 
 
 @given(st.binary(max_size=600))

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.errors import DeviceError
 from texture_core.types import NANOSECONDS, TactileSignal
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import LAYOUTS, Tsf85
@@ -233,15 +233,6 @@ def test_a_silent_device_is_stopped_and_started_and_given_up_at_last(wire: Wire,
     assert wire.heard().count(bytes.fromhex('9A 00 58 01 01')) == 4
 
 
-def test_the_image_that_stays_the_same_is_counted_as_repeated(feeder: Feeder) -> None:
-    for number in range(10):  # a new image every 50 ms, sent each millisecond, published at 60 Hz
-        feeder.run(50, image=[number] * 28)
-    counts = feeder.sensor.counts
-    assert counts['images'] == len(feeder.static) == pytest.approx(24, abs=2)
-    fresh = len({batch.samples[0, 0] for batch in feeder.static})
-    assert counts['repeated_images'] == counts['images'] - fresh
-
-
 def test_acceleration_and_rotation_come_in_si_units_with_the_dynamic_values(feeder: Feeder) -> None:
     feeder.run(200, more=bytes.fromhex('30 0000 C000 4000') + b'\x40' + struct.pack('>3h', 0, -13107, 13107))
     imu = feeder.others['imu']
@@ -305,21 +296,6 @@ def test_the_prototype_has_12_taxels_at_25_hz(wire: Wire, clock: Clock) -> None:
     assert sensor.counts['bogus'] == 0
 
 
-def test_nothing_that_came_during_a_pause_is_lost(wire: Wire, sensor: Tsf85) -> None:
-    sensor.open()
-    for stamp_ms in range(500):  # 10 kB: more than the kernel hands over at once
-        wire.say(stamp_ms, 0)
-    deadline = time.monotonic() + 10.0  # the kernel moves bytes through a pseudo-terminal in its own time
-    while sensor._parser.packets < 500 and time.monotonic() < deadline:
-        sensor.read()
-    assert sensor._parser.packets == 500
-
-
-def test_a_third_finger_is_refused_with_a_sentence() -> None:
-    with pytest.raises(InvalidParameter, match=r"'finger' is 2; a TSF-85 has the fingers 0 and 1"):
-        Tsf85(SensorParams(finger=2))
-
-
 def test_bytes_that_are_no_packets_are_reported_from_silence(wire: Wire, clock: Clock) -> None:
     sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.1), clock)
     sensor.open()
@@ -329,10 +305,6 @@ def test_bytes_that_are_no_packets_are_reported_from_silence(wire: Wire, clock: 
             os.write(wire.device, bytes.fromhex('9A 00 58 03 80 0102'))
             sensor.read()
     sensor.close()
-
-
-def test_the_drift_of_the_device_is_reported(feeder: Feeder) -> None:
-    assert feeder.sensor.details == {'device clock slow by [ppm]': 0.0}
 
 
 def test_a_second_program_cannot_open_the_device(wire: Wire, sensor: Tsf85, clock: Clock) -> None:

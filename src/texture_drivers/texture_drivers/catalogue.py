@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol
 
 from texture_core.types import Sensor
 from texture_drivers.anyskin import anyskin
@@ -19,13 +18,8 @@ from texture_drivers.sound_card import SoundCard
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
 from texture_drivers.tsf85 import Tsf85
 
-
-class MakeSensor(Protocol):
-    """How a sensor is made: from its parameters and a clock, ns since the epoch of the stamps. Opens nothing yet."""
-
-    def __call__(self, params: SensorParams, now_ns: Callable[[], int]) -> Sensor:
-        """Return the sensor."""
-        ...
+# How a sensor is made: from its parameters and a clock, ns since the epoch of the stamps. Opens nothing yet.
+MakeSensor = Callable[[SensorParams, Callable[[], int]], Sensor]
 
 
 SENSORS: Mapping[str, MakeSensor] = {

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import serial
@@ -538,16 +538,8 @@ AUTO = 'auto'
 UsbId = tuple[int, int]  # vendor, product
 
 
-class Port(Protocol):
-    """What pyserial knows of a port; all but `device` may be None."""
-
-    device: str
-    vid: int | None
-    pid: int | None
-    serial_number: str | None
-
-
-ListPorts = Callable[[], Iterable[Port]]
+# Ports as pyserial lists them: device, and vid, pid and serial_number, which may be None.
+ListPorts = Callable[[], Iterable[Any]]
 
 
 def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts = list_ports.comports) -> str:
@@ -577,7 +569,7 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts =
     if device != AUTO:
         return device
     listed = list(ports())
-    found = sorted(port.device for port in listed if (port.vid, port.pid) in usb_ids)
+    found = sorted(str(port.device) for port in listed if (port.vid, port.pid) in usb_ids)
     if len(found) == 1:
         return found[0]
     if found:
@@ -598,9 +590,9 @@ def serial_number(device: str, ports: ListPorts = list_ports.comports) -> str:
     return next((port.serial_number or '' for port in ports() if port.device == path), '')
 
 
-def _description(port: Port) -> str:
+def _description(port: Any) -> str:
     if port.vid is None or port.pid is None:
-        return port.device
+        return str(port.device)
     return f'{port.device} ({_numbers(port.vid, port.pid)})'
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.interfaces import QosDurability, QosReliability
 
 from texture_core.errors import InvalidData
 from texture_core.types import ExplorationState, FeatureVector, Phase, RoughnessEstimate, TactileSignal, TextureEstimate
 from texture_recordings.bags import (
+    QOS,
     TYPES,
     BagWriter,
     SignalDecoder,
@@ -75,6 +77,11 @@ def test_the_fast_decoder_agrees_with_the_general_one_when_the_stream_changes() 
         fast, general = decoder.decode(encode(sent)), decode(encode(sent), TYPES[TactileSignal])
         for field in dataclasses.fields(sent):
             np.testing.assert_array_equal(getattr(fast, field.name), getattr(general, field.name))
+
+
+def test_a_bag_played_by_ros_gives_late_listeners_the_newest_estimate_as_the_nodes_do() -> None:
+    assert QOS['texture'][0].durability is QosDurability.TRANSIENT_LOCAL
+    assert QOS['signal'][0].reliability is QosReliability.BEST_EFFORT
 
 
 def test_topics_are_chosen_by_the_last_part_of_their_name(tmp_path: Path) -> None:

@@ -36,10 +36,12 @@ from texture_core.config import FileRefused, folder, open_regular, parse_yaml, r
 from texture_core.errors import InvalidData
 from texture_core.types import (
     NANOSECONDS,
+    QUALITIES,
     Array,
     ExplorationState,
     FeatureVector,
     Phase,
+    Quality,
     RoughnessEstimate,
     TactileSignal,
     TextureEstimate,
@@ -701,20 +703,15 @@ def _files(path: Path) -> list[Path]:
 FOREVER = QosTime(2147483647, 4294967295)
 
 
-def _offered(reliability: QosReliability, durability: QosDurability, depth: int) -> list[Qos]:
+def _offered(quality: Quality) -> list[Qos]:
+    reliability = QosReliability.RELIABLE if quality.reliable else QosReliability.BEST_EFFORT
+    durability = QosDurability.TRANSIENT_LOCAL if quality.latched else QosDurability.VOLATILE
     keep, lively = QosHistory.KEEP_LAST, QosLiveliness.AUTOMATIC
-    return [Qos(keep, depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
+    return [Qos(keep, quality.depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
 
 
-# The same as texture_core.ros, for `ros2 bag play`; by the last part of the topic's name.
-QOS: Mapping[str, list[Qos]] = {
-    'signal': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
-    'signal_static': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
-    'exploration': _offered(QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 200),
-    'features': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 200),
-    'texture': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
-    'roughness': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
-}
+# For `ros2 bag play`; by the last part of the topic's name.
+QOS: Mapping[str, list[Qos]] = {topic: _offered(quality) for topic, quality in QUALITIES.items()}
 
 
 class BagWriter:

@@ -29,7 +29,7 @@ from itertools import islice, pairwise
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -1084,11 +1084,8 @@ def _read_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
     yield from module.read_message_bag(path, place, mapping)
 
 
-class TableReader(Protocol):
-    """Opens a file as tables, in the child process; whatever it raises is said of the file."""
-
-    def __call__(self, path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-        """Yield the tables of a file, see `TableFiles.tables`."""
+# Opens a file as tables, in the child process: path, name to be shown, mapping. What it raises is said of the file.
+TableReader = Callable[[Path, str, TableMapping], Iterator[Table]]
 
 
 BAG = 'bag'

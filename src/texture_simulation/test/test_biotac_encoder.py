@@ -2,12 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from texture_core.framing import FrameDecoder
 from texture_drivers.biotac import LAYOUTS, decode, sampling_command
-from texture_simulation.devices.fingers import commands, encode_replies, reply_frame, serials_frame, stuff
+from texture_simulation.devices.fingers import commands, encode_replies, reply_frame, serials_frame
 
 
 @pytest.mark.parametrize('kind', LAYOUTS)
@@ -28,10 +26,6 @@ def test_an_absent_biotac_is_a_line_that_stays_low() -> None:
     assert replies.damaged.tolist() == [44, 0]
 
 
-def test_no_frames_are_no_replies() -> None:
-    assert encode_replies(np.empty((0, 44, 2), dtype=np.uint16)).shape == (0, 44 * 6)
-
-
 def test_the_driver_reads_the_emulators_frames() -> None:
     values = np.zeros((44, 3), dtype=np.uint16)
     body = encode_replies(values[None])[0].tobytes()
@@ -41,10 +35,3 @@ def test_the_driver_reads_the_emulators_frames() -> None:
         ord('B'), 1, 5, 44, 3, body,
     )  # fmt: skip
     assert (serials.kind, serials.body) == (ord('S'), b'BT-1,,BT-3')
-
-
-@given(st.binary(max_size=1200))
-def test_stuffed_bytes_hold_no_zero_and_cost_one_in_254(content: bytes) -> None:
-    stuffed = stuff(content)
-    assert b'\x00' not in stuffed
-    assert len(content) < len(stuffed) <= len(content) + 1 + len(content) // 254 + 1

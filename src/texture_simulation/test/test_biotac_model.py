@@ -29,12 +29,6 @@ def slow(values: np.ndarray, channel: str) -> np.ndarray:
     return values[:, BIOTAC.slots.index(channel)].astype(float)
 
 
-def test_ridges_are_measured_at_speed_over_pitch() -> None:
-    pac = model('ridges').advance(slide(220, speed_m_s=0.1))[20:, 1::2].ravel().astype(float)
-    spectrum = np.abs(np.fft.rfft(pac - pac.mean()))
-    assert np.fft.rfftfreq(len(pac), 1 / 2200)[spectrum.argmax()] == pytest.approx(0.1 / PITCH_M, abs=1.0)
-
-
 def test_a_resting_finger_on_a_flat_surface_senses_no_vibration() -> None:
     pac = model('flat').advance(slide(100))[50:, 1::2]
     assert np.ptp(pac) <= 1

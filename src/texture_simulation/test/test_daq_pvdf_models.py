@@ -81,12 +81,6 @@ def test_the_force_sensor_reports_the_force_in_newtons_at_64_hz(scene: Scene) ->
     assert force[-1] * tables.FORCE_N_PER_COUNT == pytest.approx(1.5, abs=0.01)
 
 
-def test_the_film_senses_ridges_at_speed_over_pitch(scene: Scene) -> None:
-    model = pvdf.PvdfModel(scene, scene.surface('ridges'), np.random.default_rng(0))
-    film, _ = model.advance(slide(pvdf.PVDF_PATH_RATE_HZ, 3.0))
-    assert peak_hz(film[4096:].astype(float), tables.FILM_RATE_HZ) == pytest.approx(50.0, abs=0.6)
-
-
 @pytest.mark.parametrize('parts', [2, 7])
 def test_blocks_give_the_same_as_the_whole(scene: Scene, parts: int) -> None:
     path = slide(pvdf.PVDF_PATH_RATE_HZ, 0.5)

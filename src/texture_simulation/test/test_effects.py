@@ -14,7 +14,6 @@ from texture_simulation.effects import (
     Drift,
     Dropouts,
     FingerSpread,
-    ForceEffect,
     ForceGain,
     MainsHum,
     MotorVibration,
@@ -99,11 +98,6 @@ def test_a_skid_holds_the_skin_and_lets_it_catch_up() -> None:
     assert (np.diff(skin.x_m) >= -1e-12).all()
 
 
-def test_nothing_skids_in_the_air() -> None:
-    path = along_x(0.1, 5000, force_n=0.0)
-    assert Skids(per_s=20.0).start_path(rng(), RATE_HZ, ())(path) is path
-
-
 def test_the_skin_resonates_where_and_as_much_as_mass_spring_and_damper() -> None:
     skin = Skin(resonance_hz=100.0, damping=0.2)
     frequency_hz = np.array([1e-3, 20.0, 100.0, 200.0])
@@ -158,7 +152,6 @@ def test_slides_deviate_as_much_as_stated_and_never_turn_round() -> None:
 
 
 SIGNAL = [effect for effect in EFFECTS.values() if issubclass(effect, SignalEffect)]
-SHAKES = [effect for effect in EFFECTS.values() if issubclass(effect, ForceEffect)]
 
 
 @pytest.mark.parametrize('kind', SIGNAL)
@@ -167,14 +160,6 @@ def test_blocks_of_samples_give_the_same_as_the_whole(kind: type) -> None:
     through = kind().start_signal(rng(), RATE_HZ, (), 2, slow=False)
     pieces = np.concatenate([through(samples[a:b]) for a, b in itertools.pairwise(CUTS)])
     assert np.allclose(pieces, on_signal(kind(), samples))
-
-
-@pytest.mark.parametrize('kind', SHAKES)
-def test_blocks_of_force_give_the_same_as_the_whole(kind: type) -> None:
-    path, force = along_x(0.1), rng(1).normal(0, 1, 1000)
-    through = kind().start_force(rng(), RATE_HZ, ())
-    pieces = [through(path.at(slice(a, b)), force[a:b]) for a, b in itertools.pairwise(CUTS)]
-    assert np.allclose(np.concatenate(pieces), kind().start_force(rng(), RATE_HZ, ())(path, force))
 
 
 @pytest.mark.parametrize('kind', [effect for effect in EFFECTS.values() if issubclass(effect, PathEffect)])

@@ -11,7 +11,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.parameter import Parameter
 from texture_msgs.msg import TactileSignal
 
-from texture_core.errors import UnknownName
 from texture_core.ros import SENSOR_QOS, from_msg
 from texture_core.ros_testing import LocalGraph
 from texture_drivers.nodes.sensor import SensorNode
@@ -94,8 +93,3 @@ def test_deactivating_stops_the_stream_and_activating_brings_it_back(bed: Bed) -
     bed.sensor.trigger_activate()
     count = len(bed.batches)
     bed.until(lambda: len(bed.batches) > count + 5)
-
-
-def test_a_sensor_that_no_catalogue_knows_is_refused_with_a_sentence(bed: Bed) -> None:
-    with pytest.raises(UnknownName, match="did you mean 'tsf85'"):
-        SensorNode(parameter_overrides=[Parameter('sensor', value='tsf58')])

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from texture_core.types import NANOSECONDS, FingerState
 from texture_simulation.path import FingerTrack
@@ -21,25 +20,6 @@ def test_nothing_is_touched_before_anything_is_reported() -> None:
     assert not track.touching
 
 
-def test_a_sliding_finger_is_extrapolated_without_steps() -> None:
-    track = FingerTrack()
-    track.update(touching(0, 0.0, 0.1))
-    pieces = [advance(track, ms).x_m for ms in range(5, 105, 5)]
-    way = np.concatenate(pieces)
-    assert way[-1] == pytest.approx(0.01)
-    assert np.allclose(np.diff(way), 0.1 / 2000)
-
-
-def test_a_correction_is_spread_over_one_block() -> None:
-    track = FingerTrack()
-    track.update(touching(0, 0.0, 0.1))
-    before = advance(track, 5).x_m[-1]
-    track.update(touching(6, 0.0007, 0.1))
-    after = advance(track, 10).x_m
-    assert after[-1] == pytest.approx(0.0011)
-    assert np.allclose(np.diff(after, prepend=before), (after[-1] - before) / 10)
-
-
 def test_an_arm_silent_for_long_has_stopped_and_still_presses() -> None:
     track = FingerTrack()
     track.update(touching(0, 0.0, 0.1))
@@ -57,10 +37,3 @@ def test_being_put_elsewhere_is_no_slide() -> None:
     advance(track, 5)
     track.update(touching(5, x_m=0.2))
     assert advance(track, 10).x_m.tolist() == [0.2] * 10
-
-
-def test_a_state_that_comes_late_is_passed_over() -> None:
-    track = FingerTrack()
-    track.update(touching(10, x_m=0.1))
-    track.update(touching(5, x_m=0.0))
-    assert track.newest == touching(10, x_m=0.1)

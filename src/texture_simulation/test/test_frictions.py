@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 
@@ -78,26 +76,6 @@ def test_sliding_friction_builds_up_and_ebbs_away_without_a_jump() -> None:
     assert not pull[:10].any()
     assert pull[-9:] == pytest.approx(0.0)
     assert np.abs(np.diff(pull[:1500])).max() < 2 * 0.05 / 500 / CREEP_M_S
-
-
-def test_blocks_of_a_path_give_the_same_pull_as_the_whole() -> None:
-    x_m = np.cumsum(np.linspace(0, 0.1, 300)) / RATE_HZ
-    path = Trajectory(x_m, 0 * x_m, np.full_like(x_m, 2.0))
-    whole = SlidingDrag(SlidingFriction(), RATE_HZ).advance(path)
-    pieces = SlidingDrag(SlidingFriction(), RATE_HZ)
-    cuts = [0, 2, 2, 90, 300]
-    joined = [pieces.advance(path.at(slice(a, b))) for a, b in itertools.pairwise(cuts)]
-    assert np.allclose(np.concatenate(joined), whole)
-
-
-def test_a_swapped_sample_brings_its_own_friction() -> None:
-    scene = scene_from('test', {'surfaces': {'sticky': [HANGS], 'bare': []}})
-    model = SENSORS['tsf85'].make(scene, scene.surface('sticky'), np.random.default_rng(0))
-    x_m = 0.05 * np.arange(2000) / RATE_HZ
-    path = Trajectory(x_m, 0 * x_m, np.full_like(x_m, 1.5))
-    assert model.streams(path)['signal'].std() > 100
-    model.touch.surface = scene.surface('bare')
-    assert model.streams(path)['signal'][500:].std() < 1
 
 
 def test_two_frictions_on_one_surface_are_refused() -> None:

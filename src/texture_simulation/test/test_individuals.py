@@ -1,20 +1,17 @@
 """Fingers that are no copies of each other, and objects that are not flat."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidParameter
 from texture_drivers.biotac import LAYOUTS
-from texture_simulation.effects import SALT, FingerSpread
+from texture_simulation.effects import SALT
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide, straight
-from texture_simulation.scene import Contact, load_scene, scene_from
+from texture_simulation.scene import Contact, scene_from
 from texture_simulation.sensor_models import COLUMNS, ELECTRODE_PITCH_M, BioTacModel
 from texture_simulation.sensor_models import ELECTRODE_BASELINE as BASELINE
-from texture_simulation.surfaces import Curved
 
 RELIEF = {'kind': 'self_affine', 'rms_m': 2e-5, 'hurst': 0.5, 'longest_m': 4e-3, 'shortest_m': 4e-4, 'seed': 1}
 SMOOTH = {'kind': 'self_affine', 'rms_m': 1e-9, 'hurst': 0.5, 'longest_m': 4e-3, 'shortest_m': 4e-4, 'seed': 1}
@@ -41,13 +38,6 @@ def test_a_curved_object_is_sensed_more_softly_than_a_flat_one_of_the_same_relie
         measured(scene_of(RELIEF, *more))['signal'].std() for more in ((), [{'kind': 'curved', 'radius_m': 7e-3}])
     )
     assert 0.5 < ball / flat < 1.0
-
-
-def test_an_object_as_large_as_a_table_is_flat() -> None:
-    flat = measured(scene_of(RELIEF))['signal'].std()
-    assert measured(scene_of(RELIEF, {'kind': 'curved', 'radius_m': 10.0}))['signal'].std() == pytest.approx(
-        flat, rel=0.01
-    )
 
 
 def test_the_load_wanders_over_the_fingertip_by_the_share_of_its_radius_in_both() -> None:
@@ -79,32 +69,9 @@ def test_a_finger_has_a_sensitivity_a_skin_and_a_noise_of_its_own() -> None:
     assert own.surfaces is scene.surfaces
 
 
-def test_fingers_that_differ_in_sensitivity_alone_have_one_skin_and_one_noise() -> None:
-    scene = scene_of(RELIEF, effects={'finger_spread': {'relative': 0.1}, 'noise': {}})
-    own = scene.of_finger(2)
-    assert (own.contact, own.effects['noise']) == (scene.contact, scene.effects['noise'])
-    assert scene.without('finger_spread').of_finger(2) == scene.without('finger_spread')
-
-
-def test_the_sensitivity_of_a_finger_is_as_it_was_before_skins_differed() -> None:
-    gain = FingerSpread(0.1).gain(straight((0, 0, 1), (1, 0, 1), 2), 4)
-    assert gain == pytest.approx(np.exp(0.1 * np.random.default_rng([SALT, 4]).standard_normal()))
-
-
 def test_two_fingers_measure_one_object_differently_where_they_are_told_to() -> None:
     alike = [measured(scene_of(RELIEF), finger)['signal'].std() for finger in (1, 2)]
     assert alike[0] == pytest.approx(alike[1], rel=1e-9)
     spread = scene_of(RELIEF, effects={'finger_spread': {'relative': 0.2, 'skin': 0.2}})
     unlike = [measured(spread, finger)['signal'].std() for finger in (1, 2)]
     assert abs(math.log(unlike[0] / unlike[1])) > 0.03
-
-
-def test_an_object_has_one_shape() -> None:
-    with pytest.raises(InvalidParameter, match='2 shapes; an object has one'):
-        scene_of(RELIEF, {'kind': 'curved'}, {'kind': 'curved'})
-
-
-def test_the_textures_of_kaboli_are_the_same_with_and_without_shapes() -> None:
-    flat, shaped = load_scene('kaboli'), load_scene('kaboli_shapes')
-    assert {name: replace(one, shape=Curved(math.inf)) for name, one in shaped.surfaces.items()} == dict(flat.surfaces)
-    assert sum(math.isfinite(one.shape.radius_m) for one in shaped.surfaces.values()) == 17

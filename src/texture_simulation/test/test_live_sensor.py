@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 
 from texture_core.types import NANOSECONDS, FingerState
-from texture_drivers.biotac import BioTac
-from texture_drivers.catalogue import SENSORS
 from texture_drivers.daq import daq
 from texture_drivers.pvdf import Pvdf
 from texture_drivers.sensor import SensorParams
@@ -92,41 +90,12 @@ def test_the_pvdf_finger_senses_ridges_and_force(emulator: Emulator, arm: None, 
     assert found['signal_static'][64:].mean() == pytest.approx(FORCE_N, rel=0.05)
 
 
-def test_swapping_the_sample_is_measured_by_all(emulator: Emulator, arm: None, tmp_path: Path) -> None:
-    rough = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
-    emulator.set_surface('glass')
-    smooth = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
-    assert smooth < 0.3 * rough
-
-
 def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
     scene = load_scene('twelve_textures')
     live = live_daq(scene, scene.surface('glass'), tmp_path / 'daq', np.random.default_rng(0))
     live.advance(0)
     live.advance(10 * NANOSECONDS)
     assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.75 s, and then 0.25 s of samples
-
-
-def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
-    params = EmulatorParams(sensor='biotac', sensor_link=str(tmp_path / 'biotac'), finger_port=0)
-    with Emulator(params) as emulator:
-        found = read(BioTac(SensorParams(device=str(tmp_path / 'biotac'))), 1.0)
-    assert emulator.counts['bytes nobody took'] == 0
-    assert found['signal'].mean() == pytest.approx(2030, abs=30)  # nothing touches: PAC idles
-    assert found['signal_static'].shape[1] == 22
-
-
-@pytest.mark.parametrize(('name', 'channels', 'noise'), [('anyskin', 15, 4.0), ('papillarray', 54, 0.027)])
-def test_the_bench_may_hold_an_array_of_slow_taxels_alone(
-    tmp_path: Path, name: str, channels: int, noise: float
-) -> None:
-    """`noise` is the standard deviation of the noisiest channel, in µT and in N."""
-    params = EmulatorParams(sensor=name, sensor_link=str(tmp_path / name), finger_port=0)
-    with Emulator(params) as emulator:
-        found = read(SENSORS[name](SensorParams(device=str(tmp_path / name)), time.time_ns), 1.0)
-    assert emulator.counts['bytes nobody took'] == 0
-    assert found['signal'].shape[1] == channels
-    assert np.ptp(found['signal'], axis=0).max() < 10 * noise  # nothing touches
 
 
 def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ import time
 
 import pytest
 
-from texture_core.errors import DeviceError
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FingerState
 from texture_simulation.nodes.leap_hand import LeapHandNode
@@ -37,9 +36,3 @@ def test_the_device_lives_with_its_node_and_reports_where_the_finger_is(name, gr
         assert node._report()[0] == 'OK'
         node.shutdown()
         assert not (tmp_path / name).exists()
-
-
-def test_a_link_that_cannot_be_made_is_reported(graph, tmp_path):
-    (tmp_path / 'file').touch()
-    with pytest.raises(DeviceError, match='no link at'):
-        graph.add(RailsNode, link=str(tmp_path / 'file'))

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from texture_simulation.devices.fingers import SampledStream
 from texture_simulation.devices.fingers import encode_samples as encode
@@ -22,11 +21,3 @@ def bitwise_crc(data: bytes) -> int:
         for _ in range(8):
             register = ((register << 1) ^ (0x1021 if register & 0x8000 else 0)) & 0xFFFF
     return register
-
-
-@pytest.mark.parametrize('rows', [1, 32, 255])
-def test_no_zero_stands_within_a_frame(rows):
-    counts = np.zeros((rows, 8), dtype=np.int16)
-    data = encode(SampledStream(kind=1, rate_hz=2500.0, columns=8, rows=rows), 0, 0, counts)
-    assert data.count(0) == 1
-    assert data[-1] == 0

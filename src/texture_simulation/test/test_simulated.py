@@ -19,11 +19,3 @@ def test_each_surface_has_its_slides_without_a_loss(tmp_path: Path) -> None:
     ]
     for topic in ('signal', 'signal_static'):
         assert lost_samples([signal for _, _, signal in read_bag(bags[0], (topic,))]) == 0
-
-
-def test_the_same_generator_makes_the_same_slides(tmp_path: Path) -> None:
-    plan = SlidePlan(slides=1, slide_s=0.2)
-    bags = [write_simulated(tmp_path / name, plan, np.random.default_rng(3), surfaces=('leather',))[0] for name in 'ab']
-    first, second = (list(read_bag(bag, ('signal',))) for bag in bags)
-    for (_, _, one), (_, _, other) in zip(first, second, strict=True):
-        np.testing.assert_array_equal(one.samples, other.samples)

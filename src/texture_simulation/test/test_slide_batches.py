@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_core.errors import UnknownName
 from texture_simulation.offline import record, simulate_exploration, simulate_slide_streams, simulate_slides
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene, scene_from
@@ -27,16 +26,6 @@ def test_scans_have_the_shape_of_the_fast_stream_and_are_all_different(sensor: s
     assert measured.shape == (3, round(0.5 * stream.rate_hz), len(stream.channels))
     assert np.isfinite(measured).all()
     assert (np.ptp(measured, axis=0) > 0).any()
-
-
-@pytest.mark.parametrize('sensor', SENSORS)
-def test_all_streams_come_with_their_channels(sensor: str) -> None:
-    measured = simulate_slide_streams(
-        table(sensor), 'rough', 2, SimulatedSlide(0.1, 2.0, 0.5, 0.3, 0.02), np.random.default_rng(0)
-    )
-    for stream in SENSORS[sensor].streams:
-        assert measured[stream.topic].shape[::2] == (2, len(stream.channels))
-        assert measured[stream.topic].shape[1] == pytest.approx(0.5 * stream.rate_hz, abs=1)
 
 
 @pytest.mark.parametrize('sensor', SENSORS)
@@ -80,13 +69,3 @@ def test_every_surface_of_every_paper_can_be_measured(name: str) -> None:
         measured = simulate_slides(scene, surface, 1, SimulatedSlide(0.1, 2.0, 0.1), rng)
         assert np.isfinite(measured).all()
         assert measured.std() > 0
-
-
-def test_the_papers_scenes_have_as_many_surfaces_as_the_papers() -> None:
-    counts = {name: len(load_scene(name).surfaces) for name in PAPERS}
-    assert counts == dict(zip(PAPERS, (4, 5, 10, 25, 8, 20, 5), strict=True))
-
-
-def test_an_unknown_sensor_gets_the_nearest_name() -> None:
-    with pytest.raises(UnknownName, match="did you mean 'tsf85'"):
-        simulate_slides(table('tsf8'), 'rough', 1, SimulatedSlide(0.1, 2.0, 0.1), np.random.default_rng(0))

@@ -50,25 +50,3 @@ def test_back_the_way_it_came_the_skin_is_pulled_the_other_way_even_after_a_rest
     measured = TipDrag(friction, RATE_HZ).advance(along_x(offset)) / friction.force_coupling
     assert measured[700] == pytest.approx(2.0 * 0.5, rel=0.05)
     assert measured[-50] == pytest.approx(-2.0 * 0.5, rel=0.05)
-
-
-def test_the_direction_of_a_way_does_not_matter() -> None:
-    offset = 0.05 / RATE_HZ * np.arange(400)
-    straight = TipDrag(USUAL, RATE_HZ).advance(along_x(offset))
-    oblique = TipDrag(USUAL, RATE_HZ).advance(Trajectory(-0.6 * offset, 0.8 * offset, np.full(400, 2.0)))
-    assert np.allclose(straight, oblique, atol=1e-9)
-
-
-def test_many_slides_at_once_are_each_as_alone() -> None:
-    rng = np.random.default_rng(0)
-    offset = np.cumsum(rng.normal(2e-5, 2e-5, (3, 300)), axis=-1)
-    paths = Trajectory(offset, np.zeros_like(offset), rng.uniform(0.0, 3.0, (3, 300)))
-    together = TipDrag(USUAL, RATE_HZ).advance(paths)
-    for i in range(3):
-        alone = TipDrag(USUAL, RATE_HZ).advance(Trajectory(offset[i], 0 * offset[i], paths.force_n[i]))
-        assert np.allclose(together[i], alone)
-
-
-def test_a_finger_put_elsewhere_has_not_slid() -> None:
-    offset = np.concatenate([np.zeros(50), np.ones(50)])
-    assert not TipDrag(USUAL, RATE_HZ).advance(along_x(offset)).any()

@@ -5,7 +5,6 @@ import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_simulation.friction import (
-    AT_REST,
     PASSIVE,
     StickSlip,
     Tip,
@@ -87,11 +86,6 @@ def test_steady_sliding_is_stable_from_the_critical_speed_on() -> None:
     assert swings[1] < 1e-9
 
 
-def test_far_above_the_critical_speed_even_a_jerky_start_ends_in_steady_sliding() -> None:
-    speed_m_s = 4 * critical_speed_m_s(USUAL, 1.0)
-    assert np.ptp(steadily(USUAL, speed_m_s, 1.0, 0.6)[1][-2000:]) < 1e-6
-
-
 def test_a_well_damped_or_constant_friction_is_stable_at_all_speeds() -> None:
     assert critical_speed_m_s(StickSlip(skin_n_s_m=50.0), 1.0) == 0.0
     assert critical_speed_m_s(StickSlip(static=0.5, kinetic=0.5), 1.0) == 0.0
@@ -156,13 +150,6 @@ def test_a_tip_left_alone_comes_to_rest_and_stays() -> None:
     assert (np.diff(stored) <= 1e-15).all()
 
 
-def test_a_new_touch_begins_unbent() -> None:
-    force = np.concatenate([np.full(500, 2.0), np.zeros(100), [1.0]])
-    speed = np.concatenate([np.full(500, 0.1), np.zeros(101)])
-    tip = drag(USUAL, speed, force, 2.5e-4)
-    assert abs(tip.bend_m[-1]) == pytest.approx(abs(tip.slip_m_s[-1]) * 2.5e-4, rel=0.05)
-
-
 def test_friction_that_would_give_out_work_is_refused() -> None:
     most = PASSIVE * USUAL.kinetic / USUAL.stribeck_m_s
     StickSlip(bristle_s_m=0.99 * most)
@@ -183,14 +170,3 @@ def test_friction_that_would_give_out_work_is_refused() -> None:
 def test_what_no_finger_does_is_refused(speed: np.ndarray, force: np.ndarray, sentence: str) -> None:
     with pytest.raises(InvalidData, match=sentence):
         drag(USUAL, speed, force, 2.5e-4)
-
-
-def test_many_scans_at_once_are_the_same_as_each_alone() -> None:
-    rng = np.random.default_rng(1)
-    speed, force = rng.uniform(0.0, 0.2, (50, 1)) * np.ones(200), rng.uniform(0.0, 3.0, (50, 200))
-    together = drag(USUAL, speed, force, 2.5e-4)
-    for i in (0, 49):
-        alone = drag(USUAL, speed[i], force[i], 2.5e-4)
-        for one, all_of_them in zip(alone, together, strict=True):
-            assert np.allclose(one, all_of_them[i], rtol=1e-6, atol=1e-12)
-    assert drag(USUAL, np.zeros(0), np.zeros(0), 2.5e-4, start=AT_REST).bend_m.shape == (0,)

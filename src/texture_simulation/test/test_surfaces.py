@@ -40,24 +40,6 @@ def test_random_roughness_has_its_rms_and_its_waves() -> None:
     assert power[wave > 1.3 / rough.shortest_m].sum() < 0.01 * power.sum()
 
 
-def test_blurring_smooths_random_roughness() -> None:
-    rough = SelfAffine()
-    spreads = [height(rough, blur_m).std() for blur_m in (5e-5, 2e-4, 5e-4, 2e-3)]
-    assert spreads == sorted(spreads, reverse=True)
-    assert spreads[-1] < 0.3 * spreads[0]
-
-
-def test_a_seed_is_one_surface() -> None:
-    assert np.array_equal(height(SelfAffine(seed=3)), height(SelfAffine(seed=3)))
-    assert not np.array_equal(height(SelfAffine(seed=3)), height(SelfAffine(seed=4)))
-
-
-def test_terms_add_up() -> None:
-    terms = (Grating(), SelfAffine())
-    both = Surface('two', terms).height_m(PLACES, 0 * PLACES, 0 * PLACES + SHARP)
-    assert np.allclose(both, height(terms[0]) + height(terms[1]))
-
-
 def test_waves_that_do_not_fit_a_tile_are_refused() -> None:
     with pytest.raises(InvalidParameter, match='at most 32 times'):
         SelfAffine(longest_m=0.05, shortest_m=1e-4)

@@ -10,9 +10,9 @@ import pytest
 from texture_simulation.contact import SkinContact
 from texture_simulation.offline import simulate_slides
 from texture_simulation.path import SimulatedSlide, Trajectory
-from texture_simulation.scene import Scene, load_scene, scene_from
+from texture_simulation.scene import Scene, scene_from
 from texture_simulation.sensor_models import SENSORS
-from texture_simulation.surfaces import POINTS_PER_WAVE, SIDE, Sandpaper, SelfAffine
+from texture_simulation.surfaces import SIDE, Sandpaper, SelfAffine
 
 PITCH_M = 1.5e-3
 SPEEDS_M_S = (0.02, 0.05, 0.1, 0.2, 0.4)
@@ -79,14 +79,6 @@ def test_half_of_the_sampling_rate_is_measured_little_and_what_would_be_folded_t
     assert measured(1990.0) < 2e-3 * measured(100.0)
 
 
-def test_grooves_finer_than_the_contact_are_not_measured() -> None:
-    fine, coarse = (
-        simulate_slides(ridges(pitch_m), 'ridges', 1, SimulatedSlide(0.1, 2.0, 0.5), np.random.default_rng(0)).std()
-        for pitch_m in (5e-5, PITCH_M)
-    )
-    assert fine < 1e-3 * coarse
-
-
 def test_what_a_contact_averages_weakens_ridges_as_the_gaussian_s_transfer_function() -> None:
     def measured(force_n: float) -> float:
         scene = ridges(sensor='pvdf', effects={'patch_growth': {}})
@@ -134,21 +126,3 @@ def test_a_finger_in_the_air_or_at_rest_senses_nothing_however_long(sensor: str,
         model = kind.make(scene, scene.surface('rough'), np.random.default_rng(0), settled=True)
         measured = model.streams(Trajectory(x_m, rest_m, np.full(count, force_n)), slow=False)[kind.fast.topic]
         assert np.ptp(measured[len(measured) // 2 :], axis=0).max() <= 1e-3 * max(1.0, np.abs(measured).max())
-
-
-@pytest.mark.parametrize('name', ['ets_fine', 'jamali', 'kaboli', 'hu', 'sticky'])
-def test_a_seed_is_one_set_of_slides_of_a_paper_s_scene(name: str) -> None:
-    scene = load_scene(name)
-    surface = next(iter(scene.surfaces))
-
-    def measured(seed: int) -> np.ndarray:
-        return simulate_slides(scene, surface, 2, SimulatedSlide(0.05, 1.5, 0.2), np.random.default_rng(seed))
-
-    assert np.array_equal(measured(7), measured(7))
-    assert not np.array_equal(measured(7), measured(8))
-
-
-def test_the_tile_holds_all_waves_that_are_asked_for() -> None:
-    rough = SelfAffine(longest_m=6e-3, shortest_m=3e-4)
-    assert rough.spacing_m * POINTS_PER_WAVE == rough.shortest_m
-    assert rough.spacing_m * SIDE > 2 * rough.longest_m

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError
-from texture_simulation.devices.fingers import ByteFaults, EmulatedTsf85, FrameFaults
+from texture_simulation.devices.fingers import EmulatedTsf85, FrameFaults
 
 pytestmark = pytest.mark.realtime
 
@@ -90,13 +89,6 @@ def test_after_an_unclean_end_it_takes_several_starts(device: EmulatedTsf85, hos
     assert came == [False, False, True]
 
 
-def test_a_silent_device_says_nothing_whatever_it_hears(device: EmulatedTsf85, host: Host) -> None:
-    device.silent = True
-    os.write(host.end, STOP + START)
-    device.advance(TEN_MS, NO_IMAGE)
-    assert host.read() == b''
-
-
 def test_packets_are_left_out_sent_twice_and_held_back(device: EmulatedTsf85, host: Host) -> None:
     os.write(host.end, START)
     device.frame_faults = FrameFaults(skip=1.0)
@@ -111,21 +103,3 @@ def test_packets_are_left_out_sent_twice_and_held_back(device: EmulatedTsf85, ho
     device.stalled = False
     device.advance(TEN_MS, NO_IMAGE)
     assert host.read().count(b'\x9a\x00\x58') == 20
-
-
-def test_a_file_in_the_place_of_the_link_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / 'taken').write_text('mine')
-    device = EmulatedTsf85(tmp_path / 'taken', np.random.default_rng(0))
-    with pytest.raises(DeviceError, match='choose a path'):
-        device.plug()
-    assert (tmp_path / 'taken').read_text() == 'mine'
-
-
-def test_faults_happen_at_their_rates() -> None:
-    data = bytes(range(256)) * 400
-    rng = np.random.default_rng(0)
-    assert ByteFaults().apply(data, rng) == data
-    assert len(ByteFaults(drop=0.01).apply(data, rng)) == pytest.approx(len(data) * 0.99, rel=0.002)
-    assert len(ByteFaults(insert=0.01).apply(data, rng)) == pytest.approx(len(data) * 1.01, rel=0.002)
-    flipped = np.frombuffer(ByteFaults(flip=0.01).apply(data, rng), np.uint8) ^ np.frombuffer(data, np.uint8)
-    assert np.unpackbits(flipped).sum() == (flipped > 0).sum() == pytest.approx(1024, rel=0.15)

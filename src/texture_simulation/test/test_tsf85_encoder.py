@@ -36,13 +36,6 @@ def test_new_firmware_sends_an_image_once() -> None:
     assert came.count(bytes.fromhex(IMAGE_HEX)) == 1
 
 
-def test_both_fingers_may_sense() -> None:
-    came = Tsf85Encoder().encode(1, np.array([[2, 3]], dtype=np.int16), np.stack([IMAGE, IMAGE]), image_is_new=True)
-    images = f'9A 00 58 39 10 {IMAGE_HEX} 9A 00 58 39 14 {IMAGE_HEX}'
-    rest = f'30 {STILL[0]} 40 {STILL[1]}', f'34 {STILL[0]} 44 {STILL[1]}'
-    assert came == bytes.fromhex(f'{images} 9A 00 58 2B 70 0000000000000001 20 0002 {rest[0]} 24 0003 {rest[1]}')
-
-
 def test_without_stamps_the_index_jumps_over_lost_packets_and_the_times_are_right_again() -> None:
     encoder, parser, splitter, finger = (
         Tsf85Encoder(stamped=False),

@@ -86,16 +86,6 @@ def test_a_command_that_is_overwritten_within_a_cycle_is_lost(controller):
     assert not controller.robot.velocity.any()
 
 
-def test_a_move_in_the_background_shows_its_progress(controller):
-    x = controller.robot.pose[0]
-    send(controller, ScriptCommand.MOVE_L, [x + 0.05, *controller.robot.pose[1:], 0.1, 1.0], [1])
-    run(controller, 0.02)
-    assert state(controller) == DONE
-    assert controller.registers.int_out[2] & 1 << 15
-    run(controller, 1.0)
-    assert not controller.registers.int_out[2] & 1 << 15
-
-
 def test_the_end_of_force_control_does_not_end_a_speed(controller):
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 0.1)
@@ -153,12 +143,6 @@ def test_a_protective_stop_cannot_be_unlocked_before_its_time(controller):
     assert (controller.playing, controller.safety) == (True, SafetyMode.NORMAL)
 
 
-def test_driving_hard_into_the_surface_is_a_protective_stop(controller):
-    speed_l(controller, 0.0, 0.0, -0.2)
-    run(controller, 0.5)
-    assert controller.safety is SafetyMode.PROTECTIVE_STOP
-
-
 def test_a_stop_is_acknowledged_late_if_it_is_reported_so_but_done_at_once(controller):
     controller.acknowledge_s = 0.3
     speed_l(controller, 0.05, 0.0, 0.0)
@@ -207,11 +191,3 @@ def test_a_program_of_somebody_else_takes_no_commands_and_can_be_paused(controll
     assert [ask('running'), ask('programState')] == ['Program running: false', 'PAUSED other.urp']
     ask('stop')
     assert ask('programState') == 'STOPPED other.urp'
-
-
-def test_the_program_uses_the_registers_that_its_script_names():
-    controller = EmulatedController(UrControllerParams(), np.random.default_rng(0))
-    controller.upload('def rtde_control():\n global reg_offset_int = # int register offset\n24\nend\n')
-    for _ in range(100):
-        controller.tick()
-    assert (controller.registers.int_out[24], controller.registers.int_out[0]) == (1, 0)  # it is ready

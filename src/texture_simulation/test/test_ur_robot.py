@@ -67,12 +67,6 @@ def test_a_slope_pushes_along_its_normal():
     assert force == pytest.approx(2000.0 * 0.001 / np.sqrt(2) * np.array([-1, 0, 1]) / np.sqrt(2))
 
 
-def test_a_bump_is_as_high_as_it_says():
-    surface = ContactPlane(UrControllerParams(bump_height_m=0.004))
-    assert surface.force_n(place(0, 0, 0.0035), REST) == pytest.approx([0, 0, 1.0])
-    assert not surface.force_n(place(0.1, 0, 0.0001), REST).any()
-
-
 def test_a_line_takes_the_time_of_its_trapezoid_and_ends_on_the_goal():
     robot = robot_over()
     goal = robot.pose + vector(0.03, 0.04)
@@ -126,13 +120,6 @@ def test_force_control_acts_along_the_axes_of_its_frame():
     assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
 
 
-def test_force_control_comes_down_no_faster_than_allowed():
-    robot = robot_over(start_height_m=0.1)
-    robot.force_mode = pressing(50.0)
-    run(robot, 0.5)
-    assert robot.velocity[2] == pytest.approx(-0.05)
-
-
 def test_force_control_follows_a_slope_while_the_finger_slides():
     robot = robot_over(slope_x=0.1, start_height_m=0.0)
     robot.force_mode = pressing(2.0)
@@ -142,15 +129,6 @@ def test_force_control_follows_a_slope_while_the_finger_slides():
     assert robot.velocity[2] == pytest.approx(0.1 * 0.02, rel=0.05)
     # A force loop with admittance a lags by v/a behind a surface that rises with v.
     assert robot.force[2] == pytest.approx(2.0 + 0.1 * 0.02 / 0.01, rel=0.05)
-
-
-def test_zeroing_takes_the_offset_of_the_sensor_away():
-    robot = robot_over(force_offset_n=5.0)
-    robot.step(STEP_S)
-    assert np.linalg.norm(robot.force[:3]) == pytest.approx(5.0, rel=0.01)
-    robot.zero_force()
-    robot.step(STEP_S)
-    assert robot.force == pytest.approx(np.zeros(6))
 
 
 def test_a_contact_is_measured_against_its_direction_only():

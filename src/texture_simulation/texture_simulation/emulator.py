@@ -184,27 +184,9 @@ class LiveSensor:
 # The sensors that can be emulated live: each model with the device that it sends through.
 
 
-class MakeLiveSensor(Protocol):
-    """Makes a live sensor."""
-
-    def __call__(self, scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator, /) -> LiveSensor:
-        """Return the sensor, not started: its first `advance` is the beginning of its time.
-
-        Parameters
-        ----------
-        scene
-            Scene: sensor, contact and effects.
-        surface
-            Surface that is touched.
-        link
-            Symbolic link that leads to the device.
-        rng
-            All random numbers: positions on the sample, effects, noise.
-
-        Returns
-        -------
-        LiveSensor
-        """
+# Makes a live sensor, not started: its first `advance` is the beginning of its time. From a scene, the surface that is
+# touched, the symbolic link that leads to the device, and all random numbers: positions, effects, noise.
+MakeLiveSensor = Callable[[Scene, Surface, FilePath, np.random.Generator], 'LiveSensor']
 
 
 def live_tsf85(

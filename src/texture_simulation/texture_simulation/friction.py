@@ -237,48 +237,13 @@ State = tuple[Value, Value, Value]
 Step = Callable[[Value, Value, Value, Value, Value], State]
 
 
-class PrepareStep(Protocol):
-    """Makes the step of an integrator."""
-
-    def __call__(self, friction: StickSlip, step_s: float, exp: Any, /) -> Step:
-        """Return what takes the state over one step.
-
-        Parameters
-        ----------
-        friction
-            Friction of the surface, and the skin.
-        step_s
-            Length of an integration step.
-        exp
-            `math.exp` for one slide in floats, `numpy.exp` for arrays.
-
-        Returns
-        -------
-        callable
-            Takes stretch, slip, bend, and the speed and the force at the end of the step; returns the next state.
-        """
+# Makes the step of an integrator, from a friction, the length of a step, and `math.exp` or `numpy.exp` for arrays.
+# The step takes stretch, slip, bend, and the speed and the force at the end of the step, and returns the next state.
+PrepareStep = Callable[['StickSlip', float, Any], Step]
 
 
-class StepLimit(Protocol):
-    """Gives the longest step with which an integrator is stable."""
-
-    def __call__(self, friction: StickSlip, slip_m_s: float, force_n: float, /) -> float:
-        """Return the longest stable step.
-
-        Parameters
-        ----------
-        friction
-            Friction of the surface, and the skin.
-        slip_m_s
-            Speed of the tip over the surface; 0 if it sticks.
-        force_n
-            Normal force, at least 0.
-
-        Returns
-        -------
-        float
-            s; inf if every step is stable.
-        """
+# Gives the longest step, s, with which an integrator is stable at a speed of the tip and a force; inf if every one is.
+StepLimit = Callable[['StickSlip', float, float], float]
 
 
 @dataclass(frozen=True)
