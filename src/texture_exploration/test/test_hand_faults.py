@@ -45,7 +45,7 @@ LEAP = load_profile('leap')
 THUMB = LEAP.fingers['thumb']['press'].id
 PARENT = """
 import sys, time
-from texture_exploration.hands.dynamixel import DynamixelHand
+from texture_exploration.arms.dynamixel import DynamixelHand
 
 hand = DynamixelHand('leap', sys.argv[1])
 hand.connect()

@@ -49,9 +49,8 @@ MANAGED = {
 }
 MOVING = """
 import time
-from texture_exploration.arms.protocol import ArmCommand
-from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
 
 arm = RosControllersArm(RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, accept_no_timeout=True))
 arm.connect()

@@ -172,8 +172,8 @@ def test_a_bag_without_messages_of_the_suite_is_refused(tmp_path: Path) -> None:
 WRITER = """
 import os, resource, signal, sys
 import numpy as np
-from texture_core.signal import TactileSignal
-from texture_recordings.bag_writer import BagWriter
+from texture_core.types import TactileSignal
+from texture_recordings.bags import BagWriter
 
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 rng = np.random.default_rng(0)
