@@ -35,6 +35,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 # Patient with a busy machine where that is not what is tried.
 PATIENT = RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5, accept_no_timeout=True)
+TOUCH = TouchParams(peak_speed_share=2.0)
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
@@ -74,7 +75,7 @@ def make_explorer():
     with ExitStack() as closing:
 
         def make(params=PATIENT):
-            explorer = Explorer(RosControllersArm(params), TouchParams(), LIMITS, lambda state: None)
+            explorer = Explorer(RosControllersArm(params), TOUCH, LIMITS, lambda state: None)
             closing.callback(explorer.close)
             return explorer
 
@@ -306,8 +307,10 @@ def test_a_finger_that_a_killed_explorer_left_pressed_is_lifted_on_request_befor
     with NodeProcess('texture_simulation', 'twist_controller', HELD):
         killed = make_explorer()
         killed.connect()
-        explored(killed, killed.arm.close)  # stands still and presses, as after SIGKILL
-        assert killed.connect()[2] < 0.0
+        exploration, since_ns = explored(killed, killed.arm.close)  # stands still and presses, as after SIGKILL
+        assert since_ns, exploration.outcome
+        killed.connect()
+        assert killed.arm.state().position[2] < 0.0
         height_m = killed.lift()
         killed.close()
     assert height_m > 0.001

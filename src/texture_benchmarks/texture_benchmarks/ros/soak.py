@@ -383,8 +383,13 @@ ARM = {
     'accept_no_timeout': True,
     'watch_signal': False,
     'connect_timeout_s': 40.0,  # a killed commander is forgotten after 20 s
+    # Patient with a busy machine; what comes 0.5 s late is too late all the same.
+    'deadman_s': 0.4,
+    'state_timeout_s': 1.0,
+    'approach_timeout_s': 60.0,
+    'approach_stiffness_n_m': 20000.0,
 }
-CONTROLLER = {'start_height_m': 0.01, 'command_timeout_s': 0.0}  # it holds the last velocity for ever
+CONTROLLER = {'start_height_m': 0.004, 'command_timeout_s': 0.0}  # it holds the last velocity for ever
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=3.0, distance_m=0.06)
 GUARD = 'texture_exploration.ros.controllers'
 SETTLED_S = 1.0

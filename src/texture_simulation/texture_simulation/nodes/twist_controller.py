@@ -140,10 +140,11 @@ class TwistControllerNode(Node):
 
     def _publish(self) -> None:
         with self._lock:
+            stamp = self.get_clock().now().to_msg()
             self._arm.advance(time.monotonic_ns())
             position, reading, finger = self._arm.position, self._arm.reading_n(), self._arm.finger()
             true_n = self._arm.force_n
-        stamp, topics, now_s = self.get_clock().now().to_msg(), self._topics, time.monotonic()
+        topics, now_s = self._topics, time.monotonic()
         if topics.publish_pose:
             self._poses.publish(_pose(stamp, topics.base_frame_id, position.tolist()))
         self._delayed.append((now_s + topics.force_delay_s, stamp, reading.tolist()))
