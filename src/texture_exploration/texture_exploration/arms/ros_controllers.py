@@ -859,7 +859,7 @@ class RosControllersArm:
             self._follow.restart()
             return ''
         self._gone_ns = 0
-        if self._commanded == REST:
+        if self._commanded == REST or held_s > self._params.heartbeat_s:  # the guard has commanded zero meanwhile
             self._follow.restart()
             return ''
         late = self._follow.update(now_ns, self._tool.state('').position, self._commanded, held_s)
