@@ -12,17 +12,21 @@ from texture_benchmarks.soak import (
     FAULTS,
     ExplorationRecord,
     FaultEvent,
+    ForceAccount,
+    HazardRecord,
     Processes,
     ProcessUsage,
     SampleAccount,
     SoakRecord,
     Totals,
+    check_hazards,
     check_requirements,
     memory_growth,
     planned_explorations,
     planned_faults,
     read_usage,
     write,
+    write_hazards,
 )
 
 HOUR_S = 3600
@@ -172,3 +176,31 @@ def test_the_report_has_a_chart_and_figures(tmp_path) -> None:
     assert numbers['said'] == [{'node': 'sensor', 'level': 'WARN', 'text': 'gone', 'times': 3}]
     assert numbers['endings'] == {'success': {'without': 1}}
     assert (tmp_path / 'endurance.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_a_force_above_the_limit_is_timed_without_a_break() -> None:
+    force = ForceAccount()
+    for time_s, force_n in ((0.0, 5.0), (0.1, 11.0), (0.15, 12.0), (0.2, 9.0), (0.3, 20.0), (0.32, 2.0)):
+        force.update(time_s, force_n)
+    assert (force.newest_n, force.peak_n, round(force.above_s, 9)) == (2.0, 20.0, 0.05)
+
+
+@pytest.mark.parametrize(
+    ('changed', 'asked'),
+    [
+        ({}, []),
+        ({'ending': 'aborted'}, []),
+        ({'ending': 'aborted', 'message': ''}, ['every exploration succeeds or is aborted by name']),
+        ({'hazard': 'none', 'ending': 'aborted'}, ['explorations after a hazard succeed']),
+        ({'happened': False}, ['every hazard comes']),
+        ({'above_s': 0.11}, ['no force above 10 N for more than 0.1 s in any direction']),
+        ({'left_n': 0.3}, ['no finger stays pressed where the arm obeys']),
+    ],
+)
+def test_a_hazard_that_breaks_a_limit_is_named(changed, asked, tmp_path) -> None:
+    found = HazardRecord('guard killed', True, 'success', 'the motion ended as asked', 12.0, 0.05, 0.0)
+    records = [found, found._replace(**changed)]
+    assert [result.asked for result in check_hazards(records) if not result.holds] == asked
+    assert (
+        json.loads(write_hazards(records, tmp_path).read_text())['numbers']['hazards']['guard killed']['peak_n'] == 12
+    )

@@ -9,7 +9,7 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_benchmarks.ros import soak
-from texture_benchmarks.soak import LOST, PlannedFault
+from texture_benchmarks.soak import HAZARDS, LOST, PlannedFault, check_hazards
 from texture_bringup import operator as operators
 from texture_evaluation.train import train_from_bags
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -42,3 +42,10 @@ def test_a_killed_explorer_comes_back_and_every_exploration_ends_with_a_reason(m
     assert record.ends == ['explorer was killed by SIGKILL']
     assert all(item.message for item in record.explored)
     assert all(item.faults for item in record.explored if item.ending == LOST)
+
+
+def test_each_hazard_of_an_arm_ends_within_the_limits_with_a_free_finger_and_a_calm_exploration_after_it() -> None:
+    said: list[str] = []
+    records = soak.endure_hazards(soak.SoakPlan(0.0), said.append)
+    assert {item.hazard for item in records} == {*HAZARDS, 'none'}
+    assert [result for result in check_hazards(records) if not result.holds] == [], said

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import signal
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -508,3 +509,123 @@ def draw(record: SoakRecord, path: Path) -> Path:
         for axes in (memory, endings):
             axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5))
     return path
+
+
+# Hazards of an arm behind ROS controllers: what is wrong with it, and what is required of the force
+
+
+class Hazard(NamedTuple):
+    """What befalls an arm: parameters of its controller, a signal to a process, or somebody else who commands it."""
+
+    given: Mapping[str, Any] = {}
+    process: str = ''  # 'explorer' or 'guard', which gets the signal in the slide
+    number: int = 0
+    hold_s: float = 0.0  # a stopped process goes on afterwards; the other commander leaves
+    commander: bool = False
+    wired_wrong: bool = False  # from before the arm is connected, and put right before the finger must be free
+    obeys: bool = True  # whether the arm does what the explorer commands, and the explorer can command
+
+
+HAZARDS: Mapping[str, Hazard] = {
+    'wall of 20 kN/m in the slide': Hazard({'wall_m': 0.02, 'wall_stiffness_n_m': 20000.0}),
+    'velocities inverted': Hazard({'invert_twist': True}, wired_wrong=True, obeys=False),
+    'force inverted': Hazard({'invert_force': True}, wired_wrong=True),
+    'force 0.5 s late': Hazard({'force_delay_s': 0.5}, wired_wrong=True),
+    'force 0.5 s late with new stamps': Hazard({'force_delay_s': 0.5, 'stamp_when_sent': True}, wired_wrong=True),
+    'explorer paused for 0.5 s': Hazard(process='explorer', number=signal.SIGSTOP, hold_s=0.5),
+    'explorer stopped for 3 s': Hazard(process='explorer', number=signal.SIGSTOP, hold_s=3.0),
+    'explorer killed': Hazard(process='explorer', number=signal.SIGKILL, obeys=False),
+    'guard stopped for 3 s': Hazard(process='guard', number=signal.SIGSTOP, hold_s=3.0),
+    'guard killed': Hazard(process='guard', number=signal.SIGKILL),
+    'second commander': Hazard(commander=True, hold_s=1.0),
+}
+NO_HAZARD = 'none'
+HARMLESS: Mapping[str, Any] = {
+    'wall_m': 2.0,
+    'invert_twist': False,
+    'invert_force': False,
+    'force_delay_s': 0.0,
+    'stamp_when_sent': False,
+}
+FORCE_LIMIT_N, ABOVE_S = 10.0, 0.1
+FREE_N = 0.2
+
+
+class ForceAccount:
+    """Follow the size of a force: its peak, and the longest time without a break above the limit."""
+
+    def __init__(self) -> None:
+        self.newest_n = self.peak_n = self.above_s = 0.0
+        self._since_s: float | None = None
+
+    def update(self, time_s: float, force_n: float) -> None:
+        """Take note of the force at a time."""
+        self.newest_n, self.peak_n = force_n, max(self.peak_n, force_n)
+        if force_n <= FORCE_LIMIT_N:
+            self._since_s = None
+            return
+        self._since_s = time_s if self._since_s is None else self._since_s
+        self.above_s = max(self.above_s, time_s - self._since_s)
+
+
+class HazardRecord(NamedTuple):
+    """How an exploration went in which something befell the arm, and the true force on the finger meanwhile."""
+
+    hazard: str
+    happened: bool  # what comes in the slide does not come if there is no slide
+    ending: str
+    message: str
+    peak_n: float
+    above_s: float
+    left_n: float  # once the exploration was over, and the arm obeys
+
+
+def check_hazards(records: Sequence[HazardRecord]) -> list[Requirement]:
+    """Return what is required of the explorations with hazards, and what was seen."""
+    calm = [item for item in records if item.hazard == NO_HAZARD]
+    missing = [item.hazard for item in records if not item.happened]
+    nameless = [item.hazard for item in records if item.ending != SUCCESS and not item.message]
+    longest = max(records, key=lambda item: item.above_s)
+    pressed = max(records, key=lambda item: item.left_n)
+    return [
+        Requirement('every hazard comes', f'not: {", ".join(missing) or "none"}', not missing),
+        Requirement('every exploration succeeds or is aborted by name', f'{len(nameless)} without', not nameless),
+        Requirement(
+            'explorations after a hazard succeed',
+            f'{sum(item.ending == SUCCESS for item in calm)} of {len(calm)}',
+            all(item.ending == SUCCESS for item in calm),
+        ),
+        Requirement(
+            f'no force above {FORCE_LIMIT_N:g} N for more than {ABOVE_S:g} s in any direction',
+            f'longest {longest.above_s * 1e3:.0f} ms, {longest.peak_n:.0f} N, {longest.hazard}',
+            longest.above_s <= ABOVE_S,
+        ),
+        Requirement(
+            'no finger stays pressed where the arm obeys',
+            f'most {pressed.left_n:.2f} N, {pressed.hazard}',
+            pressed.left_n <= FREE_N,
+        ),
+    ]
+
+
+def write_hazards(records: Sequence[HazardRecord], out: Path) -> Path:
+    """Write hazards.json into a folder; return its path."""
+    numbers = {
+        name: {
+            'explorations': len(own),
+            'successes': sum(item.ending == SUCCESS for item in own),
+            'peak_n': max(item.peak_n for item in own),
+            'above_ms': 1e3 * max(item.above_s for item in own),
+            'left_n': max(item.left_n for item in own),
+            'messages': sorted({item.message for item in own}),
+        }
+        for name in dict.fromkeys(item.hazard for item in records)
+        if (own := [item for item in records if item.hazard == name])
+    }
+    return BenchmarkResult(
+        name='hazards',
+        measured='true force on the finger in any direction, its time above the limit, and what is left at the end',
+        data='emulated arm behind ROS controllers; faults injected in the slide or before the arm is connected',
+        split='none: one run',
+        numbers={'requirements': [found._asdict() for found in check_hazards(records)], 'hazards': numbers},
+    ).write(out)

@@ -38,8 +38,8 @@ def emulated_controllers():
     pytest.importorskip('rclpy', reason='there is no ROS here')
     domain = {'ROS_DOMAIN_ID': '92', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
     with mock.patch.dict(os.environ, domain), NodeProcess('texture_simulation', 'twist_controller'):
-        # Patient with a busy machine, which is not what is tried here.
-        yield {'connect_timeout_s': 30.0, 'deadman_s': 1.0}
+        # Patient with a busy machine, which is not what is tried here; the emulated controller has a timeout.
+        yield {'connect_timeout_s': 30.0, 'deadman_s': 1.0, 'controller_timeout_s': 0.1}
 
 
 DEVICES = {

@@ -174,10 +174,10 @@ def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works
 
 KILLED = """
 import sys
-from texture_core.exploration import ExplorationRequest
+from texture_core.types import ExplorationRequest
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.stages import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])

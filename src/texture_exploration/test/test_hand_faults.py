@@ -45,7 +45,7 @@ LEAP = load_profile('leap')
 THUMB = LEAP.fingers['thumb']['press'].id
 PARENT = """
 import sys, time
-from texture_exploration.hands.dynamixel import DynamixelHand
+from texture_exploration.arms.dynamixel import DynamixelHand
 
 hand = DynamixelHand('leap', sys.argv[1])
 hand.connect()
@@ -216,7 +216,7 @@ def test_every_number_of_a_profile_has_a_range(tmp_path, wrong):
             place = place[name]
         place[key] = wrong
         (tmp_path / 'mine.yaml').write_text(yaml.safe_dump(content))
-        with pytest.raises(InvalidParameter, match="hand profile 'mine'"):
+        with pytest.raises(InvalidParameter, match=r"hand profile '(.*/)?mine"):
             load_profile(str(tmp_path / 'mine.yaml'))
 
 

@@ -70,6 +70,24 @@ def test_an_arm_that_needs_a_longer_rise_to_zero_its_force_sensor_gets_it(table,
     assert highest_m < table.home[2] + 5 * TOUCH.clearance_m
 
 
+def test_a_state_from_before_the_zero_of_its_force_is_no_contact(table, lifting_first, monkeypatch):
+    """An arm with a thread of its own may tell that it is zeroed between a state and the question."""
+    rested, state = 0, table.arm.state
+
+    def seen():
+        nonlocal rested
+        reading, zeroed = state(), lifting_first[0]
+        high = reading.position[2] > table.home[2] + 0.8 * TOUCH.clearance_m
+        rested = rested + 1 if high and not any(reading.velocity) else 0
+        lifting_first[0] = zeroed or rested > 40
+        return reading if zeroed else replace(reading, force_n=reading.force_n - 3.0)
+
+    lifting_first[0] = False
+    monkeypatch.setattr(table.arm, 'state', seen)
+    outcome = table.explore(REQUEST)
+    assert outcome.success, outcome.message
+
+
 CHANGING = {
     'swings': (lambda reading: 2.0 * (reading.time_ns // 50_000_000 % 2), 'the force changed by 2.00 N'),
     'falls slowly': (

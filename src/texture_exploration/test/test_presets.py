@@ -1,8 +1,8 @@
 import math
-from pathlib import Path
 
 import pytest
 
+from texture_core.config import shipped
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset, read_preset
@@ -11,7 +11,7 @@ from texture_exploration.stages import TouchParams
 
 # A slide is longer than the recording of its paper by so much: an arm that answers late still covers all of that.
 LATE_S = 0.05
-PRESETS = sorted(path.stem for path in (Path(__file__).parent.parent / 'config' / 'presets').glob('*.yaml'))
+PRESETS = sorted(shipped('texture_exploration', 'config/presets'))
 
 
 @pytest.mark.parametrize('name', PRESETS)

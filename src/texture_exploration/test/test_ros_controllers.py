@@ -544,6 +544,22 @@ def test_a_late_force_whose_stamps_are_new_is_told_by_the_first_touch(late_s, st
     assert max(map(max, forces.values())) < 5.0
 
 
+def test_an_explorer_that_was_stopped_in_the_slide_lifts_a_finger_whose_arm_obeys(noisy):
+    """The guard has commanded zero meanwhile: the arm that stood still is not one that does not follow."""
+    stopped = []
+
+    def stop():
+        if not stopped:
+            stopped.append(noisy.now_ns)
+            noisy.now_ns += 3_000_000_000
+            noisy.arm.advance(noisy.now_ns)  # the emulated controller has a timeout
+
+    outcome, _ = noisy.explore(PRESS, TouchParams(), on_slide=stop)
+    assert stopped
+    assert outcome.lifted, outcome.message
+    assert noisy.arm.finger().force_n == 0.0
+
+
 @pytest.mark.parametrize('clock_ahead_s', [-3600.0, -0.05, 3.0, 3600.0])
 def test_clocks_that_do_not_agree_say_nothing_about_age(noisy, clock_ahead_s):
     noisy.clock_ahead_s = clock_ahead_s

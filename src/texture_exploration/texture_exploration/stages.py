@@ -1340,6 +1340,7 @@ class CalmDown(Stage):
         self._zeroed = zeroed
         self._speed_m_s = touch.approach_m_s(force_n)
         self._touch = touch
+        self._believed = False
         self._rest_ns = 0
         self._start_m = self._rest_m = 0.0
 
@@ -1352,7 +1353,10 @@ class CalmDown(Stage):
         """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
         rested_s = (time_ns - self._rest_ns) * 1e-9
         if rested_s >= CALM_S and self._zeroed():
-            return None
+            if self._believed:
+                return None
+            self._believed = True  # the arm tells so at once, and this state may still be without the zero
+            return ArmCommand()
         height_m = arm.position[2]
         if rested_s < PATIENCE_S or height_m - self._start_m > self._touch.approach_travel_m:
             return ArmCommand()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_benchmarks.ros.soak import SoakPlan, endure
-from texture_benchmarks.soak import check_requirements, write
+from texture_benchmarks.ros.soak import SoakPlan, endure, endure_hazards
+from texture_benchmarks.soak import check_hazards, check_requirements, write, write_hazards
 from texture_core.cli import add_seed
 from texture_core.errors import InvalidData
 
@@ -17,6 +17,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--quiet', type=float, default=20.0, metavar='S', help='mean time between two faults, s')
     parser.add_argument('--model', type=Path, help='trained model; one of simulated slides is trained if not given')
     parser.add_argument('--out', type=Path, default=Path('texture-endurance'), metavar='DIR', help='for the report')
+    parser.add_argument(
+        '--hazards', action='store_true', help='of an arm behind ROS controllers, and the force instead'
+    )
     add_seed(parser)
 
 
@@ -27,9 +30,13 @@ def run(options: argparse.Namespace) -> int:
     except OSError as error:
         raise InvalidData(f"'{options.out}' cannot be used: {error.strerror}; name another with --out") from error
     plan = SoakPlan(options.duration, options.quiet, options.seed, options.model)
-    record = endure(plan, options.out / 'nodes.log', lambda line: print(line, flush=True))
-    results = check_requirements(record)
+    if options.hazards:
+        records = endure_hazards(plan, lambda line: print(line, flush=True))
+        results, report = check_hazards(records), write_hazards(records, options.out)
+    else:
+        record = endure(plan, options.out / 'nodes.log', lambda line: print(line, flush=True))
+        results, report = check_requirements(record), write(record, options.out)
     for result in results:
         print(f'{"holds" if result.holds else "FAILS"}: {result.asked}: {result.seen}')
-    print(f'  {write(record, options.out)}')
+    print(f'  {report}')
     return int(not all(result.holds for result in results))

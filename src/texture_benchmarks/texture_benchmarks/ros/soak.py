@@ -12,14 +12,16 @@ import tempfile
 import threading
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
+from unittest import mock
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped, WrenchStamped
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -33,7 +35,8 @@ from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted, TextureError
 from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, to_ns
-from texture_core.types import ExplorationRequest
+from texture_core.ros_testing import NodeProcess
+from texture_core.types import NANOSECONDS, ExplorationRequest, ExplorationState, Phase
 from texture_evaluation.train import train_from_bags
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
@@ -371,3 +374,170 @@ def _work(
     except TextureError as error:
         return str(error)
     return f'the faults ended early: {injector.error!r}' if injector.error else ''
+
+
+# Hazards of an arm behind ROS controllers
+
+ARM = {
+    'arm': 'ros_controllers',
+    'accept_no_timeout': True,
+    'watch_signal': False,
+    'connect_timeout_s': 40.0,  # a killed commander is forgotten after 20 s
+    # Patient with a busy machine; what comes 0.5 s late is too late all the same.
+    'deadman_s': 0.4,
+    'state_timeout_s': 1.0,
+    'approach_timeout_s': 60.0,
+    'approach_stiffness_n_m': 20000.0,
+}
+CONTROLLER = {'start_height_m': 0.004, 'command_timeout_s': 0.0}  # it holds the last velocity for ever
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=3.0, distance_m=0.06)
+GUARD = 'texture_exploration.ros.controllers'
+SETTLED_S = 1.0
+OTHER_M_S, OTHER_PERIOD_S = 0.01, 0.02  # what the other commander wants, along the surface, and how often
+
+
+class HazardRig(Listener):
+    """An emulated controller, an explorer and what befalls them; use it in a `with` block."""
+
+    def __init__(self, domain_id: int, clients: Sequence[Operator]) -> None:
+        super().__init__('watcher', domain_id)
+        self.force = soak.ForceAccount()
+        self._explorations, self._settings = clients
+        self._controller = NodeProcess('texture_simulation', 'twist_controller', CONTROLLER, domain_id=domain_id)
+        self._domain_id = domain_id
+        self._explorer = self._new_explorer()
+        self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
+
+    def __enter__(self) -> Self:
+        self._controller.__enter__()
+        self._explorer.__enter__()
+        return super().__enter__()
+
+    def __exit__(self, *error: object) -> None:
+        self._explorer.stop()
+        self._controller.stop()
+        super().__exit__(*error)
+
+    def explore(self, name: str) -> soak.HazardRecord:
+        """Explore while something befalls the arm, put it right, and return how it went."""
+        hazard = soak.HAZARDS.get(name, soak.Hazard())
+        if hazard.wired_wrong:
+            self._restart(hazard.given)
+        elif hazard.given:
+            self._settings.set_parameters('twist_controller', hazard.given)
+        self._explorations.wait_for_explorer(START_DEADLINE_S)
+        self.force = soak.ForceAccount()
+        happened = [] if hazard.process or hazard.commander else ['before']
+
+        def on_progress(state: ExplorationState, _texture: Any) -> None:
+            if state.phase is Phase.SLIDE and not happened:
+                happened.append('in the slide')
+                self._act(hazard)
+
+        exploration_id = ''
+        try:
+            answer = self._explorations.explore(SLIDE, on_progress)
+            message, exploration_id = answer.message, answer.exploration_id
+            ending = soak.SUCCESS if answer.success else soak.ABORTED if exploration_id else soak.REFUSED
+        except (MotionAborted, LaunchFailed) as error:
+            ending, message = soak.LOST, str(error)
+        time.sleep(SETTLED_S)
+        left_n, force = self.force.newest_n, self.force
+        if not hazard.obeys:
+            self._restart(soak.HARMLESS)
+            self._lift()
+            left_n = self.force.newest_n
+        elif hazard.wired_wrong:
+            self._restart(soak.HARMLESS)
+        elif hazard.given:
+            self._settings.set_parameters('twist_controller', soak.HARMLESS)
+        return soak.HazardRecord(name, bool(happened), ending, message, force.peak_n, force.above_s, left_n)
+
+    def _act(self, hazard: soak.Hazard) -> None:
+        if hazard.commander:
+            self._command_too(hazard.hold_s)
+            return
+        pid = self._explorer.process.pid
+        if hazard.process == 'guard':
+            pid = next(child for child in children(pid) if GUARD in command_line(child))
+        os.kill(pid, hazard.number)
+        if hazard.hold_s:
+            time.sleep(hazard.hold_s)
+            os.kill(pid, signal.SIGCONT)
+
+    def _command_too(self, hold_s: float) -> None:
+        publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
+        end_s = time.monotonic() + hold_s
+        while time.monotonic() < end_s:
+            twist = TwistStamped()
+            twist.header.stamp, twist.header.frame_id = self.node.get_clock().now().to_msg(), 'base'
+            twist.twist.linear.y = OTHER_M_S
+            publisher.publish(twist)
+            time.sleep(OTHER_PERIOD_S)
+        self.node.destroy_publisher(publisher)
+
+    def _restart(self, given: Mapping[str, Any]) -> None:
+        """Start another explorer on a controller with other parameters."""
+        self._explorer.stop()
+        self._settings.set_parameters('twist_controller', given)
+        self._explorer = self._new_explorer().__enter__()
+        self._explorations.wait_for_explorer(START_DEADLINE_S)
+
+    def _lift(self) -> None:
+        """Lift the finger as an operator does after an explorer that was killed."""
+        with suppress(TextureError):  # what is left of the force tells
+            self._settings.call('lift', 'start the explorer')
+        time.sleep(SETTLED_S)
+
+    def _new_explorer(self) -> NodeProcess:
+        return NodeProcess('texture_exploration', 'explorer', ARM, domain_id=self._domain_id)
+
+    def _on_wrench(self, wrench: WrenchStamped) -> None:
+        force = wrench.wrench.force
+        self.force.update(to_ns(wrench.header.stamp) / NANOSECONDS, math.hypot(force.x, force.y, force.z))
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes that a process has started."""
+    found = [folder for folder in Path('/proc').iterdir() if folder.name.isdigit()]
+    parents = {int(folder.name): parent_of(folder) for folder in found}
+    return [child for child, parent in parents.items() if parent == pid]
+
+
+def parent_of(folder: Path) -> int:
+    """Return the parent of a process by its folder in /proc, 0 if it has ended."""
+    try:
+        return int((folder / 'stat').read_text(errors='replace').rpartition(')')[2].split()[1])
+    except OSError:
+        return 0
+
+
+def command_line(pid: int) -> list[str]:
+    """Return the words by which a process was started, none if it has ended."""
+    try:
+        return (Path('/proc') / str(pid) / 'cmdline').read_text(errors='replace').split('\0')
+    except OSError:
+        return []
+
+
+def endure_hazards(
+    plan: SoakPlan, say: Callable[[str], None], names: Sequence[str] = tuple(soak.HAZARDS)
+) -> list[soak.HazardRecord]:
+    """Explore with each hazard in turn, in calm after each, again and again until the time is over; each comes once."""
+    records: list[soak.HazardRecord] = []
+    with tempfile.TemporaryDirectory(prefix='texture_hazards_') as folder, ExitStack() as stack:
+        isolation = isolate(Path(folder))
+        stack.enter_context(mock.patch.dict(os.environ, isolation.environment(os.environ)))
+        clients = [stack.enter_context(Operator(domain_id=isolation.domain_id)) for _ in range(2)]
+        rig = stack.enter_context(HazardRig(isolation.domain_id, clients))
+        end_s = time.monotonic() + plan.duration_s
+        rng = np.random.default_rng(plan.seed)
+        while not records or time.monotonic() < end_s:
+            for name in rng.permutation(np.array(names)).tolist():
+                for hazard in (name, soak.NO_HAZARD):
+                    records.append(found := rig.explore(hazard))
+                    say(
+                        f'{hazard}: {found.ending}, {found.peak_n:.1f} N, {found.above_s * 1e3:.0f} ms above '
+                        f'{soak.FORCE_LIMIT_N:g} N, {found.left_n:.2f} N left: {found.message}'
+                    )
+    return records

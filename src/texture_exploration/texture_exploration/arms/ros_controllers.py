@@ -708,6 +708,7 @@ class RosControllersArm:
         self.stop()
         self._lost = self._unsafe = self._tool.misplaced = ''
         self._tool.zero.forget()
+        self._zeroed = False
         self._follow.restart()
         if fault := self._fault(self._clock()) or self._connected().unsafe():
             raise DeviceError(f'the arm did not recover: {fault}')
@@ -731,7 +732,7 @@ class RosControllersArm:
     @property
     def zeroed(self) -> bool:
         """Whether the force sensor was zeroed since the arm was connected or recovered."""
-        return self._tool.zero.zeroed
+        return self._zeroed
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -759,6 +760,7 @@ class RosControllersArm:
             self._command = None
             self._tool.zero.forget()
         self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
+        self._zeroed = self._tool.zero.zeroed  # after the state, so that who reads it finds the zeroed force
         if fault:
             self._halt(topics, now_ns)
         else:
@@ -781,7 +783,7 @@ class RosControllersArm:
         self._place = self._command = self._rise_from_m = None
         self._commanded = REST
         self._moved_ns = self._sent_ns = self._gone_ns = 0
-        self._pressing = False
+        self._pressing = self._zeroed = False
         self._lost = self._unsafe = ''
 
     def _take_over(self, topics: ControllerTopics) -> None:
@@ -857,7 +859,7 @@ class RosControllersArm:
             self._follow.restart()
             return ''
         self._gone_ns = 0
-        if self._commanded == REST:
+        if self._commanded == REST or held_s > self._params.heartbeat_s:  # the guard has commanded zero meanwhile
             self._follow.restart()
             return ''
         late = self._follow.update(now_ns, self._tool.state('').position, self._commanded, held_s)

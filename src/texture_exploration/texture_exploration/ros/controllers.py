@@ -180,8 +180,7 @@ if __name__ == '__main__':
 # The topics of ROS controllers, taken by whoever polls them: no executor, no callbacks, one thread.
 #
 # A context of its own makes the arm independent of the node that owns it: zero velocity can still be sent when that
-# node
-# is shut down. Names follow the namespace and the remappings of the process.
+# node is shut down. Names follow the namespace and the remappings of the process.
 
 CONTROLLER_TOPICS_NODE = 'arm_topics'
 COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fits every subscriber
@@ -228,7 +227,7 @@ class RosTopics:
         node = self._node
         wrench_topic = params.target_wrench_topic
         self._commanded_topics = [node.resolve_topic_name(name) for name in (params.twist_topic, wrench_topic) if name]
-        self._unnamed_s = 0.0  # since when there has been such a publisher
+        self._unnamed_s = 0.0  # since when there has been such a publisher, 0 if there is none
         self._wait_for_the_command()
         self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
         self._wrenches = node.create_publisher(WrenchStamped, wrench_topic, COMMAND_QOS) if wrench_topic else None
@@ -347,7 +346,7 @@ class RosTopics:
     def _wait_for_the_command(self) -> None:
         """Take the topics only once nobody else is there; who commands must not be disturbed by being looked at."""
         begin_s = time.monotonic()
-        while (other := self._other_commander()) or time.monotonic() - begin_s < DISCOVERY_S:
+        while (other := self._other_commander()) or self._unnamed_s or time.monotonic() - begin_s < DISCOVERY_S:
             if other and time.monotonic() - begin_s > self._params.connect_timeout_s:
                 self._leave()
                 raise DeviceError(f'{other}; end it first. One that was killed is forgotten after about 20 s')
@@ -355,14 +354,17 @@ class RosTopics:
 
     def _other_commander(self, own: tuple[str, ...] = ()) -> str:
         """Return in a sentence who else commands, '' if nobody does; each name of ours may publish once."""
-        for topic in self._commanded_topics:
-            if self._node.count_publishers(topic) <= (len(own) if topic is self._commanded_topics[0] else len(own[:1])):
-                continue
-            left, infos = list(own), self._node.get_publishers_info_by_topic(topic)
-            unnamed = any(info.node_name == UNNAMED for info in infos)
-            self._unnamed_s = (self._unnamed_s or time.monotonic()) if unnamed else 0.0
-            if unnamed and time.monotonic() - self._unnamed_s < UNNAMED_S:
-                continue
+        found = {
+            topic: self._node.get_publishers_info_by_topic(topic)
+            for number, topic in enumerate(self._commanded_topics)
+            if self._node.count_publishers(topic) > (len(own[:1]) if number else len(own))
+        }
+        unnamed = any(info.node_name == UNNAMED for infos in found.values() for info in infos)
+        self._unnamed_s = (self._unnamed_s or time.monotonic()) if unnamed else 0.0
+        if unnamed and time.monotonic() - self._unnamed_s < UNNAMED_S:
+            return ''
+        for topic, infos in found.items():
+            left = list(own)
             for info in infos:
                 name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
                 if name not in left:

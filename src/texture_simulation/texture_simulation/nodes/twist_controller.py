@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -48,6 +49,16 @@ class ControllerTopicParams:
         low=0.0,
         high=1.0,
     )
+    force_delay_s: float = param(
+        0.0,
+        'Publishes the measured force so much later than it was measured; 0 at once.',
+        unit='s',
+        low=0.0,
+        high=2.0,
+    )
+    stamp_when_sent: bool = param(
+        False, 'Stamps a delayed force when it is published; false stamps it when it was measured.'
+    )
     finger_port: int = param(
         0,
         'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
@@ -57,7 +68,10 @@ class ControllerTopicParams:
 
 
 class TwistControllerNode(Node):
-    """Follow TwistStamped, publish PoseStamped and WrenchStamped; all parameters but the topics may be changed."""
+    """Follow TwistStamped, publish PoseStamped and WrenchStamped; all parameters but the topics may be changed.
+
+    The force on the finger as it is, in the base frame and without delay, stands on `true_wrench`.
+    """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('twist_controller', **kwargs)
@@ -71,6 +85,8 @@ class TwistControllerNode(Node):
         topics = self._topics
         self._poses = self.create_publisher(PoseStamped, topics.pose_topic, 1)
         self._wrenches = self.create_publisher(WrenchStamped, topics.wrench_topic, 1)
+        self._true_wrenches = self.create_publisher(WrenchStamped, 'true_wrench', 100)
+        self._delayed: deque[tuple[float, Any, list[float]]] = deque()  # when due, stamp and reading
         self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
         self.create_subscription(WrenchStamped, topics.target_wrench_topic, self._on_wrench, 1)
         self._emulator = FingerSender(topics.finger_port)
@@ -124,13 +140,21 @@ class TwistControllerNode(Node):
 
     def _publish(self) -> None:
         with self._lock:
+            stamp = self.get_clock().now().to_msg()
             self._arm.advance(time.monotonic_ns())
             position, reading, finger = self._arm.position, self._arm.reading_n(), self._arm.finger()
-        stamp = self.get_clock().now().to_msg()
-        if self._topics.publish_pose:
-            self._poses.publish(_pose(stamp, self._topics.base_frame_id, position.tolist()))
-        if self._topics.publish_wrench:
-            self._wrenches.publish(_wrench(stamp, self._topics.tool_frame_id, reading.tolist()))
+            true_n = self._arm.force_n
+        topics, now_s = self._topics, time.monotonic()
+        if topics.publish_pose:
+            self._poses.publish(_pose(stamp, topics.base_frame_id, position.tolist()))
+        self._delayed.append((now_s + topics.force_delay_s, stamp, reading.tolist()))
+        newest = None
+        while self._delayed and self._delayed[0][0] <= now_s:
+            newest = self._delayed.popleft()
+        if topics.publish_wrench and newest is not None:
+            measured = stamp if topics.stamp_when_sent else newest[1]
+            self._wrenches.publish(_wrench(measured, topics.tool_frame_id, newest[2]))
+        self._true_wrenches.publish(_wrench(stamp, topics.base_frame_id, true_n.tolist()))
         self._emulator.send(finger)
 
     def _report(self) -> DiagnosticReport:
