@@ -594,8 +594,8 @@ Run = Callable[[Experiment], ExperimentResult]
 
 # What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
 DECISIVE_OF_TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
-# Values with which a parameter of the evidence rule changes nothing: stored digests are older than the parameter.
-NEUTRAL = {'late_weight': 1.0}
+# Values with which a parameter of evidence rule or learner changes nothing: stored digests are older than it.
+NEUTRAL = {'late_weight': 1.0, 'passes': 1}
 OWN_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
 
 
@@ -629,12 +629,12 @@ def _decisive(definition: Mapping[str, Any]) -> dict[str, Any]:
             name: {key: value for key, value in part.items() if key != 'tare'}
             for name, part in decisive['inputs'].items()
         }
-    if 'evidence' in decisive:
-        decisive['evidence'] = {
-            rule: {key: value for key, value in params.items() if NEUTRAL.get(key) != value}
+    for section in {'evidence', 'learner'} & decisive.keys():
+        decisive[section] = {
+            chosen: {key: value for key, value in params.items() if NEUTRAL.get(key) != value}
             if isinstance(params, Mapping)
             else params
-            for rule, params in decisive['evidence'].items()
+            for chosen, params in decisive[section].items()
         }
     if 'training' in decisive:
         decisive['training'] = {
