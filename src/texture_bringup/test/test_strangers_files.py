@@ -44,7 +44,7 @@ from texture_estimation.roughness import (
     read_ratings,
     train_grades,
 )
-from texture_estimation.search import HalfScores, RecipeSpace, ScoreCache
+from texture_estimation.search import RecipeSpace, read_scores, write_scores
 from texture_estimation.training import train
 from texture_exploration.arms.hand import load_profile
 from texture_exploration.presets import load_preset
@@ -174,9 +174,7 @@ def make_vendor_csv(folder: Path) -> None:
 
 
 def make_checkpoint(folder: Path) -> None:
-    memory = ScoreCache({'seed': 1})
-    memory.store((1, 2), HalfScores(np.array([0.5]), np.array([0.25])))
-    memory.save(folder / 'good.json')
+    write_scores(folder / 'good.json', 'abc', {(1, 2): (0.5, 0.25)})
 
 
 def make_biotac(folder: Path) -> None:
@@ -322,9 +320,7 @@ READERS = {
     ),
     'vendor recording': Reader(make_vendor_csv, lambda folder: load_vendor_csv(folder / 'good.csv'), ('good.csv',)),
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
-    'checkpoint': Reader(
-        make_checkpoint, lambda folder: ScoreCache({'seed': 1}).load(folder / 'good.json') or True, ('good.json',)
-    ),
+    'checkpoint': Reader(make_checkpoint, lambda folder: read_scores(folder / 'good.json', 'abc'), ('good.json',)),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
     'NTP data set': Reader(make_ntp, read_import(import_ntp21), ('slides.npz',)),
     'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, TextureError
-from texture_estimation import search as recipe_files
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search import SearchParams, checkpoint_of
+from texture_estimation.search import SearchParams
+from texture_evaluation import optimise as recipe_files
 from texture_evaluation.evaluate import evaluate
-from texture_evaluation.optimise import Wanted, optimise_from_bags
+from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
 from texture_evaluation.train import train_from_bags
 
 SMALL = SearchParams(population=5, generations=2, halves=3)
@@ -39,16 +39,16 @@ def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: 
 def test_the_same_seed_writes_the_same_recipe_and_resuming_evaluates_nothing_again(
     simulated: Path, tmp_path: Path
 ) -> None:
-    texts, halves = [], []
+    texts, evaluated = [], []
     for name, resume in (('a', False), ('b', False), ('a', True)):
         out = tmp_path / f'{name}.yaml'
         optimise_from_bags(
             Wanted('ets-linear-svm', (str(simulated),)), SMALL, out,
-            resume=resume, tell=lambda _, generation: halves.append(generation.halves),
+            resume=resume, tell=lambda _, generation: evaluated.append(generation.evaluated),
         )  # fmt: skip
         texts.append(out.read_text())
     assert texts[0] == texts[1] == texts[2]
-    assert halves[-1] == 0 < halves[0]
+    assert evaluated[-1] == 0 < evaluated[0]
 
 
 def test_a_front_is_written_as_one_recipe_for_each_of_its_points(simulated: Path, tmp_path: Path) -> None:

@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import cycle
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import yaml
+
+from texture_core.config import writing
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.recipe import Recipe, load_recipe, with_channels
 from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe, read_grades
 from texture_estimation.search import (
     ClassificationTask,
     Cut,
+    Finalist,
     Generation,
+    HalfScore,
     LabelledWindows,
     PairSearchResult,
-    ParallelMap,
     RecipeSpace,
     RoughnessTask,
     SearchParams,
     SearchResult,
     SearchSlides,
-    Written,
-    checkpoint_of,
+    beside,
+    joined_recipe,
     optimise,
     optimise_pairs,
-    shipped_space,
-    threaded_map,
-    write_recipes,
-    written_checkpoints,
+    space_for,
 )
 from texture_evaluation.charts import COLOURS, chart, line_styles, pareto_front
 from texture_features.feature_set import FeatureSet
@@ -164,11 +165,10 @@ def optimise_from_bags(
     params: SearchParams,
     out: str | Path,
     *,
-    over: Callable[[], AbstractContextManager[ParallelMap]] = threaded_map,
     resume: bool = False,
     tell: Tell = lambda *_: None,
 ) -> Written:
-    """Tune a recipe and write it as `out`, with checkpoint and chart beside it.
+    """Tune a recipe and write it as `out`, with checkpoint and chart beside it; within `workers`, on several cores.
 
     Parameters
     ----------
@@ -178,8 +178,6 @@ def optimise_from_bags(
         Population, generations and so on.
     out
         Path of the recipe that is written, such as 'best.yaml'.
-    over
-        Gives what the work is spread over.
     resume
         Go on from the checkpoint beside `out`.
     tell
@@ -210,32 +208,30 @@ def optimise_from_bags(
     if resume and not written_checkpoints(target):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
-    found: SearchResult[Any] | PairSearchResult
-    with over() as parallel_map:
-        options['parallel_map'] = parallel_map
-        if wanted.per_pair:
-            found = optimise_pairs(
-                space, search_slides, params, tell=lambda pair, said: tell(' – '.join(pair), said), **options
-            )
-        else:
-            task: Any = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
-            found = optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
+    found: SearchResult | PairSearchResult
+    if wanted.per_pair:
+        found = optimise_pairs(
+            space, search_slides, params, tell=lambda pair, said: tell(' – '.join(pair), said), **options
+        )
+    else:
+        task = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
+        found = optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
     written = write_recipes(found, space.base, wanted.recipe, params, target)
     chart = _draw(found, wanted.recipe, params, target.with_suffix('.png'))
     return Written((*written.files, chart), written.lines)
 
 
-def _draw(found: SearchResult[Any] | PairSearchResult, recipe: str, params: SearchParams, chart: Path) -> Path:
+def _draw(found: SearchResult | PairSearchResult, recipe: str, params: SearchParams, chart: Path) -> Path:
     if isinstance(found, PairSearchResult):
-        histories = {' – '.join(pair): one.found.history for pair, one in found.by_pair.items()}
+        histories = {' – '.join(pair): one.history for pair, one in found.by_pair.items()}
         return convergence_chart(histories, f'{recipe}: a search for each pair', chart)
     if params.objective == 'front':
         points = [(one.searched.cost, one.fitness) for one in found.finalists]
         return search_front_chart({recipe: points}, f'{recipe}: accuracy and computing', chart)
-    return convergence_chart({recipe: found.found.history}, f'{recipe}: the search', chart)
+    return convergence_chart({recipe: found.history}, f'{recipe}: the search', chart)
 
 
-def _space(wanted: Wanted) -> RecipeSpace[Any]:
+def _space(wanted: Wanted) -> RecipeSpace:
     recipe: Recipe | RoughnessRecipe
     if wanted.grades:
         recipe = load_roughness_recipe(wanted.recipe)
@@ -243,4 +239,118 @@ def _space(wanted: Wanted) -> RecipeSpace[Any]:
     else:
         recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
         learner = recipe.learner_name
-    return RecipeSpace.load(wanted.search or shipped_space(recipe.name, learner, per_pair=wanted.per_pair), recipe)
+    of_pairs = space_for('pairs_of', recipe.name) if wanted.per_pair else None
+    name = wanted.search or of_pairs or space_for('recipes', recipe.name) or space_for('learners', learner)
+    if not name:
+        raise InvalidParameter(
+            f"recipe '{recipe.name}' has no search space of its own, nor has '{learner}'; "
+            'say with --search FILE what is to be varied'
+        )
+    return RecipeSpace.load(name, recipe)
+
+
+# --------------------
+# Recipes that a search has found, written as files that `texture train` reads.
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files that a search has written, and what it found in lines for people.
+
+    Examples
+    --------
+    >>> Written((checkpoint_of('best.yaml'),), ('nothing yet',)).files[0].name
+    'best.search.json'
+    """
+
+    files: tuple[Path, ...]
+    lines: tuple[str, ...]
+
+
+def checkpoint_of(out: str | Path) -> Path:
+    """Return where the scores of a search are kept: 'best.yaml' → 'best.search.json'."""
+    path = Path(out)
+    return path.with_name(f'{path.stem}.search.json')
+
+
+def written_checkpoints(out: str | Path) -> list[Path]:
+    """Return the checkpoint of a search that is there, or those of its pairs."""
+    path = checkpoint_of(out)
+    return [path] if path.is_file() else sorted(path.parent.glob(f'{path.stem}-*-vs-*{path.suffix}'))
+
+
+def write_recipes(
+    found: SearchResult | PairSearchResult, base: Any, tuned: str, params: SearchParams, target: Path
+) -> Written:
+    """Write the best recipe, with the others of a front beside it; of pairs, theirs and the one that joins them.
+
+    Where a recipe comes from and its scores stand at the top of its file.
+
+    Parameters
+    ----------
+    found
+        What was found.
+    base
+        Recipe from which the search began.
+    tuned
+        How it was named.
+    params
+        Parameters of the search.
+    target
+        Path of the recipe.
+
+    Returns
+    -------
+    Written
+        The files, with the checkpoint of a search that has one, and what was found.
+
+    Raises
+    ------
+    InvalidParameter
+        If a file cannot be written.
+    """
+    origin = (
+        f'Found by `texture optimise {tuned}`: {params.population} individuals, {params.generations} '
+        f'generations, {params.halves} halves, seed {params.seed}.'
+    )
+    files = _files(found, target, front=params.objective == 'front')
+    for path, finalist in files.items():
+        _write(finalist.recipe, path, origin, _scores(finalist))
+    written = Written(tuple(files), tuple(f'{path}: {_scores(finalist)}' for path, finalist in files.items()))
+    if isinstance(found, PairSearchResult):
+        return _with_joined(written, found, base, origin, target)
+    return Written((*written.files, checkpoint_of(target)), written.lines)
+
+
+def _with_joined(written: Written, pairs: PairSearchResult, base: Recipe, origin: str, target: Path) -> Written:
+    """Write the recipe that joins those of the pairs, or say why there is none."""
+    together = f'all pairs together, most pairs won: {_shares(pairs.scores)}'
+    try:
+        joined = joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
+    except InvalidParameter as error:
+        return Written(written.files, (*written.lines, together, f'no recipe of all pairs was written: {error}'))
+    _write(joined, target, origin, together)
+    return Written((target, *written.files), (*written.lines, f'{target}: {together}'))
+
+
+def _files(found: SearchResult | PairSearchResult, target: Path, *, front: bool) -> Mapping[Path, Finalist]:
+    if isinstance(found, PairSearchResult):
+        return {beside(target, pair): one.best for pair, one in found.by_pair.items()}
+    others = [one for one in found.finalists if front and one is not found.best]
+    numbered = {target.with_name(f'{target.stem}-{n}{target.suffix}'): one for n, one in enumerate(others, 2)}
+    return {target: found.best} | numbered
+
+
+def _write(recipe: Any, path: Path, origin: str, scores: str) -> None:
+    content = yaml.safe_dump(recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
+    with writing(path):
+        path.write_text(f'# {origin}\n# {scores}.\n{content}', encoding='utf-8')
+
+
+def _scores(finalist: Finalist) -> str:
+    return f'fitness {100 * finalist.fitness:.1f} %: {_shares(finalist.scores)} over {len(finalist.scores)} halves'
+
+
+def _shares(scores: Sequence[HalfScore]) -> str:
+    learning, test = 100.0 * np.mean(scores, axis=0)
+    return f'training {learning:.1f} %, tested {test:.1f} %'

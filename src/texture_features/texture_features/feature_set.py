@@ -354,7 +354,7 @@ class FeatureSet:
             )
         inputs = [event.windows[name] for name in self.window_names]
         motion: dict[str, Any] = {name: np.array(getattr(event, name)) for name in MOTION}
-        values = self._values(
+        values = self.values(
             [WindowBatch(item.samples, item.rate_hz, channels=item.channels, **motion) for item in inputs]
         )
         return self._vector(event, _layout(inputs), values)
@@ -403,11 +403,11 @@ class FeatureSet:
             )
             for name, item in zip(self.window_names, inputs, strict=True)
         ]
-        values = self._values(stacked)
+        values = self.values(stacked)
         layout = _layout(inputs)
         return [self._vector(event, layout, row) for event, row in zip(events, values, strict=True)]
 
-    def _values(self, inputs: Sequence[WindowBatch]) -> Array:
+    def values(self, inputs: Sequence[WindowBatch]) -> Array:
         """Return the values of windows, (..., n_values)."""
         flat = (*inputs[0].samples.shape[:-2], -1)
         by_name = dict(zip(self.window_names, inputs, strict=True))

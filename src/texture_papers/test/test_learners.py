@@ -407,6 +407,24 @@ def test_online_learning_may_stop_after_some_examples_of_each_label(make_example
     assert np.mean(PassiveAggressive.predictor(after_three)(examples.values).argmax(axis=1) == codes) > 0.9
 
 
+def test_more_passes_go_on_where_the_last_one_ended_and_fit_the_examples_better(make_examples):
+    examples = make_examples(spread=2.0)
+    codes, groups = codes_of(examples)
+    one, ten, fifty = (
+        PassiveAggressive(passes=passes).fit(examples.values, codes, groups).parameters for passes in (1, 10, 50)
+    )
+    online = OnlineLinearClassifier(np.zeros_like(one['planes']))
+    standard = (examples.values - one['mean']) / one['scale']
+    order = np.argsort([np.sum(codes[:row] == codes[row]) for row in range(len(codes))], kind='stable')
+    for row in [*order] * 10:
+        online.update(standard[row], int(codes[row]))
+    np.testing.assert_allclose(ten['planes'], online.planes, atol=1e-9)
+    right = [
+        np.mean(PassiveAggressive.predictor(each)(examples.values).argmax(axis=1) == codes) for each in (one, fifty)
+    ]
+    assert right[0] < right[1]
+
+
 @pytest.mark.parametrize('shape', [(50, 6), (5, 40)])
 def test_principal_components_are_orthonormal_and_explain_what_they_should(shape):
     values = np.random.default_rng(0).normal(size=shape) * np.geomspace(1.0, 0.01, shape[1])

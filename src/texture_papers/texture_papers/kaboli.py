@@ -347,6 +347,7 @@ class PassiveAggressive:
     """A plane for each label, moved by each example that is not at a distance from where it would be mistaken.
 
     The examples are taken in rounds: the first of each label, then the second of each, and so on. Their order matters.
+    One pass is online learning: each example is seen once.
 
     Source: Crammer et al. 2006, PA-I: section 4 (one label against the others), section 8 (all labels together);
     Kaboli et al. 2015, section V.B.
@@ -370,6 +371,12 @@ class PassiveAggressive:
         choices=('one_vs_rest', 'crammer_singer'),
     )
     rounds: int = param(0, 'Sets the number of examples of each label to train on; 0 takes all.', low=0)
+    passes: int = param(
+        1,
+        'Sets how often all examples are gone through; more passes fit them more closely. The paper names no number.',
+        low=1,
+        high=10_000,
+    )
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features) and label numbers `y` 0… (n,) in the order given."""
@@ -378,7 +385,7 @@ class PassiveAggressive:
         mean, scale = standardisation(X[order])
         classifier = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')
         online = classifier(np.zeros((int(y.max()) + 1, X.shape[1] + 1)), self.c)
-        for row in order:
+        for row in np.tile(order, self.passes):
             online.update((X[row] - mean) / scale, int(y[row]))
         return Fitted(
             {'mean': mean, 'scale': scale, 'planes': online.planes}, None, 'not calibrated: distances from the planes'

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 import numpy as np
 import yaml
@@ -33,18 +33,16 @@ from texture_estimation.search import (
     UNDECIDED,
     ArrayStream,
     ClassificationTask,
-    FeatureCache,
-    R,
     RecipeSpace,
+    RoughnessTask,
     SearchParams,
     SearchResult,
     SearchSlides,
-    SearchTask,
     SlideArrays,
     decided_by_slide,
     optimise,
     space_for,
-    threaded_map,
+    workers,
 )
 from texture_features.feature_set import FeatureSet, InputFeatures
 from texture_features.windows import SEPARATOR, Stretched, axis_along
@@ -596,8 +594,8 @@ Run = Callable[[Experiment], ExperimentResult]
 
 # What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
 DECISIVE_OF_TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
-# Values with which a parameter of the evidence rule changes nothing: stored digests are older than the parameter.
-NEUTRAL = {'late_weight': 1.0}
+# Values with which a parameter of evidence rule or learner changes nothing: stored digests are older than it.
+NEUTRAL = {'late_weight': 1.0, 'passes': 1}
 OWN_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
 
 
@@ -631,12 +629,12 @@ def _decisive(definition: Mapping[str, Any]) -> dict[str, Any]:
             name: {key: value for key, value in part.items() if key != 'tare'}
             for name, part in decisive['inputs'].items()
         }
-    if 'evidence' in decisive:
-        decisive['evidence'] = {
-            rule: {key: value for key, value in params.items() if NEUTRAL.get(key) != value}
+    for section in {'evidence', 'learner'} & decisive.keys():
+        decisive[section] = {
+            chosen: {key: value for key, value in params.items() if NEUTRAL.get(key) != value}
             if isinstance(params, Mapping)
             else params
-            for rule, params in decisive['evidence'].items()
+            for chosen, params in decisive[section].items()
         }
     if 'training' in decisive:
         decisive['training'] = {
@@ -650,31 +648,31 @@ QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)
 
 
 @dataclass(frozen=True, eq=False)
-class TunedRecipe(Generic[R]):
+class TunedRecipe:
     """A recipe that was searched for, and what it took."""
 
-    found: SearchResult[R]
+    found: SearchResult
     seconds: float
     cpu_seconds: float
     scans: int
 
     @property
-    def recipe(self) -> R:
+    def recipe(self) -> Any:
         """The best."""
         return self.found.best.recipe
 
     def figures(self) -> dict[str, Any]:
         """Return what the search took and how good it thinks the best is."""
-        record, history = self.found.best.record, self.found.found.history
+        learning, test = np.mean(self.found.best.scores, axis=0).tolist()
+        history = self.found.history
         return {
             'seconds': round(self.seconds, 1),
             'cpu_seconds': round(self.cpu_seconds, 1),  # of all cores: what a busy machine would have needed alone
             'scans': self.scans,
             'generations': len(history),
-            'individuals_tried': history[-1].evaluated,
-            'halves_evaluated': history[-1].halves,
-            'learning': float(record.learning.mean()),
-            'test': float(record.test.mean()),
+            'individuals_tried': history[-1].tried,
+            'learning': learning,
+            'test': test,
         }
 
     def write(self, path: Path) -> Path:
@@ -694,7 +692,9 @@ class TunedRecipe(Generic[R]):
         return path
 
 
-def tune(space: RecipeSpace[R], scans: SlideArrays, task: SearchTask[R], seed: int, *, quick: bool) -> TunedRecipe[R]:
+def tune(
+    space: RecipeSpace, scans: SlideArrays, task: ClassificationTask | RoughnessTask, seed: int, *, quick: bool
+) -> TunedRecipe:
     """Return the best recipe of a space on these scans, and what it took to find it.
 
     Parameters
@@ -716,8 +716,8 @@ def tune(space: RecipeSpace[R], scans: SlideArrays, task: SearchTask[R], seed: i
     """
     params = replace(QUICK if quick else FULL, seed=seed)
     began, cpu_began = time.perf_counter(), time.process_time()
-    with threaded_map() as parallel_map:
-        found = optimise(space, SearchSlides(scans, params.halves, seed), params, task, parallel_map=parallel_map)
+    with workers():
+        found = optimise(space, SearchSlides(scans, params.halves, seed), params, task)
     return TunedRecipe(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))
 
 
@@ -749,18 +749,14 @@ class Slides:
     axes: tuple[str, ...] = ()
 
     @cached_property
-    def _caches(self) -> tuple[FeatureCache, ...]:
-        return tuple(FeatureCache(view) for view in self.views)
-
-    @cached_property
-    def _along_axes(self) -> FeatureCache:
-        """Features of inputs with an axis, 'signal@x': the streams of the view along it."""
+    def _along_axes(self) -> SlideArrays:
+        """Inputs with an axis, 'signal@x': the streams of the view along it."""
         streams = {
             f'{topic}{SEPARATOR}{axis}': stream
             for axis, view in zip(self.axes, self.views, strict=True)
             for topic, stream in view.streams.items()
         }
-        return FeatureCache(replace(self.views[0], streams=streams, _known={}))
+        return replace(self.views[0], streams=streams, _known={})
 
     def extract(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[Array, Codes]:
         """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,).
@@ -782,8 +778,8 @@ class Slides:
             Number of the slide of each.
         """
         joins = feature_set.window_names != feature_set.topics
-        chosen = [self._along_axes] if joins else [self._caches[n] for n in views or range(len(self.views))]
-        values = np.concatenate([cache.values(feature_set) for cache in chosen], axis=1)
+        chosen = [self._along_axes] if joins else [self.views[n] for n in views or range(len(self.views))]
+        values = np.concatenate([view(feature_set.windows).values(feature_set) for view in chosen], axis=1)
         return values, self.views[0](feature_set.windows).slides
 
 
@@ -870,7 +866,7 @@ def _shaped(scene: Scene, surface: str, radius_m: float) -> Scene:
 
 FAST, SLOW = 'signal', 'signal_static'
 OUR_RECIPES = ('default', 'vibration-and-taxels')
-TunedRecipes = Mapping[tuple[str, str], TunedRecipe[Recipe]]  # by task and recipe
+TunedRecipes = Mapping[tuple[str, str], TunedRecipe]  # by task and recipe
 NONE: TunedRecipes = {}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -14,18 +14,13 @@ from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, standardisation
 from texture_estimation.roughness import REGRESSOR_GRADES as GRADES
 from texture_estimation.roughness import ROUGH, SMOOTH
-from texture_estimation.search import GradesOfHalf, Mask, of_machines, of_networks
+from texture_estimation.search import of_machines, of_networks
 from texture_papers.roberge import (
     LINEAR,
     SIGMOID,
-    SURROGATE_CACHE_MB,
-    TOLERANCE,
     TRANSFERS,
     Network,
-    SurrogateNetworks,
     fit_network,
-    kernel_of,
-    sample_rows,
 )
 
 
@@ -165,66 +160,6 @@ def _held_out(textures: Codes) -> Any:
     return held
 
 
-# Examples of each texture that a network is trained on.
-EXAMPLES_OF_TEXTURE = 16
-
-
-def ann1_surrogate(regressor: Ann1, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-    """Return a scorer of one half split by one network whose output is the grade."""
-    return _networks_surrogate(regressor, X, y[None], groups, lambda outputs: np.clip(outputs[:, 0], SMOOTH, ROUGH))
-
-
-def ann5_surrogate(regressor: Ann5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-    """Return a scorer of one half split by a network for each grade."""
-    wanted = grade_membership(y).T.astype(np.float64)
-    return _networks_surrogate(regressor, X, wanted, groups, lambda outputs: mean_of_votes(outputs >= VOTE_THRESHOLD))
-
-
-def _networks_surrogate(
-    regressor: Ann1 | Ann5, values: Array, targets: Array, groups: Codes, grade: Callable[[Array], Array]
-) -> GradesOfHalf:
-    mean, scale = standardisation(values)
-    standard = np.ascontiguousarray((values - mean) / scale)
-
-    def graded(training: Mask) -> Array:
-        rng = np.random.default_rng(regressor.seed)
-        rows = sample_rows(groups, training, EXAMPLES_OF_TEXTURE, rng).ravel()
-        networks = SurrogateNetworks.fitted(
-            standard[None, rows], targets[:, rows], regressor.hidden, rng, regressor.transfer
-        )
-        return grade(networks.outputs(standard))
-
-    return graded
-
-
-def svm5_surrogate(regressor: Svm5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-    """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`."""
-    from sklearn.svm import SVC  # noqa: PLC0415  # takes a second
-
-    kernel = kernel_of(X, regressor.kernel_scale)
-    members = grade_membership(y).T
-
-    def graded(training: Mask) -> Array:
-        rows = np.flatnonzero(training)
-        known = kernel.take(rows, axis=0)
-        among_known = known.take(rows, axis=1).astype(np.float64)
-        weights = np.zeros((len(rows), len(members)), dtype=np.float32)
-        # A grade that no texture has never fires.
-        offsets = np.full(len(members), -1.0, dtype=np.float32)
-        for number, member in enumerate(members[:, rows]):
-            if member.all():
-                offsets[number] = 1.0
-            elif member.any():
-                svc = SVC(C=regressor.c, kernel='precomputed', tol=TOLERANCE, cache_size=SURROGATE_CACHE_MB).fit(
-                    among_known, member
-                )
-                weights[svc.support_, number] = svc.dual_coef_[0]
-                offsets[number] = svc.intercept_[0]
-        return mean_of_votes(known.T @ weights + offsets > 0)
-
-    return graded
-
-
 @dataclass(frozen=True)
 class Ann1:
     """A network with a hidden layer and one linear output, the grade.
@@ -268,10 +203,6 @@ class Ann1:
     def predictor(parameters: Mapping[str, Any]) -> NetworkRegressorPredictor:
         """Return the predictor made from the stored parameters."""
         return NetworkRegressorPredictor(RegressionNetworks(**parameters))
-
-    def surrogate(self, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-        """Return what stands for the regressor in a search."""
-        return ann1_surrogate(self, X, y, groups)
 
     def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
         """Return what a window costs."""
@@ -335,10 +266,6 @@ class Ann5:
     def predictor(parameters: Mapping[str, Any]) -> VotingNetworksPredictor:
         """Return the predictor made from the stored parameters."""
         return VotingNetworksPredictor(RegressionNetworks(**parameters))
-
-    def surrogate(self, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-        """Return what stands for the regressor in a search."""
-        return ann5_surrogate(self, X, y, groups)
 
     def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
         """Return what a window costs."""
@@ -416,10 +343,6 @@ class Svm5:
     def predictor(parameters: Mapping[str, Any]) -> VotingSvmsPredictor:
         """Return the predictor made from the stored parameters."""
         return VotingSvmsPredictor(**parameters)
-
-    def surrogate(self, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-        """Return what stands for the regressor in a search."""
-        return svm5_surrogate(self, X, y, groups)
 
     def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
         """Return what a window costs."""

@@ -262,7 +262,7 @@ class Setup:
 TARGET_S = 15 * 60.0
 
 
-class TunedRegressor(TunedRecipe[RoughnessRecipe]):
+class TunedRegressor(TunedRecipe):
     """A recipe of a regressor that was searched for, and what it took."""
 
     def figures(self) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 from texture_core.cli import add_channels, add_dask, add_seed, add_slides
 from texture_core.config import from_mapping
-from texture_estimation.search import OBJECTIVES, Generation, SearchParams, checkpoint_of, parallel_map_for
-from texture_evaluation.optimise import Wanted, optimise_from_bags
+from texture_estimation.search import OBJECTIVES, Generation, SearchParams, workers
+from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
 
 BAR = 20  # letters
 
@@ -30,7 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--population', type=int, default=usual.population, metavar='N', help='of a generation')
     parser.add_argument('--generations', type=int, default=usual.generations, metavar='N', help='the first included')
     parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random splits evaluated on')
-    parser.add_argument('--all-halves', action='store_true', help='evaluate each individual on all, however bad it is')
+    parser.add_argument('--all-halves', action='store_true', help='evaluate every individual on all, not only the best')
     parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
     add_dask(parser)
     parser.add_argument('--resume', action='store_true', help='go on from the checkpoint beside FILE')
@@ -44,17 +44,13 @@ def run(options: argparse.Namespace) -> int:
     given = {name: getattr(options, name) for name in ('recipe', 'search', 'slides', 'grades', 'per_pair')}
     wanted = Wanted(bags=tuple(options.bags), channels=options.channels or 'all', **given)
     chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed', 'objective')}
-    params = from_mapping(SearchParams, {**chosen, 'race': not options.all_halves}, 'texture optimise')
+    if options.all_halves:
+        chosen['search_halves'] = options.halves
+    params = from_mapping(SearchParams, chosen, 'texture optimise')
     progress = Progress()
     try:
-        written = optimise_from_bags(
-            wanted,
-            params,
-            options.out,
-            over=parallel_map_for(options.jobs, options.dask),
-            resume=options.resume,
-            tell=progress.tell,
-        )
+        with workers(options.jobs, options.dask):
+            written = optimise_from_bags(wanted, params, options.out, resume=options.resume, tell=progress.tell)
     except KeyboardInterrupt:
         progress.end()
         print(f"scores are kept in '{checkpoint_of(options.out)}': go on with --resume", file=sys.stderr)
@@ -105,6 +101,5 @@ def bar(generation: Generation, taken_s: float, pair: str = '') -> str:
     done = BAR * generation.number // generation.of
     return (
         f'{pair}{": " if pair else ""}[{"#" * done}{"." * (BAR - done)}] {generation.number}/{generation.of}  '
-        f'best {100 * generation.best.fitness:.2f} %  {generation.evaluated} tried, '
-        f'{generation.cache_hits} remembered, {generation.halves} halves  {taken_s:.0f} s'
+        f'best {100 * generation.best.fitness:.2f} %  {generation.tried} tried  {taken_s:.0f} s'
     )
