@@ -1,4 +1,4 @@
-"""The golden set: what every recipe says of fixed slides, so that a change of the structure changes no number.
+"""The golden set: what recipes say of fixed slides and arms are sent, so that a change of the structure changes none.
 
 `python tools/golden.py --check` computes all rows anew and compares them with `golden.json`; `--write` stores them.
 `--only WORD` takes the rows whose name contains the word, in both uses. A row is a recipe on a source of slides: a
@@ -7,6 +7,9 @@ it is absent). It holds digests of features, log-probabilities of the first wind
 final estimate of slides that were not trained. What is learnt is seen through these answers alone, as learners will be
 replaced: a recipe whose pairs only vote, such as ets-linear-svm, shows a change once a vote changes.
 
+A row 'arms: NAME' holds the phases of one exploration and what was sent to the arm or hand, thinned; where only real
+time exists, the kinds of commands on the wire.
+
 A difference is explained or mended, never re-recorded in silence: the commit that writes `golden.json` again says which
 rows changed, and why.
 """
@@ -14,13 +17,15 @@ rows changed, and why.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import math
 import os
+import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -28,13 +33,23 @@ from typing import Any
 
 import numpy as np
 
+from texture_core.types import ExplorationRequest
+
 # All that the golden set knows of the suite: after a move only these lines change.
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import RoughnessAccumulator, load_roughness_recipe, read_grades, train_grades
 from texture_estimation.training import train
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import training_examples
+from texture_exploration.arms.hand import SimulatedHand
+from texture_exploration.arms.in_hand import InHandArm, InHandParams
+from texture_exploration.arms.rails import RailsArm, RailsParams
+from texture_exploration.arms.simulated import SimulatedArm
+from texture_exploration.explorer import Explorer
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
 from texture_recordings.dataset import SlideDataset
+from texture_simulation.devices import dynamixel, rails
 from texture_simulation.offline import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -197,7 +212,8 @@ def _tolerance(where: str) -> float:
 
 def rows(only: str = '') -> dict[str, Any]:
     """Return all rows, or those whose name contains a word; without those of absent data."""
-    found: dict[str, Any] = {}
+    arms = {name: explore for name, explore in ARMS.items() if only in name and arm_available(name)}
+    found: dict[str, Any] = {name: explore(Recording()) for name, explore in arms.items()}
     for name, source in SOURCES.items():
         recipes = [recipe for recipe in _recipes(source) if only in f'{recipe} on {name}']
         if not recipes or not available(source):
@@ -324,11 +340,170 @@ def _graded(name: str, bags: Sequence[Path]) -> dict[str, Any]:
     return {'feature_set': model.feature_set, 'features': len(model.names), 'slides': said}
 
 
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=2.0, distance_m=0.03)
+RUB = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, duration_s=1.5)
+SHOWN_COMMANDS, SHOWN_CHANGE = 60, 5e-4  # m/s, N
+PATIENCE_S = 40.0
+sys.path.append(str(ROOT / 'src' / 'texture_exploration' / 'test'))  # whose tests step arms, and time, by hand
+
+
+class Recording:
+    """What was sent during one exploration, and how much of it when each phase began."""
+
+    def __init__(self) -> None:
+        self.sent: list[Any] = []
+        self.phases: list[list[Any]] = []
+
+    def note(self, state: Any) -> None:
+        """Take a state of the exploration."""
+        if not self.phases or self.phases[-1][0] != state.phase.value:
+            self.phases.append([state.phase.value, len(self.sent)])
+
+    def listen(self, owner: Any, method: str, row: Callable[..., Any]) -> None:
+        """Note each call of a method, as `row` shows it."""
+        call = getattr(owner, method)
+        setattr(owner, method, lambda *given: (self.sent.append(row(*given)), call(*given))[1])
+
+    def stepped(self, arm: Any, clock: Callable[[], int], pace: Callable[[], None]) -> dict[str, Any]:
+        """Explore in simulated time; return phases and thinned commands."""
+        explorer = Explorer(arm, TouchParams(), SafetyLimits(approach_timeout_s=30.0), self.note, clock)
+        outcome = explorer._prepare('golden', SLIDE if not isinstance(arm, InHandArm) else RUB).run(pace)
+        changes, newest = [], {}
+        for index, row in enumerate(self.sent):
+            kind = row[0] if isinstance(row[0], str) else ''
+            if kind not in newest or _changes(newest[kind], row):
+                newest[kind] = row
+                changes.append([index, row])
+        shown = np.linspace(0, len(changes) - 1, min(SHOWN_COMMANDS, len(changes))).round().astype(int)
+        return {
+            'outcome': [outcome.success, outcome.message],
+            'phases': self.phases,
+            'sent': rounded([changes[index] for index in shown]),
+        }
+
+    def in_real_time(self, arm: Any, request: ExplorationRequest) -> dict[str, Any]:
+        """Explore against the clock; return the phases, and the kinds of what was sent in the order they began."""
+        # How well the arm follows is no matter here, and depends on how busy the machine is.
+        touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.3, peak_speed_share=3.0, peak_force_share=3.0)
+        explorer = Explorer(arm, touch, SafetyLimits(state_timeout_s=1.0), self.note)
+        try:
+            explorer.connect()
+            exploration = explorer.begin('golden', request)
+            assert exploration.ended.wait(PATIENCE_S)
+        finally:
+            explorer.close()
+        return {
+            'outcome': [exploration.outcome.success, exploration.outcome.message],
+            'phases': [phase for phase, _ in self.phases],
+            'kinds': list(dict.fromkeys(self.sent)),
+        }
+
+
+def _changes(before: Sequence[Any], row: Sequence[Any]) -> bool:
+    """Return whether a command is more than the noise of force control away from the one shown before it."""
+    pairs = [(a, b) for a, b in zip(before, row, strict=True) if a != b]
+    return any(None in pair or abs(pair[0] - pair[1]) > SHOWN_CHANGE for pair in pairs)
+
+
+def _command(command: Any) -> list[Any]:
+    return [*command.tangential_m_s, command.normal_m_s, command.force_n]
+
+
+class _Clock:
+    """Time of simulated fingers: it passes by steps."""
+
+    now_ns = 1_000_000_000
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+    def pace(self, device: Any) -> None:
+        for _ in range(2):
+            self.now_ns += 5_000_000
+            device.step(0.005)
+
+
+def _simulated(recording: Recording) -> dict[str, Any]:
+    clock = _Clock()
+    arm = SimulatedArm(clock=clock, own_thread=False)
+    recording.listen(arm, 'command', _command)
+    return recording.stepped(arm, clock, lambda: clock.pace(arm))
+
+
+def _hand(recording: Recording) -> dict[str, Any]:
+    clock = _Clock()
+    hand = SimulatedHand(clock, own_thread=False)
+    grip = hand.grip
+    hand.grip = lambda forces_n: (grip(forces_n), [clock.pace(hand) for _ in range(100)])  # before it is looked at
+    recording.listen(hand, 'grip', lambda forces_n: ['grip', *forces_n.values()])
+    recording.listen(hand.fingers['index'], 'command', _command)
+    return recording.stepped(InHandArm(InHandParams(), hand), clock, lambda: clock.pace(hand))
+
+
+def _ros_controllers(recording: Recording) -> dict[str, Any]:
+    harness = importlib.import_module('test_ros_controllers')
+    robot = harness.Robot(harness.TwistControllerParams(jitter_s=0.0))
+    recording.listen(robot, 'send_velocity', list)
+    return recording.stepped(robot.driven, lambda: robot.now_ns, lambda: robot.pass_time(0.01))
+
+
+def _ur(recording: Recording) -> dict[str, Any]:
+    link = importlib.import_module('test_ur_command_stream').SteppedLink(recording.sent)
+    return recording.stepped(link.arm, lambda: link.now_ns, link.pace)
+
+
+def _rails(recording: Recording) -> dict[str, Any]:
+    def kind(order: int, body: bytes) -> str:
+        if order != 0xA0:
+            return {0xA1: 'stop', 0xA2: 'clear'}[order]
+        vx, vy, mode, value = struct.unpack('<iiBi', body)
+        return ('hold', 'rise' if value > 0 else 'fall', 'press')[mode] + (' and slide' if vx or vy else '')
+
+    with tempfile.TemporaryDirectory() as folder, rails.EmulatedRails(Path(folder) / 'rails') as device:
+        recording.listen(device.firmware, '_execute', kind)
+        return recording.in_real_time(RailsArm(RailsParams(device=str(device.port.link))), SLIDE)
+
+
+def _dynamixel(recording: Recording) -> dict[str, Any]:
+    goals = {address for places in dynamixel.GOALS for address in places}
+
+    def kind(motor: int, instruction: int, params: bytes) -> str:
+        name = {1: 'ping', 2: 'read', 3: 'write', 8: 'reboot', 0x82: 'read of all', 0x83: 'write of all'}[instruction]
+        address = int.from_bytes(params[:2], 'little')
+        value = f' = {int.from_bytes(params[2:], "little")}' if instruction == 3 and address not in goals else ''
+        return f'{name} {address}{value}' if params else name
+
+    motors = dynamixel.leap_hand()
+    with tempfile.TemporaryDirectory() as folder, dynamixel.EmulatedDynamixelBus(Path(folder) / 'bus', motors) as bus:
+        recording.listen(bus, '_execute', kind)
+        params = InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=20.0)
+        return recording.in_real_time(InHandArm(params), RUB)
+
+
+ARMS: Mapping[str, Callable[[Recording], dict[str, Any]]] = {
+    'arms: simulated': _simulated,
+    'arms: ur': _ur,
+    'arms: ros_controllers': _ros_controllers,
+    'arms: hand': _hand,
+    'arms: rails': _rails,
+    'arms: dynamixel': _dynamixel,
+}
+REAL_TIME = ('arms: rails', 'arms: dynamixel')
+
+
+def arm_available(name: str) -> bool:
+    """Return whether what an arm is driven with is installed."""
+    return name != 'arms: dynamixel' or importlib.util.find_spec('dynamixel_sdk') is not None
+
+
 def _expected(only: str) -> dict[str, Any]:
     """Return the stored rows that can be computed here."""
     stored: dict[str, Any] = json.loads(STORED.read_text())
     absent = {name for name, source in SOURCES.items() if not available(source)}
-    return {name: row for name, row in stored.items() if only in name and name.partition(' on ')[2] not in absent}
+    absent |= {name for name in ARMS if not arm_available(name)}
+    return {
+        name: row for name, row in stored.items() if only in name and not {name, name.partition(' on ')[2]} & absent
+    }
 
 
 def check(only: str = '', strict: bool = False) -> list[str]:

@@ -8,9 +8,9 @@ import golden
 import pytest
 
 
-def test_every_recipe_is_in_the_golden_set() -> None:
+def test_every_recipe_and_arm_is_in_the_golden_set() -> None:
     stored = {row.partition(' on ')[0] for row in json.loads(golden.STORED.read_text())}
-    assert stored == set(golden.every_recipe())
+    assert stored == {*golden.every_recipe(), *golden.ARMS}
 
 
 @pytest.mark.parametrize('source', golden.SOURCES)
@@ -18,6 +18,15 @@ def test_the_recipes_say_what_they_said(source: str) -> None:
     if not golden.available(golden.SOURCES[source]):
         pytest.skip(f'no recorded data in {golden.DATA}; set TEXTURE_DATA to its folder')
     assert golden.check(f' on {source}') == []
+
+
+@pytest.mark.parametrize(
+    'arm', [pytest.param(arm, marks=pytest.mark.realtime if arm in golden.REAL_TIME else ()) for arm in golden.ARMS]
+)
+def test_the_arms_and_hands_are_sent_what_they_were_sent(arm: str) -> None:
+    if not golden.arm_available(arm):
+        pytest.skip('dynamixel-sdk is missing')
+    assert golden.check(arm) == []
 
 
 def test_a_number_that_differs_beyond_rounding_is_named() -> None:
