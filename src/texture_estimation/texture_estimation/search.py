@@ -20,14 +20,6 @@ import numpy as np
 import yaml
 from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
-from pymoo.algorithms.moo.nsga2 import NSGA2
-from pymoo.algorithms.soo.nonconvex.ga import GA
-from pymoo.config import Config
-from pymoo.core.problem import Problem
-from pymoo.core.repair import Repair
-from pymoo.core.termination import NoTermination
-from pymoo.operators.crossover.sbx import SBX
-from pymoo.operators.mutation.pm import PM
 from scipy.stats import t as student_t
 from threadpoolctl import threadpool_limits
 
@@ -35,6 +27,7 @@ from texture_core.config import (
     MB,
     find,
     find_file,
+    library,
     load_json,
     load_yaml,
     param,
@@ -517,7 +510,7 @@ def dask_backend(address: str) -> Iterator[None]:
     InvalidParameter
         If no scheduler answers there.
     """
-    from distributed import Client, LocalCluster  # noqa: PLC0415  # takes a second
+    cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
 
     if address.startswith(LOCAL):
         workers = address.removeprefix(LOCAL)
@@ -525,17 +518,13 @@ def dask_backend(address: str) -> Iterator[None]:
             raise InvalidParameter(
                 f"the local cluster has '{workers}' workers; 1 to {MAX_LOCAL_WORKERS} are allowed, such as '{LOCAL}2'"
             )
-        cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=int(workers), threads_per_worker=1, dashboard_address=None
-        )
+        cluster: Any = cluster_of.LocalCluster(n_workers=int(workers), threads_per_worker=1, dashboard_address=None)
         with cluster, dask_backend(cluster.scheduler_address):
             yield
         return
 
     try:
-        client: Any = Client(  # type: ignore[no-untyped-call]
-            address, timeout=ANSWER_S, set_as_default=False
-        )
+        client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise InvalidParameter(
@@ -1848,30 +1837,6 @@ def _check_range(low: float, high: float) -> None:
 # Crossover and mutation reach this far: low indices make wide steps, which variables of few values need.
 WIDTH_INDEX = 3.0
 CROSSOVER_SHARE = 0.9
-ALGORITHMS = {1: GA, 2: NSGA2}
-
-# Its compiled parts would save nothing here, and it prints a notice of their lack.
-Config.warnings['not_compiled'] = False
-
-
-class Snap(Repair):  # type: ignore[misc]
-    """Bring points to the middles of their cells, so that equal individuals are known as such.
-
-    Examples
-    --------
-    >>> from pymoo.core.population import Population
-    >>> from texture_estimation.search import Integer
-    >>> space = SearchSpace({'bands': Integer(1, 2)})
-    >>> Snap(space).do(None, Population.new(X=np.array([[0.1], [0.4]]))).get('X').tolist()  # both mean 1 band
-    [[0.25], [0.25]]
-    """
-
-    def __init__(self, space: SearchSpace) -> None:
-        super().__init__()
-        self._space = space
-
-    def _do(self, problem: Any, points: Array, **_: Any) -> Array:
-        return self._space.snap(points)
 
 
 def algorithm_for(
@@ -1897,13 +1862,31 @@ def algorithm_for(
     pymoo's Algorithm
         Set up, before its first generation.
     """
+    library('pymoo', 'searches', 'search')
+    from pymoo.algorithms.moo.nsga2 import NSGA2  # noqa: PLC0415
+    from pymoo.algorithms.soo.nonconvex.ga import GA  # noqa: PLC0415
+    from pymoo.config import Config  # noqa: PLC0415
+    from pymoo.core.problem import Problem  # noqa: PLC0415
+    from pymoo.core.repair import Repair  # noqa: PLC0415
+    from pymoo.core.termination import NoTermination  # noqa: PLC0415
+    from pymoo.operators.crossover.sbx import SBX  # noqa: PLC0415
+    from pymoo.operators.mutation.pm import PM  # noqa: PLC0415
+
+    class Snap(Repair):  # type: ignore[misc]
+        """Bring points to the middles of their cells, so that equal individuals are known as such."""
+
+        def _do(self, problem: Any, points: Array, **_: Any) -> Array:
+            return space.snap(points)
+
+    # Its compiled parts would save nothing here, and it prints a notice of their lack.
+    Config.warnings['not_compiled'] = False
     problem = Problem(n_var=len(space.names), n_obj=n_objectives, xl=0.0, xu=1.0)
-    algorithm = ALGORITHMS[n_objectives](
+    algorithm = (GA, NSGA2)[n_objectives - 1](
         pop_size=population,
         sampling=_first_points(space, population, seed, start),
         crossover=SBX(eta=WIDTH_INDEX, prob=CROSSOVER_SHARE),
         mutation=PM(eta=WIDTH_INDEX),
-        repair=Snap(space),
+        repair=Snap(),
         eliminate_duplicates=True,
     )
     algorithm.setup(problem, termination=NoTermination(), seed=seed)
