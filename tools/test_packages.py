@@ -35,7 +35,7 @@ KEYS = {
     'sklearn': 'python3-sklearn',
     'yaml': 'python3-yaml',
 }
-# No distribution package has these, and rosdep no key: each is an extra of the package that uses it, or of tests alone.
+# No distribution package has these, and rosdep no key: each is an extra of the package that uses it.
 EXTRAS = {
     'distributed': 'distributed',
     'pyarrow': 'pyarrow',
@@ -50,7 +50,6 @@ EXTRAS = {
     'rtde_receive': 'ur-rtde',
     'dashboard_client': 'ur-rtde',
 }
-TEST_TOOLS = {'playwright', 'pywt'}
 # What comes with Python, or with scikit-learn.
 OTHERS = {'compression', 'threadpoolctl'}
 # What refuses to be imported without rosbags, in these packages: all that reads or writes bags. The rest of what is
@@ -178,7 +177,7 @@ def depends(package: Path, *tags: str) -> set[str]:
 
 
 def keys(modules: set[str]) -> set[str]:
-    return {KEYS.get(name, name) for name in modules - set(EXTRAS) - TEST_TOOLS - OTHERS}
+    return {KEYS.get(name, name) for name in modules - set(EXTRAS) - OTHERS}
 
 
 def outside(package: str, modules: set[str], allowed: frozenset[str]) -> set[str]:
@@ -218,7 +217,7 @@ def test_a_manifest_names_the_extras_that_its_package_imports(package: Path) -> 
 def test_what_is_deployed_runs_without_extras_or_says_in_one_sentence_which_it_needs(package: Path) -> None:
     files = sorted((package / package.name).rglob('*.py'))
     modules = ['.'.join(path.relative_to(package).with_suffix('').parts).removesuffix('.__init__') for path in files]
-    command = [sys.executable, '-c', WITHOUT_EXTRAS, ' '.join([*EXTRAS, *TEST_TOOLS, 'h5py']), *modules]
+    command = [sys.executable, '-c', WITHOUT_EXTRAS, ' '.join([*EXTRAS, 'h5py']), *modules]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     said = set(done.stdout.splitlines())

@@ -100,8 +100,8 @@ def checked_distribution(sourced: str) -> str:
     """Return the name of the sourced distribution, or ''; SetupError if the suite is not made for it."""
     if sourced not in ('', *DISTRIBUTIONS):
         raise SetupError(
-            f"ROS 2 '{sourced}' is sourced in this shell, and the suite is made for {' and '.join(DISTRIBUTIONS)}; open "
-            f'a shell without it, or source /opt/ros/{DISTRIBUTIONS[0]}/setup.bash instead'
+            f"ROS 2 '{sourced}' is sourced in this shell, and the suite is made for {' and '.join(DISTRIBUTIONS)}; "
+            f'open a shell without it, or source /opt/ros/{DISTRIBUTIONS[0]}/setup.bash instead'
         )
     return sourced
 

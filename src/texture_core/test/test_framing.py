@@ -1,5 +1,6 @@
 from binascii import crc_hqx
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

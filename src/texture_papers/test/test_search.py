@@ -1,7 +1,6 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import distributed
 import numpy as np
 import pytest
 from sklearn.metrics.pairwise import rbf_kernel
@@ -40,6 +39,8 @@ from texture_estimation.search import (
 )
 from texture_features.windows import CutWindow
 from texture_papers.roberge import AnnPairs, SvmPairs, ann_pairs_surrogate, kernel_of, svm_pairs_surrogate
+
+distributed = pytest.importorskip('distributed')
 
 SMALL = SearchParams(population=6, generations=3, halves=4)
 

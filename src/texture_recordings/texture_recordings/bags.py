@@ -33,6 +33,7 @@ from texture_core.types import (
 )
 
 try:
+    import apsw
     from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
     from rosbags.rosbag2 import (
         CompressionFormat,
