@@ -1,4 +1,5 @@
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
+# `make setup PYTHON=python3.12` makes the environment of that Python; later calls keep it, whatever python3 is.
 PYTHON ?= python3
 RUN := .venv/bin/ros-run
 # Compiled modules are kept, whatever the environment says: the tests start a thousand processes.
@@ -19,7 +20,7 @@ export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 .PHONY: setup demo test test-pure test-benchmarks lint benchmark peers docs clean
 
 setup:
-	@$(PYTHON) tools/workspace.py
+	@$(PYTHON) tools/workspace.py $(if $(filter file,$(origin PYTHON)),,--python)
 
 demo: setup
 	@.venv/bin/texture demo --out out/demo

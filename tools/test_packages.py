@@ -14,42 +14,63 @@ from xml.etree import ElementTree
 
 import pytest
 
+from texture_core.errors import MissingLibrary
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = sorted(manifest.parent for manifest in ROOT.glob('src/*/package.xml'))
+DEPLOYED = [p for p in PACKAGES if p.name not in {'texture_msgs', 'texture_papers', 'texture_benchmarks'}]
 
 # Module → key of rosdep. What is imported under the name of its ROS package needs no line.
 KEYS = {
     'aiohttp': 'python3-aiohttp',
     'argcomplete': 'python3-argcomplete',
-    'apsw': 'python3-apsw',
     'h5py': 'python3-h5py',
     'hypothesis': 'python3-hypothesis',
     'joblib': 'python3-joblib',
-    'lz4': 'python3-lz4',
     'matplotlib': 'python3-matplotlib',
     'numpy': 'python3-numpy',
     'pytest': 'python3-pytest',
-    'rosbags': 'python3-rosbags-pip',
     'scipy': 'python3-scipy',
     'serial': 'python3-serial',
     'sklearn': 'python3-sklearn',
     'yaml': 'python3-yaml',
 }
-# rosdep knows no key for these; docker/requirements.in and tools/requirements.in bring them.
-KEYLESS = {
-    'cobs',
-    'distributed',
-    'nltk',
-    'playwright',
-    'pyarrow',
-    'pymoo',
-    'pywt',
-    'skops',
-    'sounddevice',
-    'threadpoolctl',
+# No distribution package has these, and rosdep no key: each is an extra of the package that uses it.
+EXTRAS = {
+    'distributed': 'distributed',
+    'pyarrow': 'pyarrow',
+    'pymoo': 'pymoo',
+    'rosbags': 'rosbags',
+    'apsw': 'rosbags',
+    'backports': 'rosbags',
+    'lz4': 'rosbags',
+    'skops': 'skops',
+    'sounddevice': 'sounddevice',
+    'rtde_control': 'ur-rtde',
+    'rtde_receive': 'ur-rtde',
+    'dashboard_client': 'ur-rtde',
 }
-# What comes with Python or another package, and the libraries of robots that are chosen by name at run time.
-OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
+# What comes with Python, or with scikit-learn.
+OTHERS = {'compression', 'threadpoolctl'}
+# What refuses to be imported without rosbags, in these packages: all that reads or writes bags. The rest of what is
+# deployed, above all what moves a robot and what recognises, needs no extra.
+NEED_BAGS = {'texture_bringup', 'texture_evaluation', 'texture_recordings', 'texture_simulation'}
+WITHOUT_EXTRAS = """
+import importlib, sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition('.')[0] in sys.argv[1].split():
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+
+sys.meta_path.insert(0, Absent())
+from texture_core.errors import MissingLibrary
+for name in sys.argv[2:]:
+    try:
+        importlib.import_module(name)
+    except MissingLibrary as error:
+        print(error)
+"""
 # What some modules of a package use and its manifest leaves out, so that colcon builds the rest without it: to record
 # and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
 OPTIONAL = {
@@ -156,7 +177,7 @@ def depends(package: Path, *tags: str) -> set[str]:
 
 
 def keys(modules: set[str]) -> set[str]:
-    return {KEYS.get(name, name) for name in modules - KEYLESS - OTHERS}
+    return {KEYS.get(name, name) for name in modules - set(EXTRAS) - OTHERS}
 
 
 def outside(package: str, modules: set[str], allowed: frozenset[str]) -> set[str]:
@@ -181,6 +202,26 @@ def test_what_a_manifest_leaves_out_is_used_in_few_modules(name: str) -> None:
         for key in keys(top(frozenset().union(*imported(path)))) & set(users):
             users[key].add('.'.join(path.relative_to(package / name).with_suffix('').parts))
     assert users == OPTIONAL[name]
+
+
+@each
+def test_a_manifest_names_the_extras_that_its_package_imports(package: Path) -> None:
+    extras = ElementTree.parse(package / 'package.xml').iter('extra')
+    named = {word for extra in extras for word in (extra.text or '').split()}
+    text = '\n'.join(path.read_text() for path in (package / package.name).rglob('*.py'))
+    used = imports(package, package.name) | set(re.findall(r"(?:library|import_module)\('(\w+)", text))
+    assert {EXTRAS[name] for name in used & set(EXTRAS)} - named == set()
+
+
+@pytest.mark.parametrize('package', DEPLOYED, ids=lambda package: package.name)
+def test_what_is_deployed_runs_without_extras_or_says_in_one_sentence_which_it_needs(package: Path) -> None:
+    files = sorted((package / package.name).rglob('*.py'))
+    modules = ['.'.join(path.relative_to(package).with_suffix('').parts).removesuffix('.__init__') for path in files]
+    command = [sys.executable, '-c', WITHOUT_EXTRAS, ' '.join([*EXTRAS, 'h5py']), *modules]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    said = set(done.stdout.splitlines())
+    assert said == ({str(MissingLibrary('rosbags', 'bags', 'bags'))} if package.name in NEED_BAGS else set())
 
 
 @each

@@ -15,6 +15,7 @@ PACKAGES = sorted(path.parent for path in ROOT.glob('src/*/package.xml'))
 PYTHON_PACKAGES = [package for package in PACKAGES if package.name != 'texture_msgs']
 PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('docs/**/*.md'), *ROOT.glob('src/*/*.md')])
 LINK = re.compile(r'\]\(([^)\s]+)\)')
+REPOSITORY = re.search(r'^repository: (.+)$', (ROOT / 'docs' / 'release.md').read_text(), re.MULTILINE)[1]
 HEADING = re.compile(r'^#+ (.+)$', re.MULTILINE)
 
 
@@ -47,6 +48,9 @@ def test_a_package_has_its_papers(package: Path) -> None:
     facts = ElementTree.parse(package / 'package.xml').getroot()
     assert facts.findtext('version') == ElementTree.parse(PACKAGES[0] / 'package.xml').getroot().findtext('version')
     assert facts.findtext('license') == 'Apache-2.0'
+    assert (package / 'LICENSE').read_bytes() == (ROOT / 'LICENSE').read_bytes()
+    assert [url.get('type') for url in facts.iter('url')] == ['website', 'repository', 'bugtracker']
+    assert all((url.text or '').startswith(REPOSITORY) for url in facts.iter('url'))
     assert (package / 'README.md').exists()
     assert (package / 'CHANGELOG.rst').exists()
 

@@ -10,8 +10,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 import workspace
 
 
-@pytest.mark.parametrize('sourced', ['', 'jazzy'])
-def test_no_ros_and_jazzy_are_taken(sourced: str) -> None:
+@pytest.mark.parametrize('sourced', ['', 'jazzy', 'lyrical'])
+def test_no_ros_jazzy_and_lyrical_are_taken(sourced: str) -> None:
     assert workspace.checked_distribution(sourced) == sourced
 
 
@@ -24,6 +24,40 @@ def test_another_distribution_is_refused_with_what_to_do(
     said = capsys.readouterr().err
     assert "ROS 2 'humble' is sourced in this shell" in said
     assert 'source /opt/ros/jazzy/setup.bash' in said
+
+
+def test_the_python_of_an_environment_is_kept_whatever_runs_the_set_up(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    home = tmp_path / 'home'
+    home.mkdir()
+    other = home / 'python3.12'
+    other.write_text('#!/bin/sh\necho 3 12\n')
+    other.chmod(0o755)
+    monkeypatch.setattr(workspace, 'VENV', tmp_path)
+    assert workspace.own_interpreter() == []
+    (tmp_path / 'pyvenv.cfg').write_text(f'home = {home}\nversion = 3.12.1\n')
+    assert workspace.choose_interpreter(workspace.own_interpreter()) == (str(other), (3, 12))
+    other.unlink()
+    assert workspace.choose_interpreter(workspace.own_interpreter()) == (sys.executable, sys.version_info[:2])
+
+
+def test_a_second_set_up_does_nothing_and_another_python_makes_the_environment_anew(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(workspace, 'VENV', tmp_path)
+    made = []
+    for version in ((3, 12), (3, 12), (3, 13)):
+        workspace.once('venv', version, [], lambda version=version: made.append(version))
+    assert made == [(3, 12), (3, 13)]
+
+
+def test_each_file_of_the_lock_has_its_hash() -> None:
+    text = workspace.LOCK.read_text()
+    names = re.findall(r'^\w[^ \n]*==.*$', text, re.MULTILINE)
+    assert names
+    assert all(line.endswith('\\') for line in names)
+    assert text.count('--hash=sha256:') >= len(names)
 
 
 def test_an_interface_is_built_only_where_no_prefix_has_it(tmp_path: Path) -> None:

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Set the workspace up: a virtual environment with ROS 2 Jazzy, and the packages of src/ built in it.
 
+An environment that exists keeps its Python; `--python` has it made anew if it is not the one that runs this.
+
 Runs on any Python from 3.10 with nothing installed. Every step leaves a stamp of what it was made from, so a
 second run does nothing. Where a ROS 2 installation is sourced, that one is used and only what is missing is added.
 """
@@ -22,9 +24,10 @@ VENV = ROOT / '.venv'
 PYTHON = VENV / 'bin' / 'python'
 LOCK = ROOT / 'tools' / 'requirements.txt'
 WANTED = ROOT / 'tools' / 'requirements.in'
-DISTRIBUTION = 'jazzy'
+DISTRIBUTIONS = ('jazzy', 'lyrical')  # that may be sourced; the wheels are those of the first
 INTERFACES = ROOT / 'tools' / 'interfaces'  # messages that the wheels of ROS lack
 SUPPORTED = [(3, minor) for minor in (10, 11, 12, 13)]
+SOURCED = [*SUPPORTED, (3, 14)]  # Lyrical on Ubuntu 26.04 has it, and the wheels do not
 # Prefixes of the machine that made the wheels, left in their CMake exports; both have a counterpart here.
 BUILD_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
 BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages')
@@ -41,11 +44,11 @@ def main() -> int:
     lock = (ROOT / 'tools' / 'requirements.in').open()
     fcntl.flock(lock, fcntl.LOCK_EX)  # two calls at once wait for each other
     try:
-        interpreter = choose_interpreter()
         sourced = checked_distribution(sourced_ros())
-        made = once('venv', [], lambda: make_venv(interpreter, sourced), extra=sourced)
-        installed = once('packages', [LOCK], lambda: install_packages(sourced), extra=made)
-        once('build', built_files(), build, extra=f'{installed} {linked_files()}')
+        interpreter, version = choose_interpreter(kept=[] if '--python' in sys.argv[1:] else own_interpreter())
+        made = once('venv', version, [], lambda: make_venv(interpreter, sourced), extra=sourced)
+        installed = once('packages', version, [LOCK], lambda: install_packages(sourced), extra=made)
+        once('build', version, built_files(), build, extra=f'{installed} {linked_files()}')
     except SetupError as error:
         print(f'set-up: {error}', file=sys.stderr)
         return 2
@@ -56,9 +59,17 @@ class SetupError(Exception):
     """A sentence that says what is missing and what to do."""
 
 
-def choose_interpreter() -> str:
-    """Return a Python for which ROS 2 wheels exist: the running one, else one found on the path."""
-    candidates = [sys.executable, *(f'python3.{minor}' for _, minor in reversed(SUPPORTED))]
+def own_interpreter() -> list[str]:
+    """Return the Python that the environment was made with, if there is one."""
+    config = VENV / 'pyvenv.cfg'
+    facts = dict(re.findall(r'^(\w+) = (.*)$', config.read_text(), re.MULTILINE)) if config.exists() else {}
+    return [f'{facts["home"]}/python{facts["version"].rpartition(".")[0]}'] if {'home', 'version'} <= set(facts) else []
+
+
+def choose_interpreter(kept: list[str]) -> tuple[str, tuple[int, ...]]:
+    """Return a Python for which ROS 2 exists, and its version: `kept`, the running one, or one found on the path."""
+    supported = SOURCED if sourced_ros() else SUPPORTED
+    candidates = [*kept, sys.executable, *(f'python3.{minor}' for _, minor in reversed(SUPPORTED))]
     for candidate in candidates:
         probe = (
             subprocess.run(
@@ -69,8 +80,9 @@ def choose_interpreter() -> str:
             if shutil.which(candidate)
             else None
         )
-        if probe and probe.returncode == 0 and tuple(map(int, probe.stdout.split())) in SUPPORTED:
-            return candidate
+        version = tuple(map(int, probe.stdout.split())) if probe and probe.returncode == 0 else ()
+        if version in supported:
+            return candidate, version
     raise SetupError(
         f'found Python {sys.version.split()[0]}, but a Python from 3.10 to 3.13 with its venv module is needed; '
         'install one (on Debian and Ubuntu: python3-venv python3-dev) and run again'
@@ -86,17 +98,17 @@ def sourced_ros() -> str:
 
 def checked_distribution(sourced: str) -> str:
     """Return the name of the sourced distribution, or ''; SetupError if the suite is not made for it."""
-    if sourced not in ('', DISTRIBUTION):
+    if sourced not in ('', *DISTRIBUTIONS):
         raise SetupError(
-            f"ROS 2 '{sourced}' is sourced in this shell, and the suite is made for '{DISTRIBUTION}'; open a shell "
-            f'without it, or source /opt/ros/{DISTRIBUTION}/setup.bash instead'
+            f"ROS 2 '{sourced}' is sourced in this shell, and the suite is made for {' and '.join(DISTRIBUTIONS)}; "
+            f'open a shell without it, or source /opt/ros/{DISTRIBUTIONS[0]}/setup.bash instead'
         )
     return sourced
 
 
-def once(step: str, inputs: list[Path], action: Callable[[], None], extra: str = '') -> str:
+def once(step: str, version: tuple[int, ...], inputs: list[Path], action: Callable[[], None], extra: str = '') -> str:
     """Run `action` unless the stamp of `step` says that it ran on just these inputs; return the stamp."""
-    digest = hashlib.sha256(f'{sys.version_info[:2]} {ROOT} {extra}'.encode())
+    digest = hashlib.sha256(f'{version} {ROOT} {extra}'.encode())
     for path in inputs:
         digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
     stamp = VENV / f'.{step}.stamp'
@@ -130,10 +142,11 @@ def install_packages(sourced: str) -> None:
         missing.write_text('\n'.join(missing_requirements()))
         run(*pip, '-r', missing)
         return
-    run(*pip, '-r', LOCK)
+    run(*pip, '--require-hashes', '-r', LOCK)
     # Another package may have brought a newer empy, which shares its folder: the pinned one has the last word.
-    empy = next(line for line in LOCK.read_text().split('\n') if line.startswith('empy=='))
-    run(*pip, '--force-reinstall', '--no-deps', empy)
+    empy = VENV / 'empy.txt'
+    empy.write_text(re.findall(r'^empy==(?:.*\\\n)*.*\n', LOCK.read_text(), re.MULTILINE)[0])
+    run(*pip, '--require-hashes', '--force-reinstall', '--no-deps', '-r', empy)
     fix_build_paths()
 
 
@@ -233,7 +246,7 @@ def write_commands(env: dict[str, str]) -> None:
     exports += [
         f'export PATH=\'{VENV / "bin"}\':"$PATH"',
         'export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"',
-        'export ROS_DISTRO="${ROS_DISTRO:-jazzy}" ROS_VERSION=2 ROS_PYTHON_VERSION=3',
+        f'export ROS_DISTRO="${{ROS_DISTRO:-{sourced_ros() or DISTRIBUTIONS[0]}}}" ROS_VERSION=2 ROS_PYTHON_VERSION=3',
         # Pools of the numeric libraries slow small arrays down and take the cores of the other nodes.
         'export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"',
     ]

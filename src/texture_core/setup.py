@@ -65,7 +65,7 @@ setup(
     package_data={'': ['py.typed', '*.yaml', '*.csv']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
-        (f'share/{NAME}', ['package.xml']),
+        (f'share/{NAME}', ['package.xml', 'LICENSE']),
         *shared('launch'),
         *shared('config'),
         ('bin', on_path()),

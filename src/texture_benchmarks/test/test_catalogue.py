@@ -13,6 +13,8 @@ from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_bringup.command import main
 from texture_core.errors import InvalidData
 
+pytestmark = pytest.mark.ros
+
 NAMES = ('good', 'killed', 'bad', 'clock', 'missing')
 
 

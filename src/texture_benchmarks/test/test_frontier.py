@@ -9,6 +9,8 @@ from texture_benchmarks.recipes import comparable
 from texture_benchmarks.study import BenchmarkOptions
 from texture_estimation.recipe import load_recipe
 
+pytestmark = pytest.mark.ros
+
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 

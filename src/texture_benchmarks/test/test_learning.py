@@ -11,6 +11,8 @@ from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
 from texture_features.examples import LabelledFeatures
 
+pytestmark = pytest.mark.ros
+
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 

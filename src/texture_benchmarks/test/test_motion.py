@@ -19,7 +19,7 @@ from texture_exploration.arms.simulated import SimulatedSurface
 from texture_exploration.force_control import StiffnessEstimate
 from texture_exploration.stages import TouchParams
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 TILT = math.radians(10)
 

@@ -11,6 +11,8 @@ from texture_benchmarks.recipes import decisions, one_vote
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 
+pytestmark = pytest.mark.ros
+
 CHARTS = Path(__file__).resolve().parents[3] / 'docs' / 'charts'
 
 

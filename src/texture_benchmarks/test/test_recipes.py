@@ -28,6 +28,8 @@ from texture_evaluation.cross_validation import ChronologicalSplit, cross_valida
 from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide, find_slides
 from texture_recordings.tables import import_tables, mapping_from
 
+pytestmark = pytest.mark.ros
+
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 SLIDES = [LabelledSlide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork', 'felt') for k in range(1, 11)]
 

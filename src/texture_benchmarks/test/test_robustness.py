@@ -31,6 +31,8 @@ from texture_estimation.recipe import load_recipe, with_channels
 from texture_recordings.dataset import LabelledSlide, SlideDataset
 from texture_simulation.scene import load_scene
 
+pytestmark = pytest.mark.ros
+
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 DOCS = Path(__file__).resolve().parents[3] / 'docs'
 RATE_HZ = 1000.0

@@ -9,6 +9,8 @@ from texture_benchmarks.scale import DrawnSize, FeatureSpread
 from texture_benchmarks.study import BenchmarkOptions
 from texture_features.examples import LabelledFeatures
 
+pytestmark = pytest.mark.ros
+
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 recorded = pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 DEVIATIONS = {'textures': 5.0, 'slides': 2.0, 'windows': 1.0}

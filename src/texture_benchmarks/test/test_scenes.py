@@ -26,6 +26,8 @@ from texture_benchmarks.study import BenchmarkOptions
 from texture_simulation.effects import EFFECTS, Noise
 from texture_simulation.scene import Scene, load_scene, scene_from
 
+pytestmark = pytest.mark.ros
+
 TOUCHING = TouchProtocol((0.1,), (1.0, 8.0), duration_s=0.2)
 
 

@@ -17,8 +17,8 @@ from contextlib import contextmanager
 import aiohttp
 import numpy as np
 import pytest
-from playwright.sync_api import expect, sync_playwright
 
+sync_api = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
@@ -43,8 +43,8 @@ class Browser:
     def __init__(self, page, address):
         self.page = page
         page.goto(address)
-        expect(page.locator('#numbers input')).to_have_count(3)
-        expect(page.locator('#lights li.green')).to_have_count(len(NODES))
+        sync_api.expect(page.locator('#numbers input')).to_have_count(3)
+        sync_api.expect(page.locator('#lights li.green')).to_have_count(len(NODES))
 
     def explore(self, request):
         for name, value in request.items():
@@ -55,17 +55,17 @@ class Browser:
         self.page.click('#go')
 
     def wait_for_estimate(self, label):
-        expect(self.page.locator('#label[data-final=true]')).to_have_text(label)
-        expect(self.page.locator('#evidence .bar').first).to_contain_text(label)
+        sync_api.expect(self.page.locator('#label[data-final=true]')).to_have_text(label)
+        sync_api.expect(self.page.locator('#evidence .bar').first).to_contain_text(label)
 
     def wait_for_said(self, text):
-        expect(self.page.locator('#banner')).to_contain_text(text)
+        sync_api.expect(self.page.locator('#banner')).to_contain_text(text)
 
     def wait_for_phase(self, phase):
-        expect(self.page.locator('#phase')).to_have_text(phase)
+        sync_api.expect(self.page.locator('#phase')).to_have_text(phase)
 
     def wait_for_past(self, phase):
-        expect(self.page.locator('#past li').first).to_contain_text(phase)
+        sync_api.expect(self.page.locator('#past li').first).to_contain_text(phase)
 
     def stop(self):
         self.page.click('#stop')
@@ -173,10 +173,10 @@ def wait_for_page(address, launcher):
 @contextmanager
 def opened(address, **context):
     """Open the page in Chromium; fail on any error of its script."""
-    with sync_playwright() as playwright:
+    with sync_api.sync_playwright() as playwright:
         # The sandbox of Chromium does not run as root, nor in many containers; the page is our own.
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=['--no-sandbox', '--disable-gpu'])
-        expect.set_options(timeout=DEADLINE_S * 1000)
+        sync_api.expect.set_options(timeout=DEADLINE_S * 1000)
         try:
             page = browser.new_page(**context)
             page.set_default_timeout(DEADLINE_S * 1000)

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from texture_bringup.demo import _growing, _Recorded
 from texture_core.types import FeatureVector, TextureEstimate
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
 from texture_features.examples import LabelledFeatures
+
+pytestmark = pytest.mark.ros
 
 RECIPE = {
     'inputs': {'signal': {'features': ['mean']}},

@@ -8,6 +8,8 @@ from texture_core.cli import run_program
 from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest, ExplorationState, Phase, TextureEstimate
 
+pytestmark = pytest.mark.ros
+
 OUTSIDE = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
 ENDED = 'the exploration has ended: cancelled by the client'
 

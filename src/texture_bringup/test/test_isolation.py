@@ -1,6 +1,10 @@
 import socket
 
+import pytest
+
 from texture_bringup.demo import FIRST_PORT, FIRST_UNICAST, PORTS_PER_DOMAIN, isolate
+
+pytestmark = pytest.mark.ros
 
 
 def test_a_domain_in_use_is_left_alone(tmp_path) -> None:

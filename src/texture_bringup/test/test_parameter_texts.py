@@ -4,6 +4,8 @@ from rcl_interfaces.msg import ParameterType
 from texture_bringup.operator import parameter_from_text
 from texture_core.errors import InvalidParameter
 
+pytestmark = pytest.mark.ros
+
 
 @pytest.mark.parametrize(
     ('kind', 'text', 'value'),

@@ -2,8 +2,11 @@ from pathlib import Path
 
 import matplotlib.image
 import numpy as np
+import pytest
 
 from texture_bringup.demo import GrowingEvidence, SlideOverview, picture
+
+pytestmark = pytest.mark.ros
 
 LABELS = ('cork', 'felt', 'linen')
 TABLE = np.array([[9, 1, 0], [2, 8, 0], [0, 0, 0]])

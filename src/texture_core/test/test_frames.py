@@ -4,6 +4,8 @@ import pytest
 
 from texture_core.ros import frame_name
 
+pytestmark = pytest.mark.ros
+
 
 @pytest.mark.parametrize(
     ('namespace', 'name', 'on_tf'),

@@ -1,9 +1,10 @@
 from binascii import crc_hqx
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_core.framing import CRC_START, CounterUnwrapper, Frame, FrameDecoder, pack
+from texture_core.framing import CRC_START, CounterUnwrapper, Frame, FrameDecoder, cobs_decode, cobs_encode, pack
 
 BODIES = st.lists(st.binary(max_size=40), min_size=2, max_size=8)
 
@@ -35,6 +36,35 @@ def test_a_frame_worked_by_hand_is_read_and_written():
     by_hand = bytes.fromhex('04 420107  03 E803  01  03 0102  02 11  03 B403  00')
     assert FrameDecoder().feed(by_hand) == [frame]
     assert pack(frame) == by_hand
+
+
+# Cheshire & Baker 1999, figures 2 and 3, and runs as long as a code byte can say.
+@pytest.mark.parametrize(
+    ('plain', 'stuffed'),
+    [
+        ('', '01'),
+        ('00', '01 01'),
+        ('45 00 00 2C 4C 79 00 00 40 06 4F 37', '02 45 01 04 2C 4C 79 01 05 40 06 4F 37'),
+        ('01' * 253 + '00', 'FE' + '01' * 253 + '01'),
+        ('01' * 254 + '00 02', 'FF' + '01' * 254 + '01 02 02'),
+        ('01' * 255, 'FF' + '01' * 254 + '02 01'),
+    ],
+)
+def test_stuffing_by_hand(plain: str, stuffed: str) -> None:
+    assert cobs_encode(bytes.fromhex(plain)) == bytes.fromhex(stuffed)
+    assert cobs_decode(bytes.fromhex(stuffed)) == bytes.fromhex(plain)
+
+
+@given(st.binary(max_size=600))
+def test_stuffed_bytes_hold_no_zero_and_come_back(data: bytes) -> None:
+    assert 0 not in cobs_encode(data)
+    assert cobs_decode(cobs_encode(data)) == data
+
+
+@pytest.mark.parametrize('stuffed', ['00', '05 11', '03 11 00', '02 11 00'])
+def test_bytes_that_no_stuffing_makes_are_refused(stuffed: str) -> None:
+    with pytest.raises(ValueError, match='is not the length of a run'):
+        cobs_decode(bytes.fromhex(stuffed))
 
 
 def test_frames_come_out_the_same_however_the_stream_is_cut():

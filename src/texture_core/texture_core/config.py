@@ -24,7 +24,7 @@ from typing import IO, TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
 
 import yaml
 
-from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.errors import InvalidParameter, MissingLibrary, UnknownName
 
 if TYPE_CHECKING:
     from texture_core.types import AnyArray
@@ -101,6 +101,34 @@ def _import(name: str, kind: str) -> Any:
         raise UnknownName(
             f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported"
         ) from error
+
+
+def library(name: str, purpose: str, extra: str) -> Any:
+    """Return a library that does not come with the suite.
+
+    Parameters
+    ----------
+    name
+        Its name, such as 'h5py', or that of a module in it.
+    purpose
+        What needs it, in the plural, for the sentence.
+    extra
+        Name of the extra that brings it, in a `package.xml`.
+
+    Returns
+    -------
+    module
+        The library.
+
+    Raises
+    ------
+    MissingLibrary
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise MissingLibrary(name.partition('.')[0], purpose, extra) from error
 
 
 # --------------------

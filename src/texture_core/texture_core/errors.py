@@ -49,5 +49,15 @@ class InvalidLaunch(TextureError):
     """A launch file or launch argument that cannot be used."""
 
 
+class MissingLibrary(TextureError):
+    """A Python library of an extra, which the suite does without, and which is not installed."""
+
+    def __init__(self, name: str, purpose: str, extra: str) -> None:
+        super().__init__(
+            f"{purpose} need the library '{name}', which is not installed; run 'pip install {name}', which the extra "
+            f"'{extra}' names"
+        )
+
+
 class LaunchFailed(TextureError):
     """A node that died, or did not come up in time."""

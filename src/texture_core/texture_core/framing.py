@@ -16,12 +16,11 @@ from binascii import crc_hqx
 from struct import Struct
 from typing import NamedTuple
 
-from cobs import cobs
-
 HEADER = Struct('<BBHIBB')
 CRC = Struct('<H')
 CRC_START = 0xFFFF
 DELIMITER = b'\x00'
+LONGEST_RUN = 254  # COBS
 SEQUENCE_BITS = 16
 TIME_BITS = 32
 MAX_FRAME_BYTES = 4096
@@ -97,11 +96,44 @@ class FrameDecoder:
         return frame._replace(lost=step - 1) if step > 1 else frame
 
 
+def cobs_encode(data: bytes) -> bytes:
+    """Return bytes without a zero: each run between zeros, or of 254 bytes, after its length plus one.
+
+    Examples
+    --------
+    >>> cobs_encode(bytes.fromhex('11 22 00 33')).hex(' ')
+    '03 11 22 02 33'
+    """
+    stuffed = bytearray()
+    for run in data.split(DELIMITER):
+        for at in range(0, len(run) + 1, LONGEST_RUN):
+            piece = run[at : at + LONGEST_RUN]
+            stuffed.append(len(piece) + 1)
+            stuffed += piece
+    return bytes(stuffed)
+
+
+def cobs_decode(stuffed: bytes) -> bytes:
+    """Return what `cobs_encode` was given; ValueError if it was not made by that rule."""
+    data = bytearray()
+    at = 0
+    while at < len(stuffed):
+        end = at + stuffed[at]
+        piece = stuffed[at + 1 : end]
+        if end == at or end > len(stuffed) or DELIMITER in piece:
+            raise ValueError(f'byte {at} of {len(stuffed)} is not the length of a run')
+        data += piece
+        if len(piece) < LONGEST_RUN and end < len(stuffed):
+            data += DELIMITER
+        at = end
+    return bytes(data)
+
+
 def unpack(segment: bytes) -> Frame | None:
     """Return the frame in what stood between two zero bytes, or None if it is damaged."""
     try:
-        raw = cobs.decode(segment)
-    except cobs.DecodeError:
+        raw = cobs_decode(segment)
+    except ValueError:
         return None
     if len(raw) < HEADER.size + CRC.size:
         return None
@@ -117,7 +149,7 @@ def pack(frame: Frame) -> bytes:
     sequence, time_us = frame.sequence % (1 << SEQUENCE_BITS), frame.time_us % (1 << TIME_BITS)
     header = HEADER.pack(frame.kind, frame.version, sequence, time_us, frame.rows, frame.columns)
     checked = header + frame.body
-    return bytes(cobs.encode(checked + CRC.pack(crc_hqx(checked, CRC_START)))) + DELIMITER
+    return cobs_encode(checked + CRC.pack(crc_hqx(checked, CRC_START))) + DELIMITER
 
 
 class CounterUnwrapper:

@@ -18,8 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.config import MAX_CARD_BYTES, MB, Archive, FileRefused, load_json, parse_json, read_bounded
-from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
+from texture_core.config import (
+    MAX_CARD_BYTES,
+    MB,
+    Archive,
+    FileRefused,
+    library,
+    load_json,
+    parse_json,
+    read_bounded,
+)
+from texture_core.errors import InvalidParameter, MissingLibrary, ModelMismatch, TextureError
 from texture_core.types import Array
 from texture_features.examples import SlideConditions
 
@@ -102,6 +111,7 @@ KINDS: Mapping[tuple[str, str], Callable[[Node, Archive], Any]] = {
 # The two files that hold a model, whatever it classifies: NAME.skops with what was trained, and the card NAME.json.
 
 FORMAT = 1
+SKOPS = ('skops.io', 'new models, and models with parts of scikit-learn,', 'models')
 ENDINGS = ('.skops', '.json')
 MAX_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
 MAX_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
@@ -132,6 +142,8 @@ def usable(target: Path) -> Iterator[None]:
     """
     try:
         yield
+    except MissingLibrary:
+        raise
     except BROKEN as error:
         raise ModelMismatch(
             f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again with 'texture train'"
@@ -170,11 +182,11 @@ def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, An
     Path
         Of NAME.skops.
     """
-    from skops.io import dumps  # noqa: PLC0415  # takes a second, and only who saves or loads needs it
+    skops = library(*SKOPS)  # takes a second, and only who saves needs it
 
     parameters_path, card_path = both_files(path)
     card_path.parent.mkdir(parents=True, exist_ok=True)
-    content = dumps(dict(parameters), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
+    content = skops.dumps(dict(parameters), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
     card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
     replace_file(parameters_path, content)
     replace_file(card_path, (json.dumps(card, indent=1) + '\n').encode())
@@ -222,12 +234,12 @@ def load_parameters(content: bytes, trusted: Sequence[str], *, estimators: bool 
         return plain
     with Archive(io.BytesIO(content)) as file:
         trusted = _check_parts(file, trusted, estimators)
-    from skops.io import get_untrusted_types, loads  # noqa: PLC0415  # takes seconds, and few models need it
+    skops = library(*SKOPS)  # takes seconds, and few models need it
 
-    unexpected = sorted(set(get_untrusted_types(data=content)) - set(trusted))
+    unexpected = sorted(set(skops.get_untrusted_types(data=content)) - set(trusted))
     if unexpected:
         raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
-    return dict(loads(content, trusted=list(trusted)))
+    return dict(skops.loads(content, trusted=list(trusted)))
 
 
 def check_storable(parameters: Mapping[str, Any], name: str) -> None:
@@ -238,10 +250,10 @@ def check_storable(parameters: Mapping[str, Any], name: str) -> None:
     InvalidParameter
         If it could not.
     """
-    from skops.io import dumps  # noqa: PLC0415  # takes a second
+    skops = library(*SKOPS)
 
     try:
-        content = dumps(dict(parameters))
+        content = skops.dumps(dict(parameters))
         with Archive(io.BytesIO(content)) as file:
             _check_parts(file, (), estimators=True)
     except BROKEN as error:

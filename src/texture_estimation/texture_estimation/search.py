@@ -23,17 +23,20 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
-from pymoo.algorithms.moo.nsga2 import NSGA2
-from pymoo.algorithms.soo.nonconvex.ga import GA
-from pymoo.config import Config
-from pymoo.core.problem import Problem
-from pymoo.core.repair import Repair
-from pymoo.core.termination import NoTermination
-from pymoo.operators.crossover.sbx import SBX
-from pymoo.operators.mutation.pm import PM
 from threadpoolctl import threadpool_limits
 
-from texture_core.config import MB, find, find_file, load_json, load_yaml, param, safe_repr, shipped, unknown_name
+from texture_core.config import (
+    MB,
+    find,
+    find_file,
+    library,
+    load_json,
+    load_yaml,
+    param,
+    safe_repr,
+    shipped,
+    unknown_name,
+)
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Array, Samples
 from texture_estimation.evidence_rules import EvidenceRule, MajorityVote, deciding_rows
@@ -758,9 +761,6 @@ WIDTH_INDEX = 3.0  # of crossover and mutation: low indices make wide steps, whi
 CROSSOVER_SHARE = 0.9
 MAX_BYTES = 50 * MB  # of a checkpoint; a search of 10 000 individuals writes 10
 
-# pymoo's compiled parts would save nothing here, and it prints a notice of their lack.
-Config.warnings['not_compiled'] = False
-
 
 @dataclass(frozen=True)
 class SearchParams:
@@ -837,19 +837,26 @@ class SearchResult:
         return self.finalists[0]
 
 
-class _Snap(Repair):  # type: ignore[misc]
-    """Bring points to whole numbers, so that equal individuals are known as such."""
-
-    def __init__(self, counts: Array) -> None:
-        super().__init__()
-        self._counts = counts
-
-    def _do(self, problem: Any, points: Array, **_: Any) -> Array:
-        return np.clip(np.rint(points), 0, self._counts - 1)
-
-
 def _algorithm(space: RecipeSpace, params: SearchParams) -> Any:
     """Return pymoo's algorithm; the recipe itself takes part in the first generation, the others are drawn."""
+    library('pymoo', 'searches', 'search')
+    from pymoo.algorithms.moo.nsga2 import NSGA2  # noqa: PLC0415
+    from pymoo.algorithms.soo.nonconvex.ga import GA  # noqa: PLC0415
+    from pymoo.config import Config  # noqa: PLC0415
+    from pymoo.core.problem import Problem  # noqa: PLC0415
+    from pymoo.core.repair import Repair  # noqa: PLC0415
+    from pymoo.core.termination import NoTermination  # noqa: PLC0415
+    from pymoo.operators.crossover.sbx import SBX  # noqa: PLC0415
+    from pymoo.operators.mutation.pm import PM  # noqa: PLC0415
+
+    class Snap(Repair):  # type: ignore[misc]
+        """Bring points to values of the space, so that equal individuals are known as such."""
+
+        def _do(self, problem: Any, points: Array, **_: Any) -> Array:
+            return np.clip(np.rint(points), 0, counts - 1)
+
+    # pymoo's compiled parts would save nothing here, and it prints a notice of their lack.
+    Config.warnings['not_compiled'] = False
     counts = np.array([len(axis.values) for axis in space.axes.values()], dtype=np.float64)
     drawn = np.floor(np.random.default_rng(params.seed).random((params.population - 1, len(counts))) * counts)
     kind, n_objectives = (NSGA2, 2) if params.objective == 'front' else (GA, 1)
@@ -858,7 +865,7 @@ def _algorithm(space: RecipeSpace, params: SearchParams) -> Any:
         sampling=np.vstack([space.of_base(), drawn]),
         crossover=SBX(eta=WIDTH_INDEX, prob=CROSSOVER_SHARE),
         mutation=PM(eta=WIDTH_INDEX),
-        repair=_Snap(counts),
+        repair=Snap(),
         eliminate_duplicates=True,
     )
     # every value has a stretch of length 1, the first and the last one, too
@@ -1230,7 +1237,7 @@ def dask_backend(address: str) -> Iterator[None]:
     InvalidParameter
         If no scheduler answers there.
     """
-    from distributed import Client, LocalCluster  # noqa: PLC0415  # takes a second
+    cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
 
     if address.startswith(LOCAL):
         workers = address.removeprefix(LOCAL)
@@ -1238,17 +1245,13 @@ def dask_backend(address: str) -> Iterator[None]:
             raise InvalidParameter(
                 f"the local cluster has '{workers}' workers; 1 to {MAX_LOCAL_WORKERS} are allowed, such as '{LOCAL}2'"
             )
-        cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=int(workers), threads_per_worker=1, dashboard_address=None
-        )
+        cluster: Any = cluster_of.LocalCluster(n_workers=int(workers), threads_per_worker=1, dashboard_address=None)
         with cluster, dask_backend(cluster.scheduler_address):
             yield
         return
 
     try:
-        client: Any = Client(  # type: ignore[no-untyped-call]
-            address, timeout=ANSWER_S, set_as_default=False
-        )
+        client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise InvalidParameter(

@@ -24,21 +24,20 @@ from texture_evaluation.charts import COLOURS, chart
 def krippendorff_alpha(grades: Array) -> float:
     """Return Krippendorff's alpha for intervals of grades (n_raters, n_textures); NaN if all are the same.
 
-    Source: Krippendorff 1980, chapter 12; as `nltk` computes it.
+    Source: Krippendorff 1980, chapter 12.
 
     Parameters
     ----------
     grades : (n_raters, n_textures)
         On an interval scale; NaN where a rater gave none.
     """
-    from nltk.metrics import interval_distance  # type: ignore[import-untyped]  # noqa: PLC0415  # slow to import
-    from nltk.metrics.agreement import AnnotationTask  # type: ignore[import-untyped]  # noqa: PLC0415
-
-    given = np.argwhere(~np.isnan(grades))
-    triples = [(int(rater), int(texture), float(grades[rater, texture])) for rater, texture in given]
-    if len({grade for _, _, grade in triples}) < 2:
+    # Squared differences of all pairs are twice the variance; a texture that one rater graded alone has no pair.
+    compared = grades[:, (~np.isnan(grades)).sum(axis=0) > 1]
+    counts = (~np.isnan(compared)).sum(axis=0)
+    if not counts.size or np.nanmin(compared) == np.nanmax(compared):
         return math.nan
-    return float(AnnotationTask(triples, distance=interval_distance).alpha())
+    within = (counts * np.nanvar(compared, axis=0, ddof=1)).sum() / counts.sum()
+    return float(1 - within / np.nanvar(compared, ddof=1))
 
 
 def intraclass_correlation(table: Array) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from texture_exploration.arms.catalogue import ARMS
 from texture_simulation.devices.rails import EmulatedRails
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 
 @contextlib.contextmanager

@@ -24,7 +24,7 @@ from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, leap_hand
 from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 DEADLINE_S = 30.0
 TRIES = 3  # on a machine so busy that the robot seems silent, it may not come to a slide

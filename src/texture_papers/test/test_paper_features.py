@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import pywt
 from scipy import signal as scipy_signal
 from scipy import stats
 
@@ -23,6 +22,8 @@ from texture_papers.jamali import (
 )
 from texture_papers.kaboli import Correlation, MeanHjorth, cell_means, ranks
 from texture_papers.roberge import ArcLength, SignalEnergy, SpectralPeaks, highest_peaks
+
+pywt = pytest.importorskip('pywt')
 
 RATE_HZ = 1000.0
 

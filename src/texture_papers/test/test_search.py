@@ -1,7 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import distributed
 import numpy as np
 import pytest
 
@@ -29,6 +28,8 @@ from texture_estimation.search import (
     workers,
 )
 from texture_features.windows import CutWindow
+
+distributed = pytest.importorskip('distributed')
 
 SMALL = SearchParams(population=6, generations=3, halves=4)
 

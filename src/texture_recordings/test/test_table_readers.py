@@ -7,14 +7,15 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet
 import pytest
 import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData
 from texture_recordings.tables import MAPPED, READERS, NameTemplate, Table, TableFiles, TableMapping, mapping_from
+
+pa = pytest.importorskip('pyarrow')
+parquet = pytest.importorskip('pyarrow.parquet')
 
 X = np.round(np.sin(np.arange(60.0)) * 0.5, 4)
 Y = np.round(np.cos(np.arange(60.0)) * 0.5, 4)
@@ -47,7 +48,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     '.wav': lambda path: wavfile.write(path, 1000, np.stack([X, Y], axis=1)),
     '.h5': write_hdf5,
     '.hdf5': write_hdf5,
-    '.parquet': lambda path: pa.parquet.write_table(pa.table(ARRAYS), path),
+    '.parquet': lambda path: parquet.write_table(pa.table(ARRAYS), path),
 }
 
 

@@ -13,27 +13,12 @@ from pathlib import Path
 from typing import IO, Any, BinaryIO, NamedTuple, get_type_hints
 from zlib import crc32
 
-import apsw
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
-from rosbags.rosbag2 import (
-    CompressionFormat,
-    CompressionMode,
-    Reader,
-    ReaderError,
-    StoragePlugin,
-    Writer,
-    storage_mcap,
-)
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.base import TypesysError
-from rosbags.typesys.store import Typestore
 
 from texture_core.config import FileRefused, folder, open_regular, parse_yaml, read_text
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, MissingLibrary
 from texture_core.types import (
     NANOSECONDS,
     QUALITIES,
@@ -47,14 +32,33 @@ from texture_core.types import (
     TextureEstimate,
 )
 
+try:
+    import apsw
+    from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+    from rosbags.rosbag2 import (
+        CompressionFormat,
+        CompressionMode,
+        Reader,
+        ReaderError,
+        StoragePlugin,
+        Writer,
+        storage_mcap,
+    )
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys.base import TypesysError
+    from rosbags.typesys.store import Typestore
+
+    if sys.version_info >= (3, 14):
+        from compression.zstd import ZstdError
+    else:
+        from backports.zstd import ZstdError
+except ModuleNotFoundError as error:  # rosbags brings the others
+    raise MissingLibrary('rosbags', 'bags', 'bags') from error
+
 # --------------------
 # Which files of a bag are opened: regular ones, and an MCAP file without its end, of a recorder that was killed, as if
 # it ended behind its last whole chunk.
-
-if sys.version_info >= (3, 14):
-    from compression.zstd import ZstdError
-else:
-    from backports.zstd import ZstdError
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
 CHUNK = 0x06
@@ -437,11 +441,6 @@ def _folder(topic: str) -> str:
 
 # --------------------
 # Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
-
-if sys.version_info >= (3, 14):
-    from compression.zstd import ZstdError
-else:
-    from backports.zstd import ZstdError
 
 # What the reader raises, depending on which byte of a file is wrong.
 BROKEN = (

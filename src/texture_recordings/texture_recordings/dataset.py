@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 from bisect import bisect_left
@@ -19,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import writing
+from texture_core.config import library, writing
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.types import (
     NANOSECONDS,
@@ -205,41 +204,6 @@ def motion_made(states: Sequence[ExplorationState]) -> SlideMotion | None:
     if end_ns <= first.stamp_ns:
         return None
     return SlideMotion(STRAIGHT, first.direction_rad, speed, force, (end_ns - first.stamp_ns) / NANOSECONDS)
-
-
-# --------------------
-# Libraries that only some kinds of files need.
-
-
-def library(name: str, files: str, extra: str) -> Any:
-    """Return a library that is not installed with the suite.
-
-    Parameters
-    ----------
-    name
-        Its name, such as 'h5py'.
-    files
-        What it reads, for the sentence.
-    extra
-        Name of the extra of texture_recordings that brings it.
-
-    Returns
-    -------
-    module
-        The library.
-
-    Raises
-    ------
-    InvalidData
-        If it is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise InvalidData(
-            f"{files} need the library '{name}', which is not installed; run 'pip install "
-            f"{name.partition('.')[0]}', which the extra '{extra}' of texture_recordings names"
-        ) from error
 
 
 # --------------------

@@ -33,22 +33,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.interfaces import Connection as BagConnection
-from rosbags.serde import SerdeError
-from rosbags.typesys import get_types_from_msg
-from rosbags.typesys.store import Typestore
 
 from texture_core.config import (
     MB,
     FileRefused,
     find_file,
+    library,
     load_yaml,
     open_regular,
     param,
     tree_from_mapping,
     unknown_name,
 )
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData, InvalidParameter, MissingLibrary
 from texture_core.types import (
     MAX_HZ,
     MIN_HZ,
@@ -61,7 +58,15 @@ from texture_core.types import (
     checked_label,
 )
 from texture_recordings.bags import BagWriter, RawMessage, is_bag, read_foreign, typestore
-from texture_recordings.dataset import STREAMS, library
+from texture_recordings.dataset import STREAMS
+
+try:
+    from rosbags.interfaces import Connection as BagConnection
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import get_types_from_msg
+    from rosbags.typesys.store import Typestore
+except ModuleNotFoundError as error:
+    raise MissingLibrary('rosbags', 'bags', 'bags') from error
 
 # --------------------
 # What a mapping file (YAML) says: which columns are signals, and what labels, slides and conditions come from.

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from cobs import cobs
 
 from texture_core.config import param
+from texture_core.framing import cobs_decode, cobs_encode
 from texture_core.types import FingerSender, FingerState
 from texture_simulation.devices.fingers import ByteFaults, PtyPort
 
@@ -118,7 +118,7 @@ class RailsFirmware:
         head = struct.pack('<BBHIBB', 0x20, VERSION, self._sent % 2**16, round(self._time_s * 1e6) % 2**32, 1, 1)
         self._sent += 1
         content = head + body
-        return bytes(cobs.encode(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF)))) + b'\x00'
+        return cobs_encode(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
 
     def _execute(self, kind: int, body: bytes) -> None:
         self._silent_for_s = 0.0
@@ -184,8 +184,8 @@ class RailsFirmware:
 def _checked(segment: bytes) -> bytes | None:
     """Return a frame without its checksum, or None if it is damaged."""
     try:
-        content = bytes(cobs.decode(segment))
-    except cobs.DecodeError:
+        content = cobs_decode(segment)
+    except ValueError:
         return None
     checked, checksum = content[:-2], content[-2:]
     return checked if len(checked) >= 10 and struct.pack('<H', binascii.crc_hqx(checked, 0xFFFF)) == checksum else None
