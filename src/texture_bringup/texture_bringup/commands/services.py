@@ -62,7 +62,7 @@ reboot = ServiceCommand(
     'reboot the motors of a hand',
     "only the launch file 'hand' offers it; start that, or give its --namespace",
 )
-touch_surface = ServiceCommand('touch_surface', 'take one of the three touches that find the surface', TOUCHES_MISSING)
+touch_surface = ServiceCommand('touch_surface', 'take one of the touches that find the surface', TOUCHES_MISSING)
 forget_touches = ServiceCommand('forget_touches', 'begin the touches that find the surface again', TOUCHES_MISSING)
 tare = ServiceCommand(
     'tare',
