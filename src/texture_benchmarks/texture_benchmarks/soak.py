@@ -514,7 +514,7 @@ def draw(record: SoakRecord, path: Path) -> Path:
 # Hazards of an arm behind ROS controllers: what is wrong with it, and what is required of the force
 
 
-class Hazard(NamedTuple):
+class ArmHazard(NamedTuple):
     """What befalls an arm: parameters of its controller, a signal to a process, or somebody else who commands it."""
 
     given: Mapping[str, Any] = {}
@@ -526,18 +526,18 @@ class Hazard(NamedTuple):
     obeys: bool = True  # whether the arm does what the explorer commands, and the explorer can command
 
 
-HAZARDS: Mapping[str, Hazard] = {
-    'wall of 20 kN/m in the slide': Hazard({'wall_m': 0.02, 'wall_stiffness_n_m': 20000.0}),
-    'velocities inverted': Hazard({'invert_twist': True}, wired_wrong=True, obeys=False),
-    'force inverted': Hazard({'invert_force': True}, wired_wrong=True),
-    'force 0.5 s late': Hazard({'force_delay_s': 0.5}, wired_wrong=True),
-    'force 0.5 s late with new stamps': Hazard({'force_delay_s': 0.5, 'stamp_when_sent': True}, wired_wrong=True),
-    'explorer paused for 0.5 s': Hazard(process='explorer', number=signal.SIGSTOP, hold_s=0.5),
-    'explorer stopped for 3 s': Hazard(process='explorer', number=signal.SIGSTOP, hold_s=3.0),
-    'explorer killed': Hazard(process='explorer', number=signal.SIGKILL, obeys=False),
-    'guard stopped for 3 s': Hazard(process='guard', number=signal.SIGSTOP, hold_s=3.0),
-    'guard killed': Hazard(process='guard', number=signal.SIGKILL),
-    'second commander': Hazard(commander=True, hold_s=1.0),
+HAZARDS: Mapping[str, ArmHazard] = {
+    'wall of 20 kN/m in the slide': ArmHazard({'wall_m': 0.02, 'wall_stiffness_n_m': 20000.0}),
+    'velocities inverted': ArmHazard({'invert_twist': True}, wired_wrong=True, obeys=False),
+    'force inverted': ArmHazard({'invert_force': True}, wired_wrong=True),
+    'force 0.5 s late': ArmHazard({'force_delay_s': 0.5}, wired_wrong=True),
+    'force 0.5 s late with new stamps': ArmHazard({'force_delay_s': 0.5, 'stamp_when_sent': True}, wired_wrong=True),
+    'explorer paused for 0.5 s': ArmHazard(process='explorer', number=signal.SIGSTOP, hold_s=0.5),
+    'explorer stopped for 3 s': ArmHazard(process='explorer', number=signal.SIGSTOP, hold_s=3.0),
+    'explorer killed': ArmHazard(process='explorer', number=signal.SIGKILL, obeys=False),
+    'guard stopped for 3 s': ArmHazard(process='guard', number=signal.SIGSTOP, hold_s=3.0),
+    'guard killed': ArmHazard(process='guard', number=signal.SIGKILL),
+    'second commander': ArmHazard(commander=True, hold_s=1.0),
 }
 NO_HAZARD = 'none'
 HARMLESS: Mapping[str, Any] = {

@@ -64,7 +64,13 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
     for name, value in {'ROS_DOMAIN_ID': str(ROBOTS[robot]), 'ROS_LOG_DIR': str(tmp_path)}.items():
         monkeypatch.setenv(name, value)
     # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
-    patient = {'state_timeout_s': 1.5, 'estimate_timeout_s': 10.0, 'signal_timeout_s': 3.0, **PATIENCE.get(robot, {})}
+    patient = {
+        'state_timeout_s': 1.5,
+        'peak_speed_share': 1.0,
+        'estimate_timeout_s': 10.0,
+        'signal_timeout_s': 3.0,
+        **PATIENCE.get(robot, {}),
+    }
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
     place = {
         'ur': {'ip': '127.0.0.110'},

@@ -420,7 +420,7 @@ class HazardRig(Listener):
 
     def explore(self, name: str) -> soak.HazardRecord:
         """Explore while something befalls the arm, put it right, and return how it went."""
-        hazard = soak.HAZARDS.get(name, soak.Hazard())
+        hazard = soak.HAZARDS.get(name, soak.ArmHazard())
         if hazard.wired_wrong:
             self._restart(hazard.given)
         elif hazard.given:
@@ -453,7 +453,7 @@ class HazardRig(Listener):
             self._settings.set_parameters('twist_controller', soak.HARMLESS)
         return soak.HazardRecord(name, bool(happened), ending, message, force.peak_n, force.above_s, left_n)
 
-    def _act(self, hazard: soak.Hazard) -> None:
+    def _act(self, hazard: soak.ArmHazard) -> None:
         if hazard.commander:
             self._command_too(hazard.hold_s)
             return

@@ -187,7 +187,7 @@ COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fit
 MEASURED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # fits every publisher
 MOST = 10  # messages that are taken at once: only the newest counts
 ARRIVAL_S = 0.2
-DISCOVERY_S = 0.5  # before this node is seen to publish, it looks who else does
+DISCOVERY_S = 1.0  # before this node is seen to publish, it looks who else does
 LOOKING_S = 0.05
 UNNAMED = '_NODE_NAME_UNKNOWN_'  # of rmw, until the name of a publisher's node has come, too
 UNNAMED_S = 1.0

@@ -111,9 +111,13 @@ class TwistControllerNode(Node):
     def _on_topics(self, topics: ControllerTopicParams) -> None:
         self._topics = topics
         if topics.blink_s:
-            self.destroy_subscription(self._twists)
-            time.sleep(topics.blink_s)
-            self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
+            # In a thread: the executor keeps a subscription until the callback that destroys it is over.
+            threading.Thread(target=self._blink, args=(topics,), name='blink', daemon=True).start()
+
+    def _blink(self, topics: ControllerTopicParams) -> None:
+        self.destroy_subscription(self._twists)
+        time.sleep(topics.blink_s)
+        self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
 
     def _on_twist(self, message: TwistStamped) -> None:
         # As the twist controller of ur_robot_driver: a velocity in another frame is ignored.
