@@ -31,40 +31,9 @@ from texture_core.config import PARSE_ERRORS, FileRefused, find, parse_yaml, rea
 from texture_core.errors import InvalidLaunch, LaunchFailed, TextureError
 
 # --------------------
-# Read an XML file that is neither deep nor large, and defines no entities.
+# Read an XML file.
 
 MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
-MAX_XML_DEPTH = 30  # of elements within each other
-
-
-MAX_ELEMENTS = 5000  # in one file, and that are performed in all files together
-
-
-class _BoundedTree(ElementTree.TreeBuilder):
-    """Build the tree of a file that is neither deep nor large, and defines no entities."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._depth = self._count = 0
-
-    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
-        """Begin an element."""
-        self._depth += 1
-        self._count += 1
-        if self._depth > MAX_XML_DEPTH or self._count > MAX_ELEMENTS:
-            raise FileRefused(
-                f'it has more than {MAX_ELEMENTS} elements, or some more than {MAX_XML_DEPTH} deep within each other'
-            )
-        return super().start(tag, attrs)
-
-    def end(self, tag: str, /) -> Element:
-        """End an element."""
-        self._depth -= 1
-        return super().end(tag)
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Refuse what could define entities that multiply."""
-        raise FileRefused('it has a DOCTYPE, which no launch file needs')
 
 
 def parse_launch_file(path: Path) -> Element:
@@ -73,11 +42,11 @@ def parse_launch_file(path: Path) -> Element:
     Raises
     ------
     InvalidLaunch
-        If the file cannot be read, is too large, defines entities or is no launch file.
+        If the file cannot be read, is too large or is no launch file.
     """
     try:
         content = read_bounded(path, MAX_BYTES)
-        root: Element = ElementTree.fromstring(content, ElementTree.XMLParser(target=_BoundedTree()))
+        root: Element = ElementTree.fromstring(content)
     except OSError as error:
         raise InvalidLaunch(f"launch file '{path}' cannot be read: {error.strerror}") from error
     except FileRefused as error:
@@ -700,9 +669,6 @@ def _nowhere(_line: str) -> None:
 # --------------------
 # Texts with substitutions such as `$(var speed)`, as ROS 2 launch files write them.
 
-# A text in a launch file is a path, a number or a short list. Twenty that double each other would fill the memory.
-MAX_CHARACTERS = 10_000
-TEMPLATE_MAX_DEPTH = 30  # of calls within each other
 NAME = re.compile(r'[A-Za-z][\w-]*')
 
 
@@ -730,27 +696,17 @@ def parse(text: str) -> Template:
     InvalidLaunch
         If a call is not closed or not well formed.
     """
-    return _Reader(_bounded(text)).template(stop='')
+    return _Reader(text).template(stop='')
 
 
 def expand(template: Template, perform: Perform) -> str:
     """Return the text of a template; `perform(name, arguments)` gives the text of a call, innermost first."""
-    expanded = ''
-    for part in template:
-        expanded = _bounded(expanded + (part if isinstance(part, str) else _expand_call(part, perform)))
-    return expanded
-
-
-def _bounded(text: str) -> str:
-    if len(text) > MAX_CHARACTERS:
-        raise InvalidLaunch(
-            f'a text has {len(text)} characters, with what stands for its calls; {MAX_CHARACTERS} are allowed'
-        )
-    return text
-
-
-def _expand_call(call: Call, perform: Perform) -> str:
-    return perform(call.name, [expand(argument, perform) for argument in call.arguments])
+    return ''.join(
+        part
+        if isinstance(part, str)
+        else perform(part.name, [expand(argument, perform) for argument in part.arguments])
+        for part in template
+    )
 
 
 class _Reader:
@@ -759,7 +715,6 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
-        self._depth = 0
 
     def template(self, stop: str) -> Template:
         """Return the parts up to the end or the first plain character of `stop`."""
@@ -781,9 +736,6 @@ class _Reader:
 
     def _call(self) -> Call:
         start = self._at
-        self._depth += 1
-        if self._depth > TEMPLATE_MAX_DEPTH:
-            raise InvalidLaunch(f'a text has substitutions more than {TEMPLATE_MAX_DEPTH} deep within each other')
         self._at += len('$(')
         name = NAME.match(self._text, self._at)
         if not name:
@@ -796,7 +748,6 @@ class _Reader:
         if not self._text.startswith(')', self._at):
             raise self._malformed(start)
         self._at += 1
-        self._depth -= 1
         return Call(name.group(), tuple(arguments))
 
     def _argument(self, start: int) -> Template:
@@ -1126,7 +1077,6 @@ class ReadState:
     nodes: list[NodeDescription] = field(default_factory=list)
     declared: set[str] = field(default_factory=set)
     files: list[Path] = field(default_factory=list)
-    elements: int = 0
 
 
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
@@ -1204,11 +1154,6 @@ def _read_file(path: Path, scope: Scope, reading: ReadState) -> None:
 
 def _read_children(parent: Element, scope: Scope, reading: ReadState) -> None:
     for element in parent:
-        reading.elements += 1
-        if reading.elements > MAX_ELEMENTS:
-            raise InvalidLaunch(
-                f'the files included have more than {MAX_ELEMENTS} elements; do they include each other?'
-            )
         if element.tag not in READERS:
             raise unknown_name(element.tag, READERS, 'launch element')
         check_form(element, element.tag)

@@ -5,8 +5,8 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
-from texture_recordings.bags import BagWriter
-from texture_recordings.dataset import STREAMS, Continuity, find_slides, parse_selection
+from texture_recordings.bags import BagWriter, Continuity
+from texture_recordings.dataset import STREAMS, find_slides, parse_selection
 from texture_recordings.nodes.replay import Schedule
 
 

@@ -55,7 +55,7 @@ def test_what_is_replayed_is_recorded_whole_and_in_order(number: int, sim_time: 
             assert replay.wait(60.0) == 0, replay.output
         assert record.stop(number) == 0, record.output
     assert 'published 200 exploration, 200 signal' in replay.output
-    assert '5 lost samples' in record.output
+    assert '5 samples lost' in record.output
     for topic in ('signal', 'exploration'):
         sent = [value for _, _, value in read_bag(source, (topic,))]
         got = [value for _, _, value in read_bag(tmp_path / 'copy', (topic,))]

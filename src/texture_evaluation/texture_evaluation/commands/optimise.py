@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 class Progress:
     """A bar that grows with the generations: on a terminal in place, else a line each."""
 
-    terminal: bool = field(default_factory=lambda: sys.stderr.isatty())  # the stream of now, not of the import
+    terminal: bool = field(default_factory=lambda: sys.stderr.isatty())  # noqa: PLW0108  # the stream of now
     _began_s: float = field(default_factory=time.monotonic)
 
     def tell(self, pair: str, generation: Generation) -> None:

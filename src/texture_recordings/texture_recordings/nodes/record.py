@@ -16,8 +16,7 @@ from rclpy.qos import QoSProfile
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_recordings.bags import BagWriter, RawMessage, SignalDecoder, short_name
-from texture_recordings.dataset import Continuity
+from texture_recordings.bags import BagWriter, Continuity, RawMessage, SignalDecoder, short_name
 from texture_recordings.ros import TOPICS, Topic
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted

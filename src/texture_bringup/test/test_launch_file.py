@@ -2,7 +2,16 @@ from pathlib import Path
 
 import pytest
 
-from texture_bringup.launcher import NodeDescription, command, declared_arguments, joined_namespace, read
+from texture_bringup.launcher import (
+    NodeDescription,
+    command,
+    declared_arguments,
+    expand,
+    joined_namespace,
+    parameter_value,
+    parse,
+    read,
+)
 from texture_core.errors import InvalidLaunch, UnknownName
 
 
@@ -172,3 +181,90 @@ def test_declared_arguments_are_listed_with_their_description(tmp_path) -> None:
 )
 def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None:
     assert joined_namespace(base, name) == joined
+
+
+VARIABLES = {'$(var n)': '5', '$(var x)': '0.5', '$(var t)': 'cork', '$(var e)': '', '$(var b)': '[1'}
+
+
+def with_values(text):
+    for call, value in VARIABLES.items():
+        text = text.replace(call, value)
+    return text
+
+
+@pytest.mark.parametrize(
+    ('text', 'type_name', 'value'),
+    [
+        ('5', 'yaml', 5),
+        ('5.0', 'yaml', 5.0),
+        ('true', 'yaml', True),
+        ("'5'", 'yaml', '5'),
+        ('cork', 'yaml', 'cork'),
+        ('', 'yaml', ''),
+        ('@home', 'yaml', '@home'),
+        ('5', 'str', '5'),
+        ('5', 'float', 5.0),
+        ('1', 'bool', True),
+        ('[1, 2]', 'yaml', [1, 2]),
+        ('[a, b]', 'list_of_str', ['a', 'b']),
+        ('$(var n)', 'yaml', 5),
+        ("'$(var n)'", 'yaml', 5),
+        ('$(var n)', 'str', '5'),
+        ('$(var n)', 'float', 5.0),
+        ('$(var t)/$(var n)', 'yaml', 'cork/5'),
+        ('$(var e)', 'yaml', ''),
+        ('[$(var n), 6]', 'yaml', [5, 6]),
+        ('[$(var t), birch]', 'yaml', ['cork', 'birch']),
+    ],
+)
+def test_values_are_typed_as_yaml_does_unless_a_type_is_given(text, type_name, value) -> None:
+    got = parameter_value(text, type_name, with_values)
+    assert got == value
+    assert type(got) is type(value)
+
+
+@pytest.mark.parametrize(
+    ('text', 'type_name'),
+    [
+        ('rough', 'float'),
+        ('$(var t)', 'int'),
+        ('{a: 1}', 'yaml'),
+        ('null', 'yaml'),
+        ('[1, a]', 'yaml'),
+        ('3', 'list_of_int'),
+    ],
+)
+def test_a_value_of_another_type_is_refused(text, type_name) -> None:
+    with pytest.raises(InvalidLaunch, match='parameter value'):
+        parameter_value(text, type_name, with_values)
+
+
+def test_an_unknown_type_gets_the_nearest() -> None:
+    with pytest.raises(UnknownName, match='float'):
+        parameter_value('1', 'flaot', with_values)
+
+
+def shown(name, arguments):
+    return f'<{name}:{"|".join(arguments)}>'
+
+
+@pytest.mark.parametrize(
+    ('text', 'expanded'),
+    [
+        ('', ''),
+        ('plain $5 (text)', 'plain $5 (text)'),
+        ('a $(var x) b', 'a <var:x> b'),
+        ('$(env XDG /tmp)/finger', '<env:XDG|/tmp>/finger'),
+        ('$(env $(var name) "a b")', '<env:<var:name>|a b>'),
+        ("$(env X '')", '<env:X|>'),
+        (r'\$(var x)', '$(var x)'),
+    ],
+)
+def test_calls_are_expanded_innermost_first_and_all_else_stays(text, expanded) -> None:
+    assert expand(parse(text), shown) == expanded
+
+
+@pytest.mark.parametrize('text', ['$(var x', '$()', '$(var  x)', '$(var "x)', '$(5)'])
+def test_a_call_that_is_not_well_formed_is_refused_with_the_form(text) -> None:
+    with pytest.raises(InvalidLaunch, match='write'):
+        parse(text)
