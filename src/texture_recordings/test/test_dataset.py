@@ -9,6 +9,8 @@ from texture_recordings.bags import BagWriter, Continuity
 from texture_recordings.dataset import STREAMS, find_slides, parse_selection
 from texture_recordings.nodes.replay import Schedule
 
+pytestmark = pytest.mark.ros
+
 
 def write(path: Path, surfaces: list[str], start_s: int) -> Path:
     with BagWriter(path) as bag:

@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 from scipy.io import wavfile
 
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, MissingLibrary
 from texture_recordings.tables import MAPPED, READERS, NameTemplate, Table, TableFiles, TableMapping, mapping_from
 
 pa = pytest.importorskip('pyarrow')
@@ -132,7 +132,7 @@ def test_a_missing_library_is_told_in_one_sentence(
 ) -> None:
     path = made(tmp_path, suffix)
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(InvalidData, match=f"need the library '{name.split('.', maxsplit=1)[0]}"):
+    with pytest.raises(MissingLibrary, match=f"need the library '{name.split('.', maxsplit=1)[0]}"):
         tables(path)
 
 

@@ -680,7 +680,7 @@ def serve(number: int) -> None:
         try:
             _serve_file(connection, request)
             reply = {}
-        except InvalidData as error:
+        except (InvalidData, MissingLibrary) as error:
             reply = {'refused': str(error)}
         except MemoryError:
             reply = {'refused': _refusal(request[2], f'it takes more than {request[4] / MB:.0f} MB of memory to read')}
