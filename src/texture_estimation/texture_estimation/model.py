@@ -39,7 +39,11 @@ from texture_features.features import temporal as slide_onset
 EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL = 'examples', 'novelty_detector', 'next_touch_model'
 LEAST_PROBABILITY = 1e-300  # so that its logarithm is finite
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
-TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
+TRUSTED = (
+    'sklearn.naive_bayes.GaussianNB',
+    'sklearn.preprocessing._data.StandardScaler',
+    'sklearn.svm._classes.SVC',
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from texture_core.config import find, param
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
+from texture_estimation.learners.sklearn_learner import SklearnPredictor
 from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch
 from texture_features.spectra import amplitudes_of
@@ -334,7 +335,7 @@ class NaiveBayes:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = NaiveBayes().fit(values, codes, groups)
     >>> predictor = NaiveBayes.predictor(fitted.parameters)
-    >>> isinstance(predictor, GaussianNaiveBayesPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    >>> isinstance(predictor, SklearnPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
     (True, True)
     """
 
@@ -366,71 +367,32 @@ class NaiveBayes:
         return Fitted(parameters, held_out, f'not calibrated; growth from {split[1]}')
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> GaussianNaiveBayesPredictor | HistogramNaiveBayesPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> SklearnPredictor | HistogramNaiveBayesPredictor:
         """Return the predictor made from the stored parameters."""
-        return (
-            HistogramNaiveBayesPredictor(**parameters)
-            if 'edges' in parameters
-            else GaussianNaiveBayesPredictor(**parameters)
-        )
+        return HistogramNaiveBayesPredictor(**parameters) if 'edges' in parameters else SklearnPredictor(**parameters)
 
-    def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Array]:
-        log_priors = np.log(np.bincount(y, minlength=n_labels) / len(y))
-        fitted = self._counted(X, y, n_labels) if self.bins else self._normal(X, y, n_labels)
-        return {**fitted, 'log_priors': log_priors}
+    def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
+        return self._counted(X, y, n_labels) if self.bins else self._normal(X, y, n_labels)
 
-    def _counted(self, X: Array, y: Codes, n_labels: int) -> dict[str, Array]:
+    def _counted(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
         edges = np.quantile(X, np.arange(1, self.bins) / self.bins, axis=0).T
         places = bins_of(X, edges)
         counts = np.ones((X.shape[1], self.bins, n_labels))  # none is impossible because it never occurred
         np.add.at(counts, (np.arange(X.shape[1]), places, y[:, None]), 1.0)
-        return {'edges': edges, 'log_shares': np.log(counts / counts.sum(axis=1, keepdims=True))}
-
-    def _normal(self, X: Array, y: Codes, n_labels: int) -> dict[str, Array]:
-        mean, scale = standardisation(X)
-        standard = (X - mean) / scale
-        own = [standard[y == code] for code in range(n_labels)]
-        variances = np.stack([rows.var(axis=0) for rows in own])
+        log_priors = np.log(np.bincount(y, minlength=n_labels) / len(y))
         return {
-            'mean': mean,
-            'scale': scale,
-            'centres': np.stack([rows.mean(axis=0) for rows in own]),
-            'variances': variances + self.smoothing,
+            'edges': edges,
+            'log_shares': np.log(counts / counts.sum(axis=1, keepdims=True)),
+            'log_priors': log_priors,
         }
 
+    def _normal(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
+        from sklearn.naive_bayes import GaussianNB  # noqa: PLC0415  # scikit-learn takes a second to import
 
-@dataclass(frozen=True, eq=False)
-class GaussianNaiveBayesPredictor:
-    """Independent normal distributions, as one product with the features and their squares.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    centres, variances : (n_labels, n_features)
-        Of the standardised features.
-    log_priors : (n_labels,)
-    """
-
-    mean: Array
-    scale: Array
-    centres: Array
-    variances: Array
-    log_priors: Array
-
-    def __post_init__(self) -> None:
-        # -(x - c)² / 2v = -x² / 2v + x c / v - c² / 2v
-        quadratic = np.concatenate((-0.5 / self.variances, self.centres / self.variances), axis=1)
-        constant = -0.5 * (np.log(2.0 * np.pi * self.variances) + self.centres**2 / self.variances).sum(axis=1)
-        object.__setattr__(self, '_quadratic', quadratic.T.copy())
-        object.__setattr__(self, '_constant', constant + self.log_priors)
-
-    def __call__(self, X: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        standard = (X - self.mean) / self.scale
-        both = np.concatenate((standard * standard, standard), axis=-1)
-        scores: Array = both @ self._quadratic + self._constant  # type: ignore[attr-defined]
-        return log_softmax(scores)
+        mean, scale = standardisation(X)
+        bayes = GaussianNB(var_smoothing=0.0).fit((X - mean) / scale, y)
+        bayes.var_ += self.smoothing  # of variance 1; of constant features, too, where scikit-learn would add nothing
+        return {'estimator': bayes, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'floor': 0.0}
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,6 +36,8 @@ class SklearnPredictor:
         Number of labels, of which the estimator may lack some.
     temperature
         Divisor of the logarithms.
+    floor
+        Probability that all labels share at least; 0 takes the estimator's own log-probabilities.
 
     Examples
     --------
@@ -52,7 +54,8 @@ class SklearnPredictor:
     mean: Array
     scale: Array
     n_labels: int
-    temperature: float
+    temperature: float = 1.0
+    floor: float = FLOOR
 
     def __post_init__(self) -> None:
         for tree in _trees(self.estimator, 0):
@@ -67,9 +70,11 @@ class SklearnPredictor:
         return result
 
     def _scores(self, rows: Array) -> Array:
+        if not self.floor:
+            return np.asarray(self.estimator.predict_log_proba(rows), dtype=np.float64)
         if hasattr(self.estimator, 'predict_proba'):
             probabilities = np.asarray(self.estimator.predict_proba(rows), dtype=np.float64)
-            scores: Array = np.log((1.0 - FLOOR) * probabilities + FLOOR / self.n_labels)
+            scores: Array = np.log((1.0 - self.floor) * probabilities + self.floor / self.n_labels)
             return scores
         decisions = np.asarray(self.estimator.decision_function(rows), dtype=np.float64)
         return np.stack((-decisions, decisions), axis=-1) if decisions.ndim == 1 else decisions
