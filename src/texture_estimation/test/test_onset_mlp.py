@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from texture_estimation.learners.mlp import Mlp, OnsetMlp, linear_discriminant
+from texture_estimation.learners.discriminant import linear_discriminant
+from texture_estimation.learners.mlp import Mlp, OnsetMlp
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
 from texture_features.examples import LabelledFeatures
