@@ -54,7 +54,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *training.get('tare', []),
-        *filter(None, [model.domain.reach_reason, model.error_bound.reason]),
+        *filter(None, [model.error_bound.reason, model.domain.reach_reason]),
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]
