@@ -543,6 +543,8 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside what was trained'
+ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
+REACH = {'sessions': 'session', 'places': 'place', 'fingers': 'sensor'}  # and what tells them of a slide
 
 
 @dataclass(frozen=True)
@@ -567,6 +569,8 @@ class Domain:
         Number of slides of each label.
     margins
         How far an exploration may lie outside.
+    reach
+        Number of sessions, places and fingers of each label; what no slide tells counts as one.
 
     Examples
     --------
@@ -585,6 +589,7 @@ class Domain:
     levels: Mapping[str, Interval] = field(default_factory=dict)
     slides: Mapping[str, int] = field(default_factory=dict)
     margins: DomainMargins = field(default_factory=DomainMargins)
+    reach: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         ranges = {'speed_m_s': self.speed_m_s, 'force_n': self.force_n, **self.levels}
@@ -615,7 +620,7 @@ class Domain:
         Domain
             Ranges of speed and force, motions, directions and sensors of the slides.
         """
-        slides = tuple(conditions)
+        slides, labels = tuple(conditions), tuple(labels)
         margins = margins or DomainMargins()
         return cls(
             motions=_names(slide.motion for slide in slides),
@@ -626,7 +631,15 @@ class Domain:
             levels=_levels(slides),
             slides=dict(Counter(labels)),
             margins=margins,
+            reach=_reach(slides, labels),
         )
+
+    @property
+    def reach_reason(self) -> str:
+        """Where slides may be rejected as the training knew nothing else, in one sentence; '' if it is not known."""
+        if not self.reach or any(own['places'] > 1 or own['sessions'] > 1 for own in self.reach.values()):
+            return ''
+        return ONE_PLACE
 
     def widened(self, conditions: Sequence[SlideConditions], labels: Iterable[str]) -> Domain:
         """Return the domain with slides that were added after the training.
@@ -680,6 +693,10 @@ class Domain:
             levels={str(name): _pair(interval) for name, interval in card.get('levels', {}).items()},
             slides={str(label): int(count) for label, count in card.get('slides', {}).items()},
             margins=DomainMargins(**{name: float(value) for name, value in card.get('margins', {}).items()}),
+            reach={
+                str(label): {name: int(own.get(name, 1)) for name in REACH}
+                for label, own in card.get('reach', {}).items()
+            },
             **intervals,
         )
 
@@ -719,6 +736,17 @@ def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[I
     if any(slide.motion in TURNING_MOTIONS for slide in slides):
         return (FULL_CIRCLE,)
     return covered_arcs((angle for slide in slides for angle in slide.directions_rad), 2.0 * margin_rad)
+
+
+def _reach(slides: Sequence[SlideConditions], labels: Sequence[str]) -> dict[str, dict[str, int]]:
+    """Return how many sessions, places and fingers each label has; slides with a session each tell of none."""
+    found = {}
+    for label in dict.fromkeys(labels):
+        own = [slide for slide, of in zip(slides, labels, strict=True) if of == label]
+        names = {kind: {getattr(slide, name) for slide in own} for kind, name in REACH.items()}
+        counts = {kind: len(each) for kind, each in names.items()}
+        found[label] = {**counts, 'sessions': counts['sessions'] if counts['sessions'] < len(own) else 1}
+    return found
 
 
 def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:

@@ -73,6 +73,9 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
     return ['' if none else model.labels[index] for index, none in zip(best, tied, strict=True)]
 
 
+NEVER_KNOWN = "recipe '{}' calls nothing known or decided: its features tell the mounting as well as the surface"
+
+
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
@@ -198,7 +201,8 @@ class EvidenceAccumulator:
         best, decided = listed.index(confidence), listed.count(confidence) == 1
         within = not self._deviation
         novelty_score, known = self._novelty_score(model, mean, best, effective_windows)
-        known = known and within and model.active_confidence_floor.reached(confidence, effective_windows)
+        known = known and within and model.recipe.training.known
+        known = known and model.active_confidence_floor.reached(confidence, effective_windows)
         bound = model.error_bound_of(best)
         certain = decided and known and bound.shown and model.certain(confidence, effective_windows, novelty_score)
         reported = bound.limited(probabilities)
@@ -217,7 +221,7 @@ class EvidenceAccumulator:
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message=self._explanation(model, bound, final),
+            message=self._explanation(model, bound, final, known),
         )
 
     def _with_added(self, model: TextureModel, trained: Array, effective_windows: float) -> Array:
@@ -227,10 +231,13 @@ class EvidenceAccumulator:
         shares = model.slide_gaussians.shares(self._moments.mean, self._moments.variance, effective_windows)
         return model.slide_gaussians.combined(trained, shares)
 
-    def _explanation(self, model: TextureModel, bound: ErrorBound, final: bool) -> str:
+    def _explanation(self, model: TextureModel, bound: ErrorBound, final: bool, known: bool) -> str:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
         missing = (model.prediction_sets.reason, bound.reason) if final and not self._deviation else ()
-        return '; '.join(filter(None, (self._deviation, self._message, *missing)))
+        if final and not model.recipe.training.known:
+            missing = (NEVER_KNOWN.format(model.recipe.name), *missing)
+        reach = model.domain.reach_reason if final and not known and not self._deviation else ''
+        return '; '.join(filter(None, (self._deviation, self._message, *missing, reach)))
 
     def _novelty_score(
         self, model: TextureModel, mean: Array, best: int, effective_windows: float

@@ -122,6 +122,11 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=0.5,
     )
+    known: bool = param(
+        True,
+        'States whether an estimate may say that a surface is known and decided; false for features that tell a '
+        'mounting as well as a surface: no novelty detector rejects most of their errors on another day.',
+    )
     low_confidence_rejection_rate: float = param(
         0.0,
         'Fraction of slides over known textures that may be rejected as unknown because their label is too improbable '

@@ -47,7 +47,7 @@ from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.numerics import group_means, is_tied, log_loss
 from texture_estimation.recipe import DecisionParams, Recipe
 from texture_features.augmentation import NOISE, FeatureCopies
-from texture_features.examples import LabelledFeatures, SlideConditions
+from texture_features.examples import LOAD, LabelledFeatures, SlideConditions
 from texture_features.features import temporal
 
 # --------------------
@@ -76,6 +76,9 @@ def fit_learner(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups
     Fitted
         With one row of held-out log-probabilities for each window.
     """
+    of_load = np.array([name.endswith(LOAD) for name in examples.names])
+    if of_load.any():  # what is constant tells nothing, and weighs nothing
+        examples = replace(examples, values=np.where(of_load, 0.0, examples.values))
     if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_CALIBRATION_SLIDES:
         return recipe.learner.fit(examples.values, codes, groups)
     times = _times(groups, examples, recipe.training.start_weight)
@@ -153,10 +156,41 @@ def _augmented_examples(
     )
 
 
+def held_out_parts(examples: LabelledFeatures) -> Codes | None:
+    """Return the part in which each slide is held out, (n_slides,), by session, place and finger; None to go by slides.
+
+    Slides of one session share what is of that day: with one of them in the training, another tells nothing of the next
+    day. A label with one session is held out slide by slide, as if its slides were sessions.
+    """
+    slides, rows = np.unique(examples.groups, return_index=True)
+    made = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
+    sessions = np.array([f'{one.session}\n{one.place}\n{one.sensor}' for one in made])
+    labels = examples.labels[rows]
+    own = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    order = _ranks(sessions, rows)
+    count = min(FOLDS, int(order.max()) + 1)
+    if len(set(sessions)) == len(slides) or max(len(set(sessions[of])) for of in own) < 2 or min(map(len, own)) < 2:
+        return None
+    parts: Codes = order * count // (order.max() + 1)
+    for of in own:
+        if len(set(parts[of].tolist())) < 2:
+            rank = _ranks(sessions[of] if len(set(sessions[of])) > 1 else slides[of], rows[of])
+            parts[of] = rank * count // (rank.max() + 1)
+    return parts
+
+
+def _ranks(names: Any, rows: Codes) -> Codes:
+    """Return 0, 1, … for names in the order of their first rows."""
+    found, numbers = np.unique(names, return_inverse=True)
+    first = np.array([rows[numbers == number].min() for number in range(len(found))])
+    return np.argsort(np.argsort(first))[numbers]
+
+
 # What learners may declare as their `extras`: keyword arguments of `fit` besides the examples.
 EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
     'augmented': _augmented_examples,
     'differences': _touch_differences,
+    'parts': lambda _recipe, examples, _codes, _groups: held_out_parts(examples),
 }
 
 
@@ -286,7 +320,7 @@ def fit_novelty(
     copies = _reference_copies(examples, names, classes[first], gain_range)
     compared = np.array([name.rsplit('/', 1)[-1] != temporal.SLIDE_ONSET for name in examples.names], dtype=np.float64)
     traces: list[SlideTrace] = []
-    for held_out, predictor in _folds(learner, fitted, classes, groups):
+    for held_out, predictor in _folds(learner, fitted, classes, groups, held_out_parts(examples)):
         distances = _fit_distances(
             [slide for slide in slides if slide.group not in held_out],
             [copy for copy in copies if copy.group not in held_out],
@@ -318,14 +352,14 @@ def fit_novelty(
 
 
 def _folds(
-    learner: Learner, fitted: Fitted, classes: Codes, groups: Codes
+    learner: Learner, fitted: Fitted, classes: Codes, groups: Codes, parts: Codes | None
 ) -> Iterator[tuple[frozenset[int], Predictor | None]]:
     """Yield the slides that are held out together, and what was fitted without them, if the learner keeps it."""
     if fitted.folds:
         for fold in fitted.folds:
             yield frozenset(fold.held_out.tolist()), learner.predictor(fold.parameters)
         return
-    split = assign_folds(classes, groups, FOLDS)
+    split = assign_folds(classes, groups, FOLDS, parts)
     parts = split[0] if split else np.zeros(len(groups), np.intp)
     for part in np.unique(parts):
         yield frozenset(groups[parts == part].tolist()), None

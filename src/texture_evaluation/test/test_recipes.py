@@ -10,7 +10,7 @@ from texture_core.config import shipped
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
 from texture_evaluation.cross_validation import predict_slides
-from texture_evaluation.evaluate import evaluate
+from texture_evaluation.evaluate import evaluate, evaluate_dataset
 from texture_evaluation.metrics import window_accuracy
 from texture_evaluation.train import train_from_bags, training_examples
 from texture_recordings.dataset import SlideDataset
@@ -19,6 +19,8 @@ from texture_simulation.offline import SlidePlan, write_simulated
 SHIPPED = sorted(shipped('texture_estimation', 'config/recipes'))
 # How the load lies on the taxels: the simulated finger has it alike over all surfaces.
 OF_SHARES = {'taxels': 'signal_static', 'taxels-signal': 'signal'}
+# Which taxels change together: so it is with this.
+OF_CHANGES = ('taxels-any-day',)
 # The friction of these surfaces is not simulated.
 OF_FRICTION = ('friction-svm',)
 # The simulated slides are of one finger and along one axis.
@@ -26,7 +28,7 @@ OF_ONE_FINGER = [
     name
     for name in SHIPPED
     if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names))
-    and name not in (*OF_SHARES, *OF_FRICTION)
+    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION)
 ]
 
 
@@ -81,3 +83,49 @@ def test_recipes_of_shares_recognise_where_the_load_lies_however_hard_it_is_pres
     model = train(recipe, training_examples(recipe, slides_of_an_array(topic, seed=0)))
     results = predict_slides(model, slides_of_an_array(topic, seed=1).features(recipe.feature_set))
     assert window_accuracy(list(results.values())) > 0.95
+
+
+def slides_of_days(days: tuple[int, ...]) -> SlideDataset:
+    """Return ten slides of each of two surfaces a day: neighbours change together, or those two taxels apart."""
+    slides = []
+    for day in days:
+        rng = np.random.default_rng(day)
+        levels = rng.uniform(200.0, 600.0, 6)  # of the day, as the finger was mounted and tared
+        labels = [surface for surface in ('cork', 'felt') for _ in range(10)]
+        samples = []
+        for surface in labels:
+            steps = rng.normal(size=(400, 6))
+            together = steps + np.roll(steps, 1 if surface == 'cork' else 2, axis=1)
+            samples.append(levels * rng.uniform(0.8, 1.2) + 10.0 * together)
+        made = SlideDataset.from_arrays(
+            {'signal_static': samples}, labels, {'signal_static': 50.0}, sensor='skin (tared)', session=f'day {day}'
+        )
+        slides += [replace(slide, number=slide.number + 10 * day) for slide in made]
+    return SlideDataset(tuple(slides))
+
+
+@pytest.mark.parametrize('name', OF_CHANGES)
+def test_what_changes_together_is_recognised_on_a_day_with_other_levels(name: str) -> None:
+    recipe, trained, tested = load_recipe(name), slides_of_days((0, 1, 2)), slides_of_days((3,))
+    model = train(recipe, training_examples(recipe, trained))
+    assert model.domain.reach['cork'] == {'sessions': 3, 'places': 1, 'fingers': 1}
+    assert 'sessions held out in turn' in model.training['calibration']
+    finals = [result.estimates[-1] for result in evaluate_dataset(model, tested).known]
+    right = [final.label == slide.surface for final, slide in zip(finals, tested, strict=True)]
+    assert all(right)
+    assert np.mean([final.known for final in finals]) > 0.7
+    # On log shares, which the day gives, the same slides are guessed.
+    shares = load_recipe('taxels')
+    guessed = evaluate_dataset(train(shares, training_examples(shares, trained)), tested)
+    assert window_accuracy(guessed.known) < 0.8
+    assert not any(estimate.known for result in guessed.known for estimate in result.estimates)
+
+
+def test_offline_training_and_evaluation_tell_a_baseline_that_the_recipe_does_not_expect() -> None:
+    made = slides_of_days((0,))
+    assert made.tare_faults(load_recipe('taxels').feature_set) == []
+    raw = SlideDataset.from_arrays(
+        {'signal_static': [np.ones((100, 4))]}, ['cork'], {'signal_static': 50.0}, sensor='skin'
+    )
+    (fault,) = raw.tare_faults(load_recipe('taxels').feature_set)
+    assert "expects 'signal_static' tared" in fault

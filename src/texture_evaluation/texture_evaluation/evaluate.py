@@ -36,6 +36,8 @@ class EvaluationReport:
         Computing time of each window, from samples to estimate.
     unusable
         Names of slides without a usable window, which count nowhere.
+    tare_faults
+        Streams that are tared and should not be, or the other way round, in sentences.
     """
 
     labels: tuple[str, ...]
@@ -43,6 +45,7 @@ class EvaluationReport:
     unknown: Sequence[SlideResult]
     latency_us: Array
     unusable: tuple[str, ...] = ()
+    tare_faults: tuple[str, ...] = ()
 
     @property
     def confusion(self) -> AnyArray:
@@ -130,6 +133,7 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         unknown=[result for slide, result in results.items() if slide.surface not in model.labels],
         latency_us=np.concatenate([latency for _, latency in tested.values()]),
         unusable=tuple(slide.name for slide in tested if slide not in results),
+        tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
     )
 
 
@@ -254,7 +258,7 @@ def summary(report: EvaluationReport) -> list[str]:
         lines.append(f'unknown surfaces taken for known ones: {percent(figures["unknown_accepted"])}')
     if report.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')
-    return lines
+    return [*lines, *report.tare_faults]
 
 
 def percent(share: float | None) -> str:

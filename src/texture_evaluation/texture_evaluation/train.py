@@ -52,6 +52,8 @@ def train_from_bags(
     dataset = SlideDataset.from_bags(bags, slides, namespace, plan.feature_set.topics)
     examples = training_examples(plan, dataset)
     model = train(plan, examples, _name(out, plan.name))
+    faults = dataset.tare_faults(plan.feature_set)
+    model = replace(model, training={**model.training, **({'tare': faults} if faults else {})})
     if out is not None:
         _save(model, out, bags, slides)
     return model

@@ -69,6 +69,7 @@ SCALING = {
     'log_shares': SAME,
     'relative_changes': SAME,
     'power_autocorrelation': SAME,
+    'load_level': SHIFTED,
     'speed': SAME,
     'force': SAME,
     'friction': SAME,
@@ -87,7 +88,8 @@ def test_the_gain_of_the_sensor_acts_as_declared(name, law):
 @EVERY
 def test_values_come_for_each_channel_and_name(name):
     feature = FEATURES[name]()
-    channels = 3 if feature.per_channel else 1
+    pairs = getattr(feature, 'per_pair', False)  # of three channels there are three
+    channels = 3 if feature.per_channel or pairs else 1
     assert feature(windows(noise(500, 3))).shape == (channels, len(feature.names))
     assert len(set(feature.names)) == len(feature.names)
 

@@ -26,6 +26,7 @@ UNKNOWN: Interval = (math.nan, math.nan)
 DIRECTION_DIGITS = 2  # so that a slide has few directions, however long it is
 # In the name of the feature that tells the level of a channel, 'signal/moments/signal_log_power/dynamic'.
 LOG_POWER = '/moments/signal_log_power/'
+LOAD = '/load_level'  # ends the name of the feature that tells the level of a whole array
 
 
 class SignalLevel(NamedTuple):
@@ -69,6 +70,8 @@ class SlideConditions:
         Lowest and highest mean over the first windows, however many: at the start of a slide speed and force settle.
     levels
         Of the channels whose moments are among the features.
+    session, place
+        Names of the recording session, and of the place on the surface; only recordings tell them.
 
     Examples
     --------
@@ -85,6 +88,8 @@ class SlideConditions:
     speed_range_m_s: Interval = UNKNOWN
     force_range_n: Interval = UNKNOWN
     levels: tuple[SignalLevel, ...] = ()
+    session: str = ''
+    place: str = ''
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> SlideConditions:
@@ -105,6 +110,8 @@ class SlideConditions:
             speed_range_m_s=_pair(values.get('speed_range_m_s', UNKNOWN)),
             force_range_n=_pair(values.get('force_range_n', UNKNOWN)),
             levels=tuple(_level(*level) for level in values.get('levels', ())),
+            session=str(values.get('session', '')),
+            place=str(values.get('place', '')),
         )
 
 
@@ -182,8 +189,12 @@ def _pair(values: Sequence[Any]) -> Interval:
 
 
 def _log_powers(names: Sequence[str]) -> list[tuple[str, int]]:
-    """Return the channels whose logarithm of the power is a feature, and its place among the features."""
-    return [(name.replace(LOG_POWER, '/'), place) for place, name in enumerate(names) if LOG_POWER in name]
+    """Return the channels or arrays whose logarithm of the power is a feature, and its place among the features."""
+    return [
+        (name.replace(LOG_POWER, '/').removesuffix(LOAD), place)
+        for place, name in enumerate(names)
+        if LOG_POWER in name or name.endswith(LOAD)
+    ]
 
 
 def _signal_level(channel: str, log_power: _RunningMean) -> SignalLevel:

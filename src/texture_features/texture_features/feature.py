@@ -213,7 +213,9 @@ class Feature(Protocol):
 
     A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
     and has `per_channel` False. One that can join several inputs, found in `windows.joined`, says so by a class
-    variable `joins` that is True; it has `per_channel` False.
+    variable `joins` that is True; it has `per_channel` False. So has one of pairs of channels, which gives
+    (..., n_pairs, n_names) in the order of itertools.combinations and says so by a class variable `per_pair` that is
+    True.
 
     Examples
     --------

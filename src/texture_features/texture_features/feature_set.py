@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain, groupby
+from itertools import chain, combinations, groupby
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,6 +30,8 @@ from texture_features.features.spectral import (
 from texture_features.features.taxels import (
     CentredLogRatio,
     ChannelMeanStatistics,
+    DifferenceCorrelation,
+    LoadLevel,
     LogShares,
     MeanSpatialBands,
     RelativeChanges,
@@ -77,6 +79,8 @@ FEATURES: Mapping[str, type[Feature]] = {
     'centred_log_ratio': CentredLogRatio,
     'log_shares': LogShares,  # Aitchison 1986, with signs
     'relative_changes': RelativeChanges,
+    'difference_correlation': DifferenceCorrelation,
+    'load_level': LoadLevel,
     'speed': Speed,
     'force': Force,
     'friction': Friction,  # Roberge et al., future work
@@ -498,6 +502,8 @@ def _topic_of(name: str) -> str:
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
     for name, feature in item.features:
         columns = channels if feature.per_channel else ('',)
+        if getattr(feature, 'per_pair', False):
+            columns = tuple(f'{one}*{other}' for one, other in combinations(channels, 2))
         for channel in columns:
             for value in feature.names:
                 yield '/'.join(part for part in (item.topic, name, value, channel) if part)

@@ -539,6 +539,11 @@ class Stretched:
         return self.feature.per_channel
 
     @property
+    def per_pair(self) -> bool:
+        """As the feature says."""
+        return getattr(self.feature, 'per_pair', False)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Those of the feature."""
         return self.feature.names

@@ -746,7 +746,26 @@ class SlideDataset:
         features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
         touches = self._touches(feature_set, touch_s) if touch_s else {}
-        return replace(features, motions=motions, augmented=self._augmented(feature_set, augmentation), touches=touches)
+        conditions = {
+            slide.name: replace(features.conditions[slide.name], session=slide.session)
+            for slide in self.slides
+            if slide.name in features.conditions
+        }
+        augmented = self._augmented(feature_set, augmentation)
+        return replace(features, motions=motions, conditions=conditions, augmented=augmented, touches=touches)
+
+    def tare_faults(self, feature_set: FeatureSet) -> list[str]:
+        """Return sentences on streams that are tared and should not be, or the other way round, as the node warns.
+
+        Streams whose sensor has no name, as arrays from elsewhere, tell nothing.
+        """
+        faults: dict[str, None] = {}
+        for slide in self.slides:
+            sensors = {topic: batches[0].sensor for topic, batches in slide.signals.items() if batches}
+            faults.update(
+                dict.fromkeys(feature_set.tare_faults({t: s for t, s in sensors.items() if s not in ('', t)}))
+            )
+        return list(faults)
 
     def features_over_distances(
         self, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float

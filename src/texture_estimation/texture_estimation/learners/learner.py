@@ -171,7 +171,8 @@ def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
     """Return the names of the keyword arguments that `fit` of a learner takes besides the examples.
 
     A learner declares them in its class variable `extras`: 'augmented' for copies of the slides to draw from,
-    'differences' for what sets slides apart without being of their texture. Most learners take none.
+    'differences' for what sets slides apart without being of their texture, 'parts' for the sessions, places or fingers
+    whose slides are held out together. Most learners take none.
     """
     names: tuple[str, ...] = getattr(learner, 'extras', ())
     return names
@@ -181,7 +182,7 @@ def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
 # Divide examples for cross-validation so that no slide is on both sides.
 
 
-def assign_folds(y: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
+def assign_folds(y: Codes, groups: Codes, count: int, parts: Codes | None = None) -> tuple[Codes, str] | None:
     """Return the part (0 to count - 1) in which each example is held out, and how they were divided.
 
     The slides of each label, in the order in which they come, are cut into `count` stretches: sensors and surfaces
@@ -194,12 +195,16 @@ def assign_folds(y: Codes, groups: Codes, count: int) -> tuple[Codes, str] | Non
         Number of the label and of the slide of each example.
     count
         Number of parts, at least 2.
+    parts : (n_groups,) or None
+        Part of the slide of each number, where it is known which ones belong together; then nothing else counts.
 
     Returns
     -------
     ((n,), str), or None
         Part of each example, and the division in words.
     """
+    if parts is not None:
+        return parts[groups], f'sessions held out in turn, {len(np.unique(parts))} parts'
     folds_of = np.empty(len(y), dtype=np.intp)
     note = f'held-out slides, {count} parts'
     for code in np.unique(y):

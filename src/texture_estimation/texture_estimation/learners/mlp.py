@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
+from texture_estimation.learners.discriminant import linear_discriminant
 from texture_estimation.learners.learner import Codes, Fitted, FoldFit, assign_folds
 from texture_estimation.numerics import chunks, log_loss, log_softmax
 from texture_features.augmentation import Augmentation
@@ -158,61 +159,6 @@ class _Rows:
 
 
 # --------------------
-# Linear discriminant analysis with a shrunk covariance, as one linear layer.
-
-CONSTANT = 1e-12
-
-
-def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> tuple[Array, Array]:
-    """Return the layer that gives the log-probabilities of Gaussian classes with one covariance, up to a constant.
-
-    Parameters
-    ----------
-    X : (n, n_features)
-        Features.
-    y : (n,)
-        Number of the label of each.
-    n_labels
-        Number of labels, which are equally probable before.
-    shrinkage
-        0 for the covariance within classes as it is, 1 for its diagonal alone.
-
-    Returns
-    -------
-    (n_features, n_labels)
-        Weights; 0 for features that are constant, and all 0 where a label has fewer than two examples.
-    (n_labels,)
-        Offsets.
-
-    Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis".
-
-    Examples
-    --------
-    >>> X, y = np.array([[0.0], [2.0], [4.0], [6.0]]), np.array([0, 0, 1, 1])  # means 1 and 5, variance 1
-    >>> weights, offsets = linear_discriminant(X, y, 2, shrinkage=0.0)
-    >>> scores = 3.0 * weights[0] + offsets  # in the middle
-    >>> bool(np.isclose(scores[0], scores[1])), round(float(weights[0, 1] - weights[0, 0]), 6)  # (5 - 1) / 1
-    (True, 4.0)
-    """
-    nothing = np.zeros((X.shape[1], n_labels)), np.zeros(n_labels)
-    if np.bincount(y, minlength=n_labels).min() < 2:
-        return nothing
-    means = np.stack([X[y == code].mean(axis=0) for code in range(n_labels)])
-    centre = means.mean(axis=0)
-    rest = X - means[y]
-    scale = np.sqrt(np.mean(rest * rest, axis=0))
-    scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
-    rest /= scale
-    correlations = (1.0 - shrinkage) * (rest.T @ rest) / len(rest)
-    correlations[np.diag_indices_from(correlations)] += shrinkage + CONSTANT
-    relative = (means - centre) / scale
-    weights = np.linalg.solve(correlations, relative.T)
-    offsets = -0.5 * np.einsum('cf,fc->c', relative, weights)
-    weights /= scale[:, None]
-    return weights, offsets - centre @ weights
-
-
-# --------------------
 # Predict with a fitted multi-layer perceptron.
 
 
@@ -302,7 +248,7 @@ class Mlp:
     (True, True)
     """
 
-    extras: ClassVar[tuple[str, ...]] = ('augmented',)
+    extras: ClassVar[tuple[str, ...]] = ('augmented', 'parts')
 
     hidden: int = param(
         128,
@@ -335,7 +281,14 @@ class Mlp:
         low=0,
     )
 
-    def fit(self, X: Array, y: Codes, groups: Codes, augmented: AugmentedExamples | None = None) -> Fitted:
+    def fit(
+        self,
+        X: Array,
+        y: Codes,
+        groups: Codes,
+        augmented: AugmentedExamples | None = None,
+        parts: Codes | None = None,
+    ) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         With augmented examples, the number of passes counts those over the undisturbed ones. A network for the
@@ -351,6 +304,8 @@ class Mlp:
             Number of the slide of each.
         augmented
             Copies of the examples to draw from, or None.
+        parts : (n_groups,) or None
+            Part in which the slide of each number is held out; by slides if None.
 
         Returns
         -------
@@ -360,7 +315,7 @@ class Mlp:
         from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
 
         n_labels = int(y.max()) + 1
-        split = assign_folds(y, groups, self.folds)
+        split = assign_folds(y, groups, self.folds, parts)
         if split is None:
             fitted = self._fit(X, y, n_labels, augmented)
             return Fitted(fitted, None, 'not calibrated, as a label has a single window')

@@ -378,7 +378,7 @@ class SvmRbf:
     True
     """
 
-    extras: ClassVar[tuple[str, ...]] = ('differences',)
+    extras: ClassVar[tuple[str, ...]] = ('differences', 'parts')
 
     c: float = param(
         10.0,
@@ -410,7 +410,9 @@ class SvmRbf:
         high=1e6,
     )
 
-    def fit(self, X: Array, y: Codes, groups: Codes, differences: Array | None = None) -> Fitted:
+    def fit(
+        self, X: Array, y: Codes, groups: Codes, differences: Array | None = None, parts: Codes | None = None
+    ) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         Parameters
@@ -423,13 +425,15 @@ class SvmRbf:
             Number of the slide of each.
         differences : (n_groups, n_features) or None
             For the number of each slide a difference that is none of textures, for the whitening; NaN if not known.
+        parts : (n_groups,) or None
+            Part in which the slide of each number is held out; by slides if None.
 
         Returns
         -------
         Fitted
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
-        coupling, held_out, note = self._calibrate(X, y, groups, differences)
+        coupling, held_out, note = self._calibrate(X, y, groups, differences, parts)
         projection = self._projection(X, y, groups, differences)
         scaler, svc = self._fit_svc(_projected(X, projection), y)
         parameters = {
@@ -454,10 +458,10 @@ class SvmRbf:
         return export(parameters['scaler'], parameters['svc'], coupling, parameters.get('projection'))
 
     def _calibrate(
-        self, X: Array, y: Codes, groups: Codes, differences: Array | None
+        self, X: Array, y: Codes, groups: Codes, differences: Array | None, parts: Codes | None
     ) -> tuple[PairCoupling, Array | None, str]:
         n_labels = int(y.max()) + 1
-        split = assign_folds(y, groups, self.folds)
+        split = assign_folds(y, groups, self.folds, parts)
         if split is None:
             return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
         folds_of, note = split

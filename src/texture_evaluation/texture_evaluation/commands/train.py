@@ -53,7 +53,8 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        *filter(None, [model.error_bound.reason]),
+        *training.get('tare', []),
+        *filter(None, [model.error_bound.reason, model.domain.reach_reason]),
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]

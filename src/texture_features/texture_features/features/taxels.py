@@ -11,7 +11,7 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
-from texture_features.feature import WindowBatch, first_difference, power
+from texture_features.feature import WindowBatch, centred, first_difference, power
 from texture_features.spectra import force_normalised, mean_subtracted, spatial_log_bands, welch_spectrum
 
 # --------------------
@@ -171,6 +171,107 @@ class RelativeChanges:
         deviations = np.sqrt(np.stack([power(windows.centred_rows), power(steps)], axis=-1))
         changes: Array = np.sqrt(deviations / np.maximum(load, self.floor)[..., None])
         return changes
+
+
+# --------------------
+# Which taxels change together: correlations of the differences, whatever the level and the share of each.
+
+MOST_CORRELATION = 0.98  # beyond, the transform of a correlation would grow without bound
+
+
+@dataclass(frozen=True)
+class DifferenceCorrelation:
+    """Correlations between the channels' differences over some lags, Fisher-transformed; one for each pair of channels.
+
+    Levels and their shares tell how a finger is mounted and how it was tared that day. Which channels change together
+    while a surface passes, over a short and over a longer lag, changes less from day to day. The mean difference, which
+    is drift, is left out. n channels give n (n - 1) / 2 pairs: meant for arrays of some twenty taxels.
+
+    Source: Fisher 1915 for the transform, arctanh.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> noise = np.cumsum(10.0 * rng.standard_normal((400, 2)), axis=0)
+    >>> samples = np.stack([noise[:, 0], noise[:, 0] + 7.0, noise[:, 1]], axis=1)  # two that move together, and another
+    >>> values = DifferenceCorrelation(lags=[1])(WindowBatch(samples, rate_hz=100.0))[:, 0]
+    >>> values.round(1).tolist()  # a and b, a and c, b and c
+    [2.3, -0.0, -0.0]
+    """
+
+    per_channel: ClassVar[bool] = False
+    per_pair: ClassVar[bool] = True
+
+    lags: list[int] = param(  # noqa: RUF009 – it gives a field
+        [1, 4],
+        'Sets the lags of the differences in samples, at most a quarter of the window; longer ones compare slower '
+        'changes.',
+        low=1,
+        high=10_000,
+    )
+    floor: float = param(
+        0.1,
+        'Sets the variance added to that of each difference, in unit²: channels that hardly change, as those quantised '
+        'to integers, are not correlated by their noise.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __post_init__(self) -> None:
+        if not self.lags or len(set(self.lags)) < len(self.lags):
+            raise InvalidParameter(f'the lags of difference_correlation are {self.lags}; one or more are needed, once')
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The lags."""
+        return tuple(map(str, self.lags))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the transformed correlations, (..., n_pairs, n_lags)."""
+        rows = windows.rows
+        first, second = np.triu_indices(rows.shape[-2], 1)
+        found = []
+        for longest in self.lags:
+            lag = max(1, min(longest, rows.shape[-1] // 4))
+            changes = centred(rows[..., lag:] - rows[..., :-lag]) if rows.shape[-1] > lag else np.zeros_like(rows)
+            # The same product for one window as for many: no other rounding live than offline.
+            covariance = changes @ changes.swapaxes(-1, -2) / changes.shape[-1]
+            deviation = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1) + self.floor)
+            correlation = covariance[..., first, second] / (deviation[..., first] * deviation[..., second])
+            found.append(np.arctanh(np.clip(correlation, -MOST_CORRELATION, MOST_CORRELATION)))
+        return np.stack(found, axis=-1)
+
+
+# --------------------
+# The load on the whole array: whether it is that of the training, not what lies under it.
+
+
+@dataclass(frozen=True)
+class LoadLevel:
+    """Logarithm of the mean square over all channels and samples: the load of a tared array, squared.
+
+    For the domain of a model and for its novelty detector: a load that no session of the training showed is told from
+    those that it showed. Networks and discriminants are trained without it, as it tells the day and not the surface.
+
+    Examples
+    --------
+    >>> level = LoadLevel()(WindowBatch(np.array([[3.0, -5.0], [3.0, -5.0]]), rate_hz=100.0)).item()
+    >>> round(np.exp(level), 3)  # (3² + 5²) / 2
+    17.0
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that no load gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(mean square + floor), (..., 1, 1)."""
+        mean = np.add.reduce(power(windows.rows), axis=-1, keepdims=True) / windows.samples.shape[-1]
+        level: Array = np.log(mean + self.floor)[..., None]
+        return level
 
 
 # --------------------
