@@ -69,6 +69,9 @@ class SlideConditions:
         Lowest and highest mean over the first windows, however many: at the start of a slide speed and force settle.
     levels
         Of the channels whose moments are among the features.
+    session, place
+        Recording and part of the path of a slide from recordings: what a training may leave out to see how far it
+        reaches.
 
     Examples
     --------
@@ -85,6 +88,8 @@ class SlideConditions:
     speed_range_m_s: Interval = UNKNOWN
     force_range_n: Interval = UNKNOWN
     levels: tuple[SignalLevel, ...] = ()
+    session: str = ''
+    place: str = ''
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> SlideConditions:
@@ -105,6 +110,8 @@ class SlideConditions:
             speed_range_m_s=_pair(values.get('speed_range_m_s', UNKNOWN)),
             force_range_n=_pair(values.get('force_range_n', UNKNOWN)),
             levels=tuple(_level(*level) for level in values.get('levels', ())),
+            session=str(values.get('session', '')),
+            place=str(values.get('place', '')),
         )
 
 
