@@ -11,6 +11,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from texture_benchmarks import (
+    borders,
     frontier,
     latency,
     learning,
@@ -36,6 +37,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'peers': peers.run,  # general classifiers of time series on the same later slides; in packages of their own
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
+    'borders': borders.run,  # at another place, on another day, with another finger
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'roughness': latency.run_roughness,  # from window to grade
@@ -49,7 +51,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
 # Where accuracy counts: they run side by side, one on each core, the longest first.
 SIDE_BY_SIDE = ('trust', 'learning', 'robustness', 'next_motion', 'next_motion_recorded')
 # What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes or more.
-LONG = frozenset({'frontier', 'motion', 'peers', 'recipes', 'robustness', 'scale', 'scenes', 'trust'})
+LONG = frozenset({'borders', 'frontier', 'motion', 'peers', 'recipes', 'robustness', 'scale', 'scenes', 'trust'})
 
 Act = Callable[[str], int]  # runs a study by its name and returns the exit code of its process
 

@@ -24,6 +24,8 @@ from texture_evaluation.cross_validation import (
     interval,
     mcnemar,
     parse_split,
+    slide_counts,
+    split_slides,
 )
 from texture_evaluation.evaluate import evaluate_dataset, table
 from texture_evaluation.metrics import SlideResult
@@ -163,6 +165,8 @@ def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
         ('stratified', StratifiedGroupKFold, 'slide'),
         ('leave-one-out:speed', LeaveOneGroupOut, 'speed'),
         ('leave-one-out:session', LeaveOneGroupOut, 'session'),
+        ('leave-one-out:sensor', LeaveOneGroupOut, 'sensor'),
+        ('leave-one-out:place', LeaveOneGroupOut, 'place'),
         ('chronological:0.6', ChronologicalSplit, 'slide'),
         ('random:10', GroupShuffleSplit, 'slide'),
     ],
@@ -175,11 +179,53 @@ def test_a_split_is_named_in_a_word(text: str, kind: type, groups: str) -> None:
 
 @pytest.mark.parametrize(
     'text',
-    ['stratifed:5', 'stratified:one', 'stratified:1', 'leave-one-out:', 'leave-one-out:colour', 'chronological:2', ''],
+    [
+        'stratifed:5',
+        'stratified:one',
+        'stratified:1',
+        'leave-one-out:',
+        'leave-one-out:colour',
+        'chronological:2',
+        '',
+        'leave-one-out:place:1',
+        'leave-one-out:speed:2',
+    ],
 )
 def test_a_split_that_makes_no_sense_is_refused_with_what_is_allowed(text: str) -> None:
     with pytest.raises(InvalidParameter, match=r'stratified:FOLDS|leave one of speed|above 0 and below 1'):
         parse_split(text)
+
+
+@pytest.mark.parametrize('text', ['leave-one-out:place', 'leave-one-out:place:4'])
+def test_a_place_is_left_out_in_slides_of_which_no_part_was_trained(text: str) -> None:
+    split = parse_split(text)
+    dataset = split.cut(tones())
+    assert len(set(dataset.condition('place'))) == split.parts  # not every slide reaches the end of the longest
+    tested = []
+    for train, test in split_slides(dataset, split.splitter, split.groups):
+        trained, held = dataset.take(train), dataset.take(test)
+        assert len(set(held.condition('place'))) == 1
+        assert not set(trained.condition('place')) & set(held.condition('place'))
+        assert not {slide.whole_name for slide in trained} & {slide.whole_name for slide in held}
+        assert set(trained.labels) == set(held.labels)
+        tested += held.names.tolist()
+    assert sorted(tested) == sorted(dataset.names)
+
+
+def test_parts_of_a_slide_stay_on_one_side_of_every_other_split() -> None:
+    dataset = tones().in_parts(2)
+    for splitter in (StratifiedGroupKFold(2), GroupShuffleSplit(2, random_state=0)):
+        for train, test in split_slides(dataset, splitter):
+            wholes = [{slide.whole_name for slide in dataset.take(rows)} for rows in (train, test)]
+            assert not wholes[0] & wholes[1]
+
+
+def test_the_interval_of_one_wrong_slide_in_ten_holds_the_share() -> None:
+    one, dataset = cross_validate(RECIPE, tones(), ChronologicalSplit()).pooled[0], 9
+    wrong = SlideResult('felt', one.window_labels, one.estimates)
+    low, high = interval(slide_counts([*[one] * dataset, wrong]))
+    assert one.surface == 'cork'
+    assert 0.6 <= low <= 0.9 <= high == 1.0
 
 
 def test_the_table_has_a_row_for_each_fold_and_the_file_all_figures(tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -237,3 +238,95 @@ def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
         assert not np.array_equal(first[0].samples, second[0].samples)
     figures = evaluate(model, bags, '5-6').as_json()
     assert figures['window_accuracy'] > 0.9
+
+
+def ramps(count: int = 2, speed_m_s: object = math.nan, **more: object) -> SlideDataset:
+    """Return slides of 4 s whose one channel is the time, in s."""
+    time_s = np.arange(4000)[:, None] / RATE_HZ
+    labels = ['cork', 'felt'] * (count // 2)
+    return SlideDataset.from_arrays(
+        {'signal': [time_s] * count}, labels, {'signal': RATE_HZ}, speed_m_s=speed_m_s, **more
+    )
+
+
+def spans(dataset: SlideDataset) -> dict[str, tuple[float, float]]:
+    """Return the first and last time in the samples of each part."""
+    return {one.slide.name: (one.samples[0, 0], one.samples[-1, 0]) for one in dataset.samples('signal')}
+
+
+def test_parts_of_equal_time_hold_every_sample_once_and_windows_never_span_two() -> None:
+    cut = ramps().in_parts(4)
+    assert cut.names[:5].tolist() == [f'cork/1 part {k}/4' for k in (1, 2, 3, 4)] + ['felt/1 part 1/4']
+    np.testing.assert_allclose(spans(cut)['cork/1 part 2/4'], (1.0, 1.999), atol=2e-3)
+    np.testing.assert_array_equal(
+        np.concatenate(cut.to_numpy()[0][:4])[:, 0], (np.arange(4000) / RATE_HZ).astype(np.float32)
+    )
+    for slide, events in cut.windows(FEATURES):
+        starts = [event.start_ns for event in events if isinstance(event, CutWindow)]
+        first = int(slide.place[0]) - 1
+        assert [start // NANOSECONDS % 5 for start in starts[:2]] == [first] * 2
+        for event in events:
+            if isinstance(event, CutWindow):
+                own = event.windows['signal'].samples[:, 0]
+                assert first - 1e-3 <= own[0] < own[-1] < first + 1.0
+
+
+def test_parts_are_of_equal_distance_where_slides_tell_their_speed() -> None:
+    halves = ramps(speed_m_s=[0.02, 0.02]).slides
+    state = halves[0].states[0]
+    slow_then_fast = replace(
+        halves[0],
+        states=(
+            replace(state, steady_s=2.0, speed_m_s=0.01),
+            replace(state, steady_s=2.0, speed_m_s=0.03, stamp_ns=2 * NANOSECONDS),
+        ),
+    )  # 20 mm in the first 2 s on a line between the two speeds, then 60 mm
+    first, second = spans(SlideDataset((slow_then_fast,)).in_parts(2)).values()
+    # 10 mm/s rising to 30 within 2 s are 40 mm, half of the whole 100 mm is reached a third of a second later
+    assert first[1] == pytest.approx(2.333, abs=5e-3)
+    assert second[0] == pytest.approx(first[1] + 1e-3, abs=1e-6)
+
+
+def test_slides_the_other_way_are_counted_from_the_other_end() -> None:
+    cut = ramps(4, speed_m_s=0.02, direction_rad=[0.0, 0.0, math.pi, math.pi]).in_parts(2)
+    assert cut.names.tolist()[-2:] == ['felt/2 part 2/2', 'felt/2 part 1/2']
+    assert spans(cut)['felt/2 part 2/2'][0] == 0.0
+
+
+def test_positions_make_the_place_whatever_the_time() -> None:
+    def at(slide: object, *x_m: float) -> object:
+        state = slide.states[0]
+        places = [
+            replace(state, stamp_ns=state.stamp_ns + k * NANOSECONDS, steady_s=1.0, x_m=x, y_m=0.0)
+            for k, x in enumerate(x_m)
+        ]
+        return replace(slide, states=tuple(places))
+
+    one, other = (slide for slide in ramps(4) if slide.surface == 'cork')
+    cut = SlideDataset((at(one, 0.0, 0.01, 0.02, 0.03), at(other, 0.03, 0.032, 0.036, 0.04))).in_parts(2)
+    assert sorted(cut.condition('place')) in (['1/2', '1/2', '2/2'], ['1/2', '2/2', '2/2'])
+    assert len({slide.place for slide in cut if slide.number == 2}) == 1  # all of it lies in one half
+
+
+def test_whole_slides_are_one_place_and_parts_are_cut_once() -> None:
+    with pytest.raises(InvalidData, match='all are of one place'):
+        ramps().condition('place')
+    with pytest.raises(InvalidData, match='is a part already'):
+        ramps().in_parts(2).in_parts(2)
+    with pytest.raises(InvalidData, match='2 or more are needed'):
+        ramps().in_parts(1)
+
+
+def test_features_tell_session_and_place_of_each_slide() -> None:
+    features = ramps(session='monday').in_parts(2).features(FEATURES)
+    made = features.conditions['cork/1 part 2/2']
+    assert (made.session, made.place) == ('monday', '2/2')
+
+
+def test_the_touch_before_a_slide_belongs_to_its_first_part() -> None:
+    [slide, _] = ramps().slides
+    touch = replace(slide.states[0], phase=Phase.CONTACT, steady_s=1.0)
+    sliding = replace(slide.states[0], stamp_ns=NANOSECONDS, steady_s=3.0)
+    first, second = SlideDataset((replace(slide, states=(touch, sliding)),)).in_parts(2).samples('signal')
+    assert (len(first.before), len(second.before)) == (1000, 0)
+    assert (first.samples[0, 0], second.samples[0, 0]) == (1.0, pytest.approx(2.5, abs=2e-3))

@@ -12,7 +12,14 @@ from texture_features.feature import WindowBatch
 from texture_features.features.taxels import LogShares, SpatialBands
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset, find_slides
-from texture_recordings.public_sets import IMPORTS, evenly, import_fabricslide, import_ntp21
+from texture_recordings.public_sets import (
+    IMPORTS,
+    evenly,
+    import_fabricslide,
+    import_fingersense,
+    import_lmt29,
+    import_ntp21,
+)
 
 PITCH_M = 10e-3
 
@@ -55,6 +62,25 @@ def run(rows: int, speed: int, force: int) -> np.ndarray:
     wave = 40 * np.sin(2 * np.pi * time_s * abs(speed) / 1000.0 / PITCH_M)
     values[:, 3:] = force + np.arange(16) + wave[:, None]
     return values
+
+
+def make_fingersense(folder: Path) -> Path:
+    """Write two fabrics on two dates in two files: ten rows in free air, then a load, then three rows in free air."""
+    rows = np.vstack([np.full((10, 16), 2), 300 + np.arange(16) + np.zeros((200, 1)), np.full((3, 16), 1)])
+    folder.mkdir()
+    for file, date in (('2021-05_06.npz', '2021-05-31'), ('2021-02_03.npz', '2021-02-12')):
+        keys = [
+            f'{date}/{name}' for name in ('Wool/2.5N/10mms', 'Wool/2N/-20mms/1', 'Wool/2N/-20mms', 'Denim/2N/10mms')
+        ]
+        np.savez(folder / file, **dict.fromkeys(keys, rows.astype(np.int16)))
+    return folder
+
+
+def make_lmt29(folder: Path) -> Path:
+    folder.mkdir()
+    sound = {f'{name}/{k:02d}': np.full(22_050, k, np.int16) for name in ('G4Bamboo', 'G9Jeans') for k in (2, 1)}
+    np.savez(folder / 'recordings.npz', **sound)
+    return folder
 
 
 def conditions(bag: Path, topic: str) -> list[tuple[float, float]]:
@@ -103,6 +129,37 @@ def test_speeding_up_is_contact_and_no_slide(tmp_path: Path) -> None:
         assert len(slide.before) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.047, abs=2e-3)
 
 
+def test_a_date_is_a_session_and_slides_are_numbered_over_the_dates(tmp_path: Path) -> None:
+    bags = import_fingersense(make_fingersense(tmp_path / 'in'), tmp_path / 'out')
+    assert [bag.name for bag in bags] == ['2021-02-12', '2021-05-31']
+    dataset = SlideDataset.from_bags(bags).select(labels=['Wool'])
+    assert [(slide.number, slide.session, slide.exploration_id[16:]) for slide in dataset] == [
+        (1, '2021-02-12', '2N/-20mms'), (2, '2021-02-12', '2N/-20mms/1'), (3, '2021-02-12', '2.5N/10mms'),
+        (4, '2021-05-31', '2N/-20mms'), (5, '2021-05-31', '2N/-20mms/1'), (6, '2021-05-31', '2.5N/10mms'),
+    ]  # fmt: skip
+    assert [(slide.speed_m_s, slide.force_n) for slide in dataset][:3] == [(0.02, 2.0), (0.02, 2.0), (0.01, 2.5)]
+    assert [round(math.sin(slide.direction_rad)) for slide in dataset][:3] == [-1, -1, 1]
+    only = import_fingersense(tmp_path / 'in', tmp_path / 'denim', materials=['Denim'], slides='2')
+    assert [slide.name for slide in find_slides(only)] == ['Denim/1']
+    assert only[0].name == '2021-05-31'
+
+
+def test_free_air_before_and_after_is_no_slide(tmp_path: Path) -> None:
+    bags = import_fingersense(make_fingersense(tmp_path / 'in'), tmp_path / 'out', materials=['Denim'])
+    for slide in SlideDataset.from_bags(bags).samples('signal_static'):
+        assert (slide.rate_hz, len(slide.before), len(slide.samples)) == (50.0, 10, 200)
+        np.testing.assert_array_equal(slide.samples[0], 300 + np.arange(16))
+
+
+def test_a_stroke_by_hand_is_one_channel_of_sound_without_conditions(tmp_path: Path) -> None:
+    bags = import_lmt29(make_lmt29(tmp_path / 'in'), tmp_path / 'out')
+    assert [bag.name for bag in bags] == ['G4Bamboo', 'G9Jeans']
+    first, second = SlideDataset.from_bags(bags[:1]).samples('signal')
+    assert (first.rate_hz, first.samples.shape, second.samples[0, 0]) == (22_050.0, (22_050, 1), 2.0)
+    assert math.isnan(first.speed_m_s)
+    assert (first.slide.motion, first.slide.motion_name) == (None, '')
+
+
 def test_the_touch_before_a_slide_is_described_for_the_training(tmp_path: Path) -> None:
     (canvas,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Canvas'])
     dataset, recipe = SlideDataset.from_bags([canvas]), load_recipe('taxels')
@@ -122,7 +179,15 @@ def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_spe
         assert bands.edges_per_m[highest] == pytest.approx(1 / PITCH_M, rel=0.1)
 
 
-@pytest.mark.parametrize(('make', 'topic'), [(make_ntp21, 'signal'), (make_fabricslide, 'signal_static')])
+@pytest.mark.parametrize(
+    ('make', 'topic'),
+    [
+        (make_ntp21, 'signal'),
+        (make_fabricslide, 'signal_static'),
+        (make_fingersense, 'signal_static'),
+        (make_lmt29, 'signal'),
+    ],
+)
 def test_states_come_before_the_samples_they_cover_and_a_slide_ends(tmp_path: Path, make, topic) -> None:
     importer = IMPORTS[make.__name__.removeprefix('make_')]
     bag = importer(make(tmp_path / 'in'), tmp_path / 'out', slides='1')[-1]
@@ -138,11 +203,17 @@ def test_states_come_before_the_samples_they_cover_and_a_slide_ends(tmp_path: Pa
 
 def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tmp_path: Path) -> None:
     ntp, fabric = make_ntp21(tmp_path / 'ntp'), make_fabricslide(tmp_path / 'fabric')
+    dated, sound = make_fingersense(tmp_path / 'dated'), make_lmt29(tmp_path / 'sound')
     broken = tmp_path / 'broken'
     broken.mkdir()
-    for file in ('slides.npz', 'runs.npz'):
+    for file in ('slides.npz', 'runs.npz', '2021-05_06.npz', 'recordings.npz'):
         (broken / file).write_bytes(b'nothing')
-    for importer, source, name in ((import_ntp21, ntp, 'texture30'), (import_fabricslide, fabric, 'Canvass')):
+    for importer, source, name in (
+        (import_ntp21, ntp, 'texture30'),
+        (import_fabricslide, fabric, 'Canvass'),
+        (import_fingersense, dated, 'Wooll'),
+        (import_lmt29, sound, 'G4Bambo'),
+    ):
         with pytest.raises(UnknownName, match='did you mean'):
             importer(source, tmp_path / 'out', materials=[name])
         with pytest.raises(InvalidData, match='none of the slides'):

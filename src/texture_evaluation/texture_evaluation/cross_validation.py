@@ -493,11 +493,18 @@ class Split:
     groups
         What must not be on both sides: 'slide', a condition of `SlideDataset`, such as 'speed', or an array,
         (n_slides,).
+    parts
+        Number of parts into which slides are cut first, for places; 1 leaves them whole.
     """
 
     name: str
     splitter: Splitter
     groups: str | AnyArray = 'slide'
+    parts: int = 1
+
+    def cut(self, dataset: SlideDataset) -> SlideDataset:
+        """Return the slides that are split: those of the data set, or their parts."""
+        return dataset if self.parts == 1 else dataset.in_parts(self.parts)
 
 
 def parse_split(text: str, seed: int = 0) -> Split:
@@ -529,9 +536,13 @@ def _stratified(name: str, argument: str, seed: int) -> Split:
 
 
 def _leave_one_out(name: str, argument: str, seed: int) -> Split:
-    if argument not in (*CONDITIONS, 'slide'):
-        raise InvalidParameter(f"the split is '{name}'; leave one of {', '.join(CONDITIONS)} or slide out")
-    return Split(name, LeaveOneGroupOut(), argument)
+    condition, _, parts = argument.partition(':')
+    of_place = condition == 'place'
+    count = int(parts or 2) if of_place else 1
+    if condition not in (*CONDITIONS, 'slide') or (parts and count < 2):
+        allowed = f'leave one of {", ".join(CONDITIONS)} or slide out; of place name 2 or more parts, as place:4'
+        raise InvalidParameter(f"the split is '{name}'; {allowed}")
+    return Split(name, LeaveOneGroupOut(), condition, count)
 
 
 def _chronological(name: str, argument: str, seed: int) -> Split:
@@ -549,7 +560,7 @@ SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
     'random': _random,
 }
 ALLOWED = (
-    f'write stratified:FOLDS, leave-one-out:CONDITION ({", ".join(CONDITIONS)}), '
+    f'write stratified:FOLDS, leave-one-out:CONDITION ({", ".join(CONDITIONS)}; place:PARTS), '
     'chronological:TRAINING_FRACTION or random:SPLITS'
 )
 
@@ -563,7 +574,10 @@ SPLIT_ADVICE = 'if each session holds one surface, set `session` in the mapping 
 def split_slides(
     dataset: SlideDataset, splitter: Splitter, groups: str | AnyArray = 'slide'
 ) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return the training and test slides of each split, by their place in the data set.
+    """Return the training and test slides of each split, by their index in the data set.
+
+    Where parts of one slide would be on both sides, a split becomes two, each of which trains on every other slide of
+    a surface and tests on those between.
 
     Parameters
     ----------
@@ -588,9 +602,26 @@ def split_slides(
     if type(splitter).__name__.startswith('Stratified'):
         _check_folds(labels, getattr(splitter, 'n_splits', 1))
     try:
-        return list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
+        splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:
         raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
+    return [apart for train, test in splits for apart in _of_other_slides(dataset, train, test)]
+
+
+def _of_other_slides(
+    dataset: SlideDataset, train: NDArray[np.intp], test: NDArray[np.intp]
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Yield a split as it is, or as two if parts of a slide are on both sides."""
+    wholes = np.array([slide.whole_name for slide in dataset])
+    if not np.isin(wholes[test], wholes[train]).any():
+        yield train, test
+        return
+    order: dict[str, dict[int, int]] = {}  # of the numbers of each surface
+    for slide in sorted(dataset, key=lambda slide: slide.number):
+        order.setdefault(slide.surface, {}).setdefault(slide.number, len(order[slide.surface]))
+    odd = np.array([order[slide.surface][slide.number] % 2 == 1 for slide in dataset])
+    for tested in (odd, ~odd):
+        yield train[~tested[train]], test[tested[test]]
 
 
 def refuse_untrained(labels: AnyArray, splits: Sequence[tuple[NDArray[np.intp], NDArray[np.intp]]]) -> None:
@@ -645,7 +676,8 @@ def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
         If there are not as many values as slides.
     """
     if isinstance(groups, str):
-        return dataset.names if groups == 'slide' else dataset.condition(groups)
+        wholes = np.array([slide.whole_name for slide in dataset])
+        return wholes if groups == 'slide' else dataset.condition(groups)
     columns = np.asarray(groups)
     if columns.shape != (len(dataset),):
         raise InvalidData(

@@ -71,7 +71,8 @@ class SlideConditions:
     levels
         Of the channels whose moments are among the features.
     session, place
-        Names of the recording session, and of the place on the surface; only recordings tell them.
+        Recording and part of the path of a slide from recordings: what a training may leave out to see how far it
+        reaches.
 
     Examples
     --------

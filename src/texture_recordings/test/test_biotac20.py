@@ -7,7 +7,7 @@ import pytest
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, TactileSignal, lost_samples
 from texture_recordings.bags import read_bag
-from texture_recordings.dataset import find_slides
+from texture_recordings.dataset import SlideDataset, find_slides
 from texture_recordings.public_sets import frame_indices, import_biotac20, restore_sign
 
 N_FRAMES = 610
@@ -77,6 +77,21 @@ def test_a_state_arrives_before_the_batch_it_covers_and_guarantees_its_length(tm
             assert value.end_ns <= covered_ns
             assert log_ns >= value.end_ns
     assert value.phase is Phase.DONE
+
+
+def test_halves_are_of_equal_distance_by_the_velocity(tmp_path: Path) -> None:
+    source = make_source(tmp_path / 'in')
+    with np.load(source / 'material07.npz') as file:
+        content = dict(file)
+    velocity = content['slide01/velocity']
+    velocity[velocity[:, 0] < 3.0, 1:3] *= 0.5  # half the speed in the first 3 s, so 30 of 90 mm
+    np.savez(source / 'material07.npz', **{**content, 'slide01/velocity': velocity})
+    bags = import_biotac20(source, tmp_path / 'out', slides='1')
+    halves = SlideDataset.from_bags(bags).in_parts(2)
+    assert halves.condition('place').tolist() == ['1/2', '2/2']
+    counts = [sum(len(batch.samples) for batch in half.signals['signal']) for half in halves]
+    assert counts[0] / 2200.0 == pytest.approx(3.75, abs=0.05)  # 45 mm
+    assert sum(counts) == 600 * 22
 
 
 def test_missing_frames_become_a_jump_of_the_index(tmp_path: Path) -> None:

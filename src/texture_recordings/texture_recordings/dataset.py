@@ -70,6 +70,8 @@ class LabelledSlide:
         Batches of each topic in the order of time; empty if only the places of the slides were read.
     states
         Exploration states, in the order of time.
+    place
+        Which part of the path it covers, such as '1/2'; '' for a whole slide. See `SlideDataset.in_parts`.
 
     Examples
     --------
@@ -88,10 +90,16 @@ class LabelledSlide:
     motion: SlideMotion | None = None
     signals: Mapping[str, Sequence[TactileSignal]] = field(default_factory=dict, compare=False, repr=False)
     states: Sequence[ExplorationState] = field(default=(), compare=False, repr=False)
+    place: str = ''
 
     @property
     def name(self) -> str:
-        """Surface and number, such as 'cork/3': unlike exploration ids, unique over all bags."""
+        """Surface and number, such as 'cork/3', and the part if it is one: unique over all bags."""
+        return f'{self.whole_name} part {self.place}' if self.place else self.whole_name
+
+    @property
+    def whole_name(self) -> str:
+        """Name of the slide of which this is a part; of a whole slide its own."""
         return f'{self.surface}/{self.number}'
 
     @property
@@ -631,6 +639,10 @@ class SlideDataset:
         if name not in CONDITIONS:
             raise InvalidData(f"slides have no condition '{name}'; use one of {', '.join(CONDITIONS)}")
         values = np.array([CONDITIONS[name](slide) for slide in self.slides])
+        if name == 'place' and not all(values):
+            raise InvalidData(
+                'the slides are not cut into parts, so all are of one place; cut them by in_parts(2) first'
+            )
         if values.dtype.kind != 'f':
             return values
         unknown = np.flatnonzero(np.isnan(values))
@@ -691,6 +703,53 @@ class SlideDataset:
         """
         return SlideDataset(tuple(self.slides[int(index)] for index in np.arange(len(self))[indices]))
 
+    def in_parts(self, count: int) -> SlideDataset:
+        """Return the slides cut into parts at different places of their surface, which keep their numbers.
+
+        The path of each surface is divided into equal lengths: along the longest extent of the reported positions;
+        where a slide tells none, by the distance from its start; without speeds, by the time. Slides that run the other
+        way are then counted from the other end. No window spans two parts, as each is a slide of its own.
+
+        Slides over one track are one place, however many: only the parts of it show how far a training reaches.
+
+        Parameters
+        ----------
+        count
+            Number of parts, from 2 on.
+
+        Returns
+        -------
+        SlideDataset
+            In the same order, the parts of a slide in the order of time.
+
+        Raises
+        ------
+        InvalidData
+            If `count` is below 2, the slides are cut already, or one has no state while sliding.
+
+        Examples
+        --------
+        >>> dataset = SlideDataset.from_arrays({'signal': [np.ones((100, 1))]}, ['cork'], {'signal': 100.0})
+        >>> dataset.in_parts(2).names.tolist()
+        ['cork/1 part 1/2', 'cork/1 part 2/2']
+        """
+        if count < 2:
+            raise InvalidData(f'slides are to be cut into {count} parts; 2 or more are needed')
+        if cut := next((slide for slide in self.slides if slide.place or not slide.sliding), None):
+            why = 'is a part already' if cut.place else 'tells no time of sliding'
+            raise InvalidData(f"slide '{cut.name}' in '{cut.bag}' {why}; cut whole slides with their states")
+        stretches: dict[str, list[_Stretch]] = {}
+        for surface in dict.fromkeys(slide.surface for slide in self.slides):
+            own = [slide for slide in self.slides if slide.surface == surface]
+            stretches |= {slide.name: found for slide, found in zip(own, _stretches(own, count), strict=True)}
+        return SlideDataset(
+            tuple(
+                _part(slide, stretch, f'{stretch.cell + 1}/{count}')
+                for slide in self.slides
+                for stretch in stretches[slide.name]
+            )
+        )
+
     def windows(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[WindowEvent]]]:
         """Yield each slide with its windows and its end, as the feature extractor on the robot cuts them.
 
@@ -746,10 +805,10 @@ class SlideDataset:
         features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
         touches = self._touches(feature_set, touch_s) if touch_s else {}
+        slides = {slide.name: slide for slide in self.slides}
         conditions = {
-            slide.name: replace(features.conditions[slide.name], session=slide.session)
-            for slide in self.slides
-            if slide.name in features.conditions
+            name: replace(made, session=slides[name].session, place=slides[name].place)
+            for name, made in features.conditions.items()
         }
         augmented = self._augmented(feature_set, augmentation)
         return replace(features, motions=motions, conditions=conditions, augmented=augmented, touches=touches)
@@ -937,6 +996,96 @@ def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
     )
 
 
+# --------------------
+# Slides cut into parts: the place on the surface as a condition.
+
+STEP_NS = 1_000_000  # to which a cut is placed
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """A stretch of a slide within one cell of the path."""
+
+    cell: int
+    begin_ns: int
+    end_ns: int
+
+
+def _stretches(slides: Sequence[LabelledSlide], count: int) -> list[list[_Stretch]]:
+    """Return for each slide of one surface its stretches in equal cells of the path, in the order of time."""
+    spans = [_covered(slide.sliding) for slide in slides]
+    grids = [np.arange(start_ns, end_ns, STEP_NS) for start_ns, end_ns in spans]
+    ways, low, high = _ways(slides, grids)
+    found = []
+    for (_, end_ns), grid, way in zip(spans, grids, ways, strict=True):
+        cells = np.clip(np.floor((way - low) / max(high - low, 1e-12) * count), 0, count - 1).astype(int)
+        edges = [0, *(np.flatnonzero(np.diff(cells)) + 1).tolist(), len(grid)]
+        times = [*grid[edges[:-1]].tolist(), end_ns]
+        runs = [_Stretch(int(cells[edge]), *span) for edge, span in zip(edges[:-1], pairwise(times), strict=True)]
+        # Of a path that comes back to a cell, the longest stretch is kept.
+        longest = {run.cell: run for run in sorted(runs, key=lambda run: run.end_ns - run.begin_ns)}
+        found.append([run for run in runs if longest[run.cell] is run])
+    return found
+
+
+def _ways(slides: Sequence[LabelledSlide], grids: Sequence[AnyArray]) -> tuple[list[Array], float, float]:
+    """Return how far along the path of their surface slides were at the times of grids, and where the path lies."""
+    stamps = [np.array([state.stamp_ns for state in slide.sliding]) for slide in slides]
+    points = [np.array([(state.x_m, state.y_m) for state in slide.sliding]) for slide in slides]
+    if all(np.isfinite(own).all() for own in points) and len({s.frame_id for x in slides for s in x.sliding}) == 1:
+        together = np.concatenate(points)
+        axis = np.linalg.svd(together - together.mean(axis=0), full_matrices=False)[2][0]
+        ways = [np.interp(grid, at, own @ axis) for grid, at, own in zip(grids, stamps, points, strict=True)]
+        return ways, min(map(np.min, ways)), max(map(np.max, ways))
+    speeds = [np.array([state.speed_m_s for state in slide.sliding]) for slide in slides]
+    if not all(np.isfinite(own).all() for own in speeds):
+        speeds = [np.ones(len(own)) for own in speeds]
+    ways = [
+        np.cumsum(np.r_[0.0, np.interp(grid, at, own)[:-1]]) * (STEP_NS / NANOSECONDS)
+        for grid, at, own in zip(grids, stamps, speeds, strict=True)
+    ]
+    length = float(np.median([way[-1] for way in ways]))
+    turned = [math.cos(slide.direction_rad - slides[0].direction_rad) < 0.0 for slide in slides]  # NaN is not turned
+    return [length - way if back else way for way, back in zip(ways, turned, strict=True)], 0.0, length
+
+
+def _part(slide: LabelledSlide, stretch: _Stretch, place: str) -> LabelledSlide:
+    """Return a stretch as a slide; the first one keeps what came before the slide, the last one what came after."""
+    start_ns, stop_ns = _covered(slide.sliding)
+    first, last = stretch.begin_ns <= start_ns, stretch.end_ns >= stop_ns
+    begin_ns, end_ns = stretch.begin_ns, stretch.end_ns
+    sliding = slide.sliding
+    states = [state for state in slide.states if first and state.stamp_ns < begin_ns]
+    for state, after in zip(sliding, [*sliding[1:], None], strict=True):
+        if state.stamp_ns < end_ns and (after is None or after.stamp_ns > begin_ns):
+            since_ns = max(state.stamp_ns, begin_ns)
+            until_ns = min(state.stamp_ns + round(state.steady_s * NANOSECONDS), end_ns)
+            states.append(replace(state, stamp_ns=since_ns, steady_s=max(0, until_ns - since_ns) / NANOSECONDS))
+    if last:
+        states += [state for state in slide.states if state.stamp_ns > sliding[-1].stamp_ns]
+    else:
+        states.append(replace(states[-1], stamp_ns=end_ns, phase=Phase.LIFT, steady_s=0.0))
+    since, until = (None if first else begin_ns), (None if last else end_ns)
+    signals = {
+        topic: tuple(cut for batch in batches if (cut := _between(batch, since, until)))
+        for topic, batches in slide.signals.items()
+    }
+    return replace(slide, place=place, motion=motion_made(states), signals=signals, states=states)
+
+
+def _between(batch: TactileSignal, begin_ns: int | None, end_ns: int | None) -> TactileSignal | None:
+    """Return the samples of a batch from a time to before another; None without any."""
+    per_ns, count = batch.sampling_rate_hz / NANOSECONDS, len(batch.samples)
+    first, last = (
+        default if at is None else min(count, max(0, math.ceil((at - batch.stamp_ns) * per_ns - 1e-6)))
+        for at, default in ((begin_ns, 0), (end_ns, count))
+    )
+    if first >= last:
+        return None
+    stamp_ns = batch.stamp_ns + round(first / per_ns)
+    return replace(batch, stamp_ns=stamp_ns, first_sample=batch.first_sample + first, samples=batch.samples[first:last])
+
+
 CONDITIONS: Mapping[str, Callable[[LabelledSlide], Any]] = {
     'speed': lambda slide: slide.speed_m_s,  # m/s
     'force': lambda slide: slide.force_n,  # N
@@ -944,6 +1093,7 @@ CONDITIONS: Mapping[str, Callable[[LabelledSlide], Any]] = {
     'motion': lambda slide: slide.motion_name,
     'sensor': lambda slide: slide.sensor,
     'session': lambda slide: slide.session,
+    'place': lambda slide: slide.place,
     'number': lambda slide: slide.number,
 }
 

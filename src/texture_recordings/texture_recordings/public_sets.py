@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timezone
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -291,6 +292,8 @@ class SteadySlide:
         Of the finger; NaN if unknown.
     steady
         Samples in which the finger slides; before them it is in contact, after them it lifts. All if None.
+    motion
+        Name of the motion; '' if it is none of the catalogue.
 
     Examples
     --------
@@ -306,6 +309,7 @@ class SteadySlide:
     force_n: float
     direction_rad: float
     steady: range | None = None
+    motion: str = 'linear_slide'
 
 
 @dataclass(frozen=True)
@@ -329,7 +333,9 @@ class ImportedStream:
         return round(samples * NANOSECONDS / self.rate_hz)
 
 
-def write_steady_slides(path: Path, stream: ImportedStream, slides: Iterable[SteadySlide]) -> Path:
+def write_steady_slides(
+    path: Path, stream: ImportedStream, slides: Iterable[SteadySlide], start_ns: int = START_NS
+) -> Path:
     """Write a bag of slides, one after the other in the order given; the stamps are made up.
 
     A state is published at the start of each phase and guarantees its whole length: speed and force do not change.
@@ -342,13 +348,15 @@ def write_steady_slides(path: Path, stream: ImportedStream, slides: Iterable[Ste
         Topic, sensor, channels and rate of the samples.
     slides
         In the order of their writing.
+    start_ns
+        Stamp of the first slide.
 
     Returns
     -------
     Path
         Of the bag.
     """
-    start_ns, first = START_NS, 0
+    first = 0
     with BagWriter(path) as bag:
         for slide in slides:
             start_ns = _write(bag, stream, slide, start_ns, first) + PAUSE_NS
@@ -362,7 +370,7 @@ def _write(bag: BagWriter, stream: ImportedStream, slide: SteadySlide, start_ns:
     steady = slide.steady or range(count)
     phases = [(Phase.CONTACT, range(steady.start)), (Phase.SLIDE, steady), (Phase.LIFT, range(steady.stop, count))]
     named = ExplorationState(
-        0, slide.exploration_id, 'linear_slide', Phase.SLIDE, speed_m_s=slide.speed_m_s, force_n=slide.force_n,
+        0, slide.exploration_id, slide.motion, Phase.SLIDE, speed_m_s=slide.speed_m_s, force_n=slide.force_n,
         direction_rad=slide.direction_rad, surface=slide.surface,
     )  # fmt: skip
     for phase, part in phases:
@@ -407,12 +415,12 @@ def _write_phase(
 
 
 # --------------------
-# A data set whose slides lie in one .npz file, to one bag for each surface.
+# A data set whose slides lie in .npz files, to one bag for each surface or session.
 
 
 @dataclass(frozen=True)
 class SlideFile:
-    """What the file is called, and how its keys and arrays are read; slides are numbered in order of conditions.
+    """What the files are called, and how their keys and arrays are read; slides are numbered in order of conditions.
 
     Examples
     --------
@@ -430,10 +438,12 @@ class SlideFile:
     ['cork/1', 'cork/2']
     """
 
-    name: str
+    name: str  # or a pattern, such as '2021-*.npz'
     stream: ImportedStream
     place: Callable[[str], tuple[str, Any] | None]  # surface and condition of a key, None if it is no such key
     slide: Callable[[str, str, Any, AnyArray], SteadySlide]  # of key, surface, condition and array
+    # Bag and stamp of its first slide, of surface and condition: a bag is a session
+    session: Callable[[str, Any], tuple[str, int]] = lambda surface, _: (surface, START_NS)
 
     def write_bags(self, source: str | Path, out: str | Path, slides: str, surfaces: Sequence[str]) -> list[Path]:
         """Write the slides of each surface that `slides` names ('' for all), of all surfaces if none is named.
@@ -469,16 +479,15 @@ class SlideFile:
         for name in surfaces:
             if name not in found:
                 raise unknown_name(name, found, 'surface')
+        sessions: defaultdict[tuple[str, int], list[tuple[str, str, Any]]] = defaultdict(list)
+        for name in surfaces or sorted(found):
+            for condition, key in _chosen(name, found[name], wanted):
+                sessions[self.session(name, condition)].append((key, name, condition))
         return [
             write_steady_slides(
-                Path(out) / name,
-                self.stream,
-                (
-                    self._slide(key, name, condition, content[key])
-                    for condition, key in _chosen(name, found[name], wanted)
-                ),
+                Path(out) / bag, self.stream, (self._slide(*slide, content[slide[0]]) for slide in slides), start_ns
             )
-            for name in (surfaces or sorted(found))
+            for (bag, start_ns), slides in sorted(sessions.items(), key=lambda item: item[0][1])
         ]
 
     def _slide(self, key: str, surface: str, condition: Any, values: AnyArray) -> SteadySlide:
@@ -490,18 +499,23 @@ class SlideFile:
             ) from error
 
     def _read(self, folder: Path) -> dict[str, AnyArray]:
-        file = folder / self.name
-        if not file.is_file():
+        files = sorted(path for path in folder.glob(self.name) if path.is_file())
+        if not files:
             raise InvalidData(f"no file {self.name} in '{folder}'; give the folder that holds it")
-        try:
-            with open_regular(file) as opened:
-                content = Arrays(opened)
-                return {key: _slide(key, content[key]) for key in content.names}
-        except (OSError, ValueError, KeyError) as error:
-            raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
+        return {key: values for file in files for key, values in _arrays(file).items()}
+
+
+def _arrays(file: Path) -> dict[str, AnyArray]:
+    try:
+        with open_regular(file) as opened:
+            content = Arrays(opened)
+            return {key: _slide(key, content[key]) for key in content.names}
+    except (OSError, ValueError, KeyError) as error:
+        raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
 
 
 def _slide(key: str, values: AnyArray) -> AnyArray:
+    values = values[:, None] if values.ndim == 1 else values
     if values.ndim != 2 or values.dtype.kind not in 'iuf' or len(values) < 2 or not np.isfinite(values).all():
         raise ValueError(
             f"'{key}' has shape {values.shape}, type {values.dtype}; finite (n_samples, n_channels) are needed"
@@ -716,6 +730,130 @@ def import_ntp21(
 
 
 # --------------------
+# The slides of a 16-taxel capacitive finger over the same fabrics on several dates, one labelled bag a date.
+#
+# Source: github wngfra/fingerSense (Apache-2.0) with its history, joined into `2021-02_03.npz` and `2021-05_06.npz`
+# with a key `date/Fabric/forceN/speedmms[/repeat]` for each slide.
+
+FINGERSENSE = re.compile(r'(\d{4}-\d\d-\d\d)/([^/]+)/(\d+(?:\.\d+)?)N/(-?\d+)mms(?:/(\d+))?')
+# No rate is published. Rows of a slide grow by 28 (May) to 32 (February) m over the speed in m/s; at 50 Hz that is a
+# way of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
+NOMINAL_HZ = 50.0
+FINGERSENSE_STREAM = ImportedStream(
+    'signal_static', 'cpm/taxels', tuple(f'taxel{number}' for number in range(1, 17)), 'count', NOMINAL_HZ
+)
+FREE_SHARE = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact
+
+
+class DatedRun(NamedTuple):
+    """How one slide was made; sorted as the slides are numbered: by date, then force, speed and repeat.
+
+    Examples
+    --------
+    >>> sorted([DatedRun('2021-05-31', 2.0, 10, 0), DatedRun('2021-05-27', 4.0, 10, 0)])[0].date
+    '2021-05-27'
+    """
+
+    date: str
+    force_n: float
+    speed_mm_s: int
+    repeat: int
+
+
+def fingersense_place(key: str) -> tuple[str, DatedRun] | None:
+    """Return fabric of a key, and the run."""
+    match = FINGERSENSE.fullmatch(key)
+    return (match[2], DatedRun(match[1], float(match[3]), int(match[4]), int(match[5] or 0))) if match else None
+
+
+def fingersense_slide(key: str, surface: str, run: DatedRun, recorded: AnyArray) -> SteadySlide:
+    """Return a slide, given its rows as recorded.
+
+    Parameters
+    ----------
+    key
+        Name of the slide in the file.
+    surface
+        Label of the fabric or grating.
+    run
+        Date, force, speed and repeat.
+    recorded : (n_rows, 16)
+        The taxels.
+
+    Returns
+    -------
+    SteadySlide
+        It slides from the first row in contact to the last.
+    """
+    load = recorded.mean(axis=1)
+    touching = np.flatnonzero(load > FREE_SHARE * np.quantile(load, 0.9))
+    steady = range(int(touching[0]), int(touching[-1]) + 1) if len(touching) else None
+    direction_rad = math.copysign(math.pi / 2, run.speed_mm_s)
+    return SteadySlide(key, surface, recorded, abs(run.speed_mm_s) / 1000.0, run.force_n, direction_rad, steady)
+
+
+def _fingersense_session(_surface: str, run: DatedRun) -> tuple[str, int]:
+    midnight = datetime.fromisoformat(run.date).replace(tzinfo=timezone.utc)
+    return run.date, round(midnight.timestamp()) * NANOSECONDS
+
+
+FINGERSENSE_DATA = SlideFile(
+    '2021-*.npz', FINGERSENSE_STREAM, fingersense_place, fingersense_slide, _fingersense_session
+)
+
+
+def import_fingersense(
+    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
+) -> list[Path]:
+    """Write one bag a date ('2021-05-31'), so that a session is a date, from all 2021-*.npz, and return their paths.
+
+    The slides of a fabric are numbered by date, then force, speed and repeat. No rate is published: rows are written at
+    a nominal 50 Hz, on `signal_static`; there is no vibration, so `channels` must be 'all'. Direction: +π/2 for speeds
+    above 0, −π/2 below. Forces are as the keys name them; those of 100 and more (23 May) are hardly newtons. The states
+    say `contact` until the taxels carry a load and `lift` once they carry none.
+    """
+    if channels != 'all':
+        raise InvalidData(f"channels are '{channels}'; this finger has slow taxels alone, import 'all'")
+    return FINGERSENSE_DATA.write_bags(source, out, slides, materials)
+
+
+# --------------------
+# Contact sound of a tool that strokes 29 textures by hand, as labelled bags.
+#
+# Source: the LMT haptic texture database (Strese et al. 2014) as it stands in the history of github
+# shinolab/vibrotactile-autoencoder, joined into one `recordings.npz` with a key `G1Texture[VersionN]/NN` a stroke.
+
+STROKE = re.compile(r'(G\d[^/]*)/(\d+)')
+LMT29_STREAM = ImportedStream('signal', 'lmt/microphone', ('sound',), 'count', 22_050.0)
+
+
+def lmt29_place(key: str) -> tuple[str, int] | None:
+    """Return texture and number of a key."""
+    match = STROKE.fullmatch(key)
+    return (match[1], int(match[2])) if match else None
+
+
+def lmt29_slide(key: str, texture: str, _number: int, recorded: AnyArray) -> SteadySlide:
+    """Return a stroke, given its samples (n, 1): by hand, so speed, force and direction are unknown."""
+    return SteadySlide(key, texture, recorded[:, :1], math.nan, math.nan, math.nan, motion='')
+
+
+LMT29_DATA = SlideFile('recordings.npz', LMT29_STREAM, lmt29_place, lmt29_slide)
+
+
+def import_lmt29(
+    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
+) -> list[Path]:
+    """Write one bag a texture, 'G4Bamboo' and so on, from recordings.npz, and return their paths.
+
+    Sound at 22 050 Hz on `signal`, as recorded: the whole stroke counts as sliding. Fast channels and all are the same.
+    """
+    if channels not in ('fast', 'all'):
+        raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")
+    return LMT29_DATA.write_bags(source, out, slides, materials)
+
+
+# --------------------
 # Data sets that `texture import` knows.
 
 
@@ -761,4 +899,6 @@ IMPORTS: Mapping[str, Importer] = {
     'biotac20': import_biotac20,  # 20 materials × 40 slides, BioTac on a robot arm
     'ntp21': import_ntp21,  # 21 textures × speeds × forces, 9-taxel MEMS array
     'fabricslide': import_fabricslide,  # 7 fabrics × forces × speeds × 2 directions and gratings, 16 capacitive taxels
+    'fingersense': import_fingersense,  # fabrics on several dates in 2021, 16 capacitive taxels
+    'lmt29': import_lmt29,  # contact sound of 29 textures, a tool stroked by hand
 }

@@ -41,8 +41,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--cross-validate',
         metavar='SPLIT',
-        help='train and test a recipe on splits of the slides: stratified:5, leave-one-out:speed, chronological:0.75 '
-        'or random:20',
+        help='train and test a recipe on splits of the slides: stratified:5, leave-one-out:speed, '
+        'leave-one-out:place:4 (quarters of the path), chronological:0.75 or random:20',
     )
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='folds computed at once; -1: one per core')
     add_dask(parser)
@@ -74,7 +74,7 @@ def run_cross_validation(options: argparse.Namespace) -> int:
     _check_outputs(options, [*names, *bags])
     recipes = [with_channels(load_recipe(name), options.channels or 'all') for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
-    dataset = SlideDataset.from_bags(bags, options.slides, topics=tuple(topics))
+    dataset = split.cut(SlideDataset.from_bags(bags, options.slides, topics=tuple(topics)))
     with dask_backend(options.dask) if options.dask else nullcontext():
         n_jobs = None if options.dask else options.jobs
         results = [cross_validate(recipe, dataset, split.splitter, n_jobs, groups=split.groups) for recipe in recipes]
