@@ -8,7 +8,6 @@ import pytest
 
 from texture_core.types import Window
 from texture_features.augmentation import (
-    DISTURBANCES,
     KINDS,
     NOISE,
     Augmentation,
@@ -101,10 +100,6 @@ def test_copies_without_any_range_are_the_slide_itself() -> None:
     assert len(same.disturbed.groups) == 0
 
 
-def test_without_copies_there_is_nothing() -> None:
-    assert augmented(copies=0) is None
-
-
 def test_only_the_vibration_is_amplified_clipped_and_held() -> None:
     rng = np.random.default_rng(0)
     windows = one_input(rng.standard_normal((3, 400, 2)))
@@ -150,11 +145,3 @@ def test_a_low_pass_halves_the_power_at_its_cut_off_and_keeps_what_is_far_below(
     assert passed[100.0] == pytest.approx(0.5, abs=0.03)
     slow = dataclasses.replace(tones[100.0], vibration=False)
     np.testing.assert_array_equal(low_pass(slow, 0.05, np.random.default_rng(0)), slow.samples)
-
-
-def test_strengths_are_uniform_in_their_logarithm() -> None:
-    rng = np.random.default_rng(0)
-    drift = DISTURBANCES['drift']
-    drawn = np.log([drift.draw(rng) for _ in range(2000)])
-    assert math.log(drift.weakest) <= drawn.min() < drawn.max() <= math.log(drift.strongest)
-    assert drawn.mean() == pytest.approx(math.log(math.sqrt(drift.weakest * drift.strongest)), abs=0.1)

@@ -1,10 +1,15 @@
+from __future__ import annotations
+
 import dataclasses
+import json
+import math
 
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidParameter, TextureError, UnknownName
-from texture_core.types import Window
+from texture_core.errors import InvalidParameter, TextureError
+from texture_core.types import FeatureVector, Window
+from texture_features.examples import RunningConditions, SlideConditions
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, SlideEnd
 
@@ -120,11 +125,6 @@ def test_a_file_that_is_no_recipe_gets_one_sentence(tmp_path, text):
     assert '\n' not in str(caught.value)
 
 
-def test_an_unknown_recipe_is_answered_with_the_nearest():
-    with pytest.raises(UnknownName, match="did you mean 'default'"):
-        FeatureSet.load('defalt')
-
-
 def test_one_input_is_described_twice_with_features_of_their_own() -> None:
     recipe = {
         'inputs': {
@@ -142,6 +142,91 @@ def test_one_input_is_described_twice_with_features_of_their_own() -> None:
     assert {name.split('/')[1] for name in found if name.startswith('signal#2')} == {'hjorth', 'speed'}
 
 
-def test_a_further_description_of_an_input_needs_a_name() -> None:
-    with pytest.raises(InvalidParameter, match="has a name after '#', as in 'signal#2'"):
-        FeatureSet.from_mapping({'inputs': {'signal#': {'features': ['hjorth']}}})
+LAYOUT = ((100.0, ('a', 'b')),)
+
+
+def feature_set(tare: str = '') -> FeatureSet:
+    option = {'tare': tare} if tare else {}
+    return FeatureSet.from_mapping({'inputs': {'signal_static': {**option, 'features': ['mean']}}})
+
+
+def test_a_recipe_that_states_nothing_takes_any_signal() -> None:
+    assert feature_set().tare_faults({'signal_static': 'x (tared)'}) == []
+    assert 'tare' not in feature_set().as_mapping()['inputs']['signal_static']
+
+
+@pytest.mark.parametrize(('tare', 'sensor'), [('raw', 'x'), ('tared', 'x (tared)')])
+def test_a_signal_as_the_recipe_states_is_no_fault(tare: str, sensor: str) -> None:
+    assert feature_set(tare).tare_faults({'signal_static': sensor}) == []
+    assert feature_set(tare).tare_faults({}) == []  # nothing has come yet
+
+
+@pytest.mark.parametrize(
+    ('tare', 'sensor', 'is_what'), [('tared', 'x', 'not subtracted'), ('raw', 'x (tared)', 'is sub')]
+)
+def test_another_signal_is_reported_with_what_to_do(tare: str, sensor: str, is_what: str) -> None:
+    (fault,) = feature_set(tare).tare_faults({'signal_static': sensor})
+    assert is_what in fault
+    assert 'subtract_baseline' in fault
+
+
+def test_the_statement_is_kept_in_the_recipe_and_does_not_change_the_features() -> None:
+    assert feature_set('raw').as_mapping()['inputs']['signal_static']['tare'] == 'raw'
+    assert feature_set('raw').fingerprint(LAYOUT) == feature_set().fingerprint(LAYOUT)
+
+
+def test_an_unknown_statement_is_refused() -> None:
+    with pytest.raises(InvalidParameter, match='tare'):
+        feature_set('maybe')
+
+
+def window(**known: object) -> FeatureVector:
+    return FeatureVector(0, 'e', 0.5, 0.1, **known)
+
+
+def test_conditions_are_means_over_the_windows_that_know_them() -> None:
+    running = RunningConditions()
+    for speed, force in ((0.02, 1.0), (0.04, math.nan), (0.06, 2.0)):
+        running.update(window(speed_m_s=speed, force_n=force, motion='circular', sensor='tsf85/dynamic'))
+    found = running.get()
+    assert (found.motion, found.sensor) == ('circular', 'tsf85/dynamic')
+    assert (found.speed_m_s, found.force_n) == (pytest.approx(0.04), pytest.approx(1.5))
+    assert found.speed_range_m_s == (pytest.approx(0.02), pytest.approx(0.04))  # 0.02, 0.03 and 0.04
+
+
+def test_what_no_window_knows_stays_unknown() -> None:
+    running = RunningConditions()
+    running.update(window())
+    found = running.get()
+    assert (found.motion, found.sensor, found.directions_rad) == ('', '', ())
+    assert math.isnan(found.speed_m_s)
+    assert all(map(math.isnan, found.force_range_n))
+    assert SlideConditions().motion == ''
+
+
+def test_a_long_slide_has_few_directions() -> None:
+    running = RunningConditions()
+    for number in range(1000):
+        running.update(window(direction_rad=math.pi * (number % 2) + 1e-4 * (number % 7)))
+    assert running.get().directions_rad == (0.0, 3.14)
+
+
+def test_the_level_of_a_channel_is_the_geometric_mean_of_the_rms_of_its_windows() -> None:
+    names = ('signal/hjorth/mobility/a', 'signal/moments/signal_log_power/a', 'signal/moments/signal_log_power/b')
+    running = RunningConditions()
+    for rms in (1.0, 4.0):
+        log_power = 2.0 * math.log(rms)
+        running.update(window(names=names, values=np.array([7.0, log_power, log_power + 2.0 * math.log(10.0)])))
+    first, second = running.get().levels
+    assert first == ('signal/a', pytest.approx(2.0), pytest.approx(1.0), pytest.approx(2.0))
+    assert (second.channel, second.rms) == ('signal/b', pytest.approx(20.0))
+
+
+def test_conditions_survive_a_file() -> None:
+    running = RunningConditions()
+    names = ('signal/moments/signal_log_power/a',)
+    running.update(window(names=names, values=np.zeros(1), speed_m_s=0.05, motion='circular', direction_rad=0.5))
+    stored = json.loads(json.dumps(dataclasses.asdict(running.get())))
+    found = SlideConditions.from_mapping(stored)
+    assert repr(found) == repr(running.get())  # NaN is not equal to itself
+    assert repr(SlideConditions.from_mapping({})) == repr(SlideConditions())

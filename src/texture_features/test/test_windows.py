@@ -6,15 +6,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from texture_core.errors import InvalidParameter
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
+from texture_features.feature_set import FeatureSet
 from texture_features.windows import (
-    BufferedStream,
+    AxisJoiner,
     CutWindow,
     SlideCoverage,
     SlideEnd,
     WindowCutter,
     WindowParams,
+    axis_along,
     cut_recording,
+    split_axis,
 )
 
 PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
@@ -73,16 +77,6 @@ def test_windows_cover_the_guaranteed_time_and_no_more():
     assert starts(events) == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
     assert first_samples(events) == [1000, 1100, 1200, 1300, 1400, 1500]
     assert events[-1] == SlideEnd(ns(2.0), 'e1', 0.1)
-
-
-def test_two_slide_states_cover_the_time_between_them():
-    states = [state(1.0), state(1.4), state(1.8), state(1.9, Phase.LIFT)]
-    assert starts(run({'signal': stream(3.0)}, states)) == [1.0, 1.1, 1.2, 1.3]
-
-
-def test_slide_states_too_far_apart_leave_a_hole():
-    states = [state(0.0, steady_s=0.6), state(1.25, steady_s=0.6), state(2.0, Phase.LIFT)]
-    assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 1.3]
 
 
 def test_a_state_in_the_air_withdraws_the_guarantee_and_leaves_a_hole_up_to_the_next_state():
@@ -165,12 +159,6 @@ def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, win
     assert len(asked) < 50
 
 
-def test_what_a_stream_delivered_before_it_began_again_is_not_passed_over_with_its_gaps():
-    signals = [*stream(2.0, begin_s=10.0), *stream(2.0, begin_s=20.0)]
-    *cut, end = run({'signal': signals}, [state(0.0, steady_s=30.0)])
-    assert (len(cut), end.skipped) == (32, 296 - 32)
-
-
 def test_speed_and_force_are_means_over_the_window():
     states = [
         state(0.0, speed_m_s=0.1, force_n=math.nan),
@@ -222,31 +210,6 @@ def test_a_stream_that_goes_on_is_no_silence():
         events += cutter.time_out(0.2 * number)
     assert len(starts(events)) == 6
     assert isinstance(events[-1], SlideEnd)
-
-
-def test_an_idle_cutter_keeps_a_few_seconds_only():
-    cutter = WindowCutter(PARAMS, ['signal'], keep_s=1.0)
-    for batch in stream(30.0, batch=20):
-        cutter.add_signal('signal', batch)
-        cutter.take()
-    [run_kept] = cutter._inputs['signal'].stream.buffers
-    assert run_kept.next_sample - run_kept.first_sample <= 1020
-    assert len(run_kept._rows) <= 2 * 1040
-    assert len(run_kept._marks) <= 52
-
-
-def test_a_huge_jump_of_the_index_is_a_loss_and_takes_no_memory():
-    cutter = WindowCutter(PARAMS, ['signal'])
-    cutter.add_signal('signal', stream(0.1)[0])
-    cutter.add_signal('signal', dataclasses.replace(stream(0.1)[1], first_sample=2**60))
-    assert cutter.counts['lost_samples'] == 2**60 - 5
-    assert len(cutter._inputs['signal'].stream.buffers[0]._rows) < 50_000
-
-
-def test_topics_that_are_no_input_are_ignored():
-    cutter = WindowCutter(PARAMS, ['signal'])
-    cutter.add_signal('other', stream(0.1)[0])
-    assert cutter.waiting_for == ('signal',)
 
 
 def recording(rng):
@@ -301,16 +264,6 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
     assert as_data(events + cutter.finish()) == expected
 
 
-def test_a_stream_that_ended_is_forgotten_when_another_has_run_for_as_long_as_is_kept():
-    kept = BufferedStream(keep_s=1.0)
-    for batch in stream(0.5) + stream(0.4, begin_s=1.0):
-        kept.add(batch)
-    assert len(kept.buffers) == 2
-    for batch in stream(0.6, begin_s=1.0)[-40:]:
-        kept.add(batch)
-    assert [run.next_sample for run in kept.buffers] == [600]
-
-
 def test_a_finger_that_drops_out_beside_another_is_named_and_two_silent_ones_are_not() -> None:
     fingers = ('finger0/signal', 'finger1/signal')
     cutter = WindowCutter(PARAMS, fingers)
@@ -324,3 +277,164 @@ def test_a_finger_that_drops_out_beside_another_is_named_and_two_silent_ones_are
         cutter.time_out(100.0 + 0.5 * number)
     assert cutter.dropped(101.5) == ('finger1/signal',)
     assert cutter.dropped(103.0) == ()  # nothing comes at all: the sensor itself reports that
+
+
+RATE_HZ = 100.0
+AXES_PARAMS = WindowParams(length_s=1.0, hop_s=0.5)
+BOTH = ('signal@x', 'signal@y')
+Y = 0.5 * math.pi
+
+
+def signal(seconds):
+    """Return a signal whose samples are their time, s."""
+    samples = np.arange(round(seconds * RATE_HZ), dtype=np.float32)[:, None] / RATE_HZ
+    return TactileSignal(0, 's', ('pac',), (), RATE_HZ, 0, samples)
+
+
+def leg(start_s, seconds, direction_rad, speed_m_s=0.02):
+    """Return the states of steady sliding in one direction, and that nothing is guaranteed after it."""
+    end_s = start_s + seconds
+    times = np.arange(start_s, end_s - 1e-9, 0.1)
+    steady = [(at, min(0.1, end_s - at), direction_rad) for at in times]
+    return [
+        ExplorationState(
+            round(at * NANOSECONDS),
+            'a',
+            'cross_slide',
+            Phase.SLIDE,
+            steady_s,
+            speed_m_s,
+            1.0,
+            direction,
+            surface='linen',
+        )
+        for at, steady_s, direction in [*steady, (end_s, 0.0, direction_rad)]
+    ]
+
+
+def cut(*legs, inputs=BOTH, seconds=20.0):
+    states = [state for each in legs for state in each]
+    end = ExplorationState(states[-1].stamp_ns + NANOSECONDS // 10, 'a', 'cross_slide', Phase.LIFT)
+    return list(cut_recording({'signal': [signal(seconds)]}, [*states, end], AXES_PARAMS, inputs))
+
+
+@pytest.mark.parametrize(('first', 'second'), [(0.0, Y), (Y, 0.0), (math.pi, -Y)])
+def test_windows_along_x_and_y_are_joined_whichever_comes_first(first, second):
+    *windows, end = cut(leg(0.0, 2.0, first), leg(3.0, 2.0, second))
+    assert isinstance(end, SlideEnd)
+    assert len(windows) == 3
+    starts = {name: [event.windows[name].samples[0, 0] for event in windows] for name in BOTH}
+    first_name, second_name = BOTH if axis_along(first) == 'x' else BOTH[::-1]
+    assert starts[first_name] == pytest.approx([0.0, 0.5, 1.0])
+    assert starts[second_name] == pytest.approx([3.0, 3.5, 4.0])
+    assert [event.start_ns / NANOSECONDS for event in windows] == pytest.approx([3.0, 3.5, 4.0])
+    assert all(math.isnan(event.direction_rad) and event.surface == 'linen' for event in windows)
+
+
+def test_speed_and_force_are_means_over_both_legs():
+    window, *_ = cut(leg(0.0, 1.0, 0.0, speed_m_s=0.02), leg(3.0, 1.0, Y, speed_m_s=0.03))
+    assert window.speed_m_s == pytest.approx(0.025)
+    assert window.force_n == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize('directions', [(0.0,), (Y,), (0.0, math.pi), (0.25 * math.pi, 0.75 * math.pi)])
+def test_without_both_axes_there_is_no_window(directions):
+    events = cut(*(leg(3.0 * number, 2.0, direction) for number, direction in enumerate(directions)))
+    assert [type(event) for event in events] == [SlideEnd]
+
+
+def test_a_window_does_not_wait_for_the_next_exploration():
+    joiner = AxisJoiner(BOTH)
+    [along_x] = cut(leg(0.0, 1.0, 0.0), inputs=('signal',))[:-1]
+    [along_y] = cut(leg(0.0, 1.0, Y), inputs=('signal',))[:-1]
+    assert joiner.add(along_x) is None
+    assert joiner.end() == 1
+    assert joiner.add(along_y) is None
+    assert joiner.add(along_x).windows.keys() == set(BOTH)
+
+
+def test_a_window_along_one_axis_alone_needs_no_partner():
+    *windows, _ = cut(leg(0.0, 1.0, 0.0), leg(3.0, 1.0, Y), inputs=('signal@y',))
+    [window] = windows
+    assert window.windows['signal@y'].samples[0, 0] == pytest.approx(3.0)
+    assert window.direction_rad == pytest.approx(Y)
+
+
+def test_the_features_of_both_axes_are_one_vector_live_and_offline_alike():
+    recipe = {
+        'windows': {'length_s': 1.0, 'hop_s': 0.5},
+        'inputs': {name: {'features': ['mean']} for name in BOTH},
+    }
+    feature_set = FeatureSet.from_mapping(recipe)
+    assert feature_set.topics == ('signal',)
+    *windows, end = cut(leg(0.0, 2.0, 0.0), leg(3.0, 2.0, Y), inputs=feature_set.window_names)
+    single = [feature_set.extract(event) for event in windows]
+    many = feature_set.extract_many([*windows, end])
+    assert single[0].names == ('signal@x/mean/pac', 'signal@y/mean/pac')
+    assert np.array([vector.values for vector in single]) == pytest.approx(
+        np.array([[0.495, 3.495], [0.995, 3.995], [1.495, 4.495]])
+    )
+    assert [vector.values.tolist() for vector in many[:-1]] == [vector.values.tolist() for vector in single]
+    assert many[-1].last
+
+
+@pytest.mark.parametrize('name', ['signal@z', '@x', 'signal@'])
+def test_another_axis_than_x_or_y_is_refused(name):
+    with pytest.raises(InvalidParameter, match='the axes are x and y'):
+        split_axis(name)
+
+
+def test_inputs_with_and_without_an_axis_are_not_mixed():
+    inputs = {'signal@x': {'features': ['mean']}, 'signal_static': {'features': ['mean']}}
+    with pytest.raises(InvalidParameter, match='some of slides along an axis and some of any direction'):
+        FeatureSet.from_mapping({'inputs': inputs})
+
+
+FRICTION_RATE_HZ, STEP_NS = 100.0, 20_000_000
+RECIPE = {'windows': {'length_s': 0.5, 'hop_s': 0.5}, 'inputs': {'signal': {'features': ['friction', 'mean']}}}
+
+
+def states(tangential_n, seconds=1.0):
+    """Slide under 2 N; each state says how much the surface drags at its time."""
+    for number in range(round(seconds * 1e9 / STEP_NS)):
+        stamp_ns = number * STEP_NS
+        yield ExplorationState(
+            stamp_ns,
+            'a',
+            'linear_slide',
+            Phase.SLIDE,
+            0.02,
+            0.05,
+            2.0,
+            tangential_force_n=tangential_n(stamp_ns * 1e-9),
+        )
+
+
+def friction_of(tangential_n, stretch_to_m_s=0.0):
+    inputs = {'signal': {**RECIPE['inputs']['signal'], 'stretch_to_m_s': stretch_to_m_s}}
+    features = FeatureSet.from_mapping({**RECIPE, 'inputs': inputs})
+    batch = TactileSignal(0, 'finger', ('a',), (), FRICTION_RATE_HZ, 0, np.zeros((120, 1), dtype=np.float32))
+    events = list(cut_recording({'signal': [batch]}, states(tangential_n), WindowParams(0.5, 0.5)))
+    one_by_one = [features.extract(event) for event in events]
+    together = features.extract_many(events)
+    for single, several in zip(one_by_one, together, strict=True):
+        np.testing.assert_array_equal(single.values, several.values)
+    return [float(vector.values[0]) for vector in together if not vector.last]
+
+
+@pytest.mark.parametrize('coefficient', [0.1, 0.6, 1.2])
+@pytest.mark.parametrize('stretch_to_m_s', [0.0, 0.1])
+def test_the_feature_is_the_coefficient_of_coulomb_friction_at_any_stretch(coefficient, stretch_to_m_s):
+    assert friction_of(lambda _time_s: 2.0 * coefficient, stretch_to_m_s) == pytest.approx([coefficient] * 2)
+
+
+def test_each_window_has_the_mean_of_its_own_time():
+    assert friction_of(lambda time_s: 0.4 if time_s < 0.4999 else 1.0) == pytest.approx([0.2, 0.5])
+
+
+def test_states_without_direction_are_left_out_of_the_mean():
+    assert friction_of(lambda time_s: math.nan if time_s < 0.1 else 0.8) == pytest.approx([0.4, 0.4])
+
+
+def test_an_arm_that_does_not_measure_it_gives_no_number():
+    assert np.isnan(friction_of(lambda _time_s: math.nan)).all()
