@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,42 +69,6 @@ def axis_along(direction_rad: float) -> str:
     return ''
 
 
-class DirectedWindow(Protocol):
-    """What is joined: a dataclass with the windows of all topics, and how the finger went meanwhile.
-
-    Examples
-    --------
-    >>> from texture_features.windows import CutWindow
-    >>> {'windows', 'speed_m_s', 'force_n', 'direction_rad'} <= set(CutWindow.__dataclass_fields__)
-    True
-    """
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def windows(self) -> Mapping[str, Window]:
-        """Windows by topic."""
-
-    @property
-    def speed_m_s(self) -> float:
-        """Mean speed."""
-
-    @property
-    def force_n(self) -> float:
-        """Mean normal force."""
-
-    @property
-    def tangential_force_n(self) -> float:
-        """Mean force of the surface against the direction of travel."""
-
-    @property
-    def direction_rad(self) -> float:
-        """Mean direction of travel."""
-
-
-T = TypeVar('T', bound=DirectedWindow)
-
-
 def check_axes(names: Iterable[str]) -> None:
     """Refuse names of inputs that cannot be joined.
 
@@ -122,7 +86,7 @@ def check_axes(names: Iterable[str]) -> None:
         )
 
 
-class AxisJoiner(Generic[T]):
+class AxisJoiner:
     """Join the n-th window along x with the n-th along y of the same exploration, whichever comes first.
 
     Parameters
@@ -137,16 +101,10 @@ class AxisJoiner(Generic[T]):
 
     Examples
     --------
-    >>> @dataclasses.dataclass
-    ... class Slide:
-    ...     direction_rad: float
-    ...     speed_m_s: float
-    ...     force_n: float = 1.0
-    ...     tangential_force_n: float = 0.5
-    ...     windows: dict = dataclasses.field(default_factory=lambda: {'signal': 'samples'})
+    >>> samples = {'signal': Window(np.zeros((10, 1)), 1000.0, ('pac',))}
     >>> joiner = AxisJoiner(['signal@x', 'signal@y'])
-    >>> joiner.add(Slide(0.0, 0.02))  # waits for its partner
-    >>> joined = joiner.add(Slide(math.pi / 2, 0.04))
+    >>> joiner.add(CutWindow(0, 'a', 0.01, 0.01, samples, speed_m_s=0.02, direction_rad=0.0))  # waits for its partner
+    >>> joined = joiner.add(CutWindow(9, 'a', 0.01, 0.01, samples, speed_m_s=0.04, direction_rad=math.pi / 2))
     >>> tuple(joined.windows), round(joined.speed_m_s, 3), joiner.end()
     (('signal@x', 'signal@y'), 0.03, 0)
     """
@@ -155,14 +113,14 @@ class AxisJoiner(Generic[T]):
         names = tuple(names)
         check_axes(names)
         self._sources = {name: split_axis(name) for name in names}
-        self._waiting: dict[str, deque[T]] = {axis: deque() for _, axis in self._sources.values() if axis}
+        self._waiting: dict[str, deque[CutWindow]] = {axis: deque() for _, axis in self._sources.values() if axis}
 
     @property
     def joins(self) -> bool:
         """Whether the inputs name axes; else every window is whole as it is."""
         return bool(self._waiting)
 
-    def add(self, window: T) -> T | None:
+    def add(self, window: CutWindow) -> CutWindow | None:
         """Return the window that is complete with this one; None if its partner is still to come, or it is none.
 
         Parameters
@@ -771,7 +729,7 @@ class WindowCutter:
         Length and hop of the windows.
     inputs
         Topics of which every window needs all samples; batches of other topics are ignored. With an axis, as in
-        'signal@x' and 'signal@y', windows along both axes of one exploration are joined (`windowing/axes.py`).
+        'signal@x' and 'signal@y', windows along both axes of one exploration are joined.
     keep_s
         How long samples are kept at least, s.
 
@@ -798,7 +756,7 @@ class WindowCutter:
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
         self._params = params
         self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in dict.fromkeys(map(_topic_of, inputs))}
-        self._joiner: AxisJoiner[CutWindow] = AxisJoiner(inputs)
+        self._joiner = AxisJoiner(inputs)
         self._unpaired = 0
         self._slides: deque[SlideCoverage] = deque()
         self._ready = False
