@@ -41,10 +41,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         sys.argv = argv
         with contextlib.redirect_stdout(printed):
             for line in COMMAND.findall(TUTORIAL):
-                quick = (
-                    ['--quick'] if line.startswith('texture benchmark') else []
-                )  # `default` alone beside the reader's
-                assert main([*shlex.split(line)[1:], *quick]) == 0, line
+                assert main(shlex.split(line)[1:]) == 0, line
             for block in PYTHON.findall(TUTORIAL):
                 exec(compile(block, 'docs/recordings.md', 'exec'), {})
         yield printed.getvalue()
@@ -67,11 +64,10 @@ def test_the_page_shows_what_the_import_prints(said: str) -> None:
 
 @pytest.mark.benchmark
 def test_a_reader_ends_with_figures_charts_and_a_file(said: str) -> None:
-    for name in ('figure.png', 'figures.json', 'figures/recipes_own.png', 'figures/recipes_own.md', 'slides.parquet'):
+    for name in ('figure.png', 'figures.json', 'slides.parquet'):
         assert Path(name).stat().st_size > 200, name
     assert "'mine' against 'fast' on 36 slides" in said
     assert '36 (250, 3)' in said
-    assert '| ExtraTreesClassifier |' in Path('figures/recipes_own.md').read_text()
 
 
 @pytest.mark.parametrize('text', BLOCK.findall(REFERENCE))

@@ -1,4 +1,3 @@
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -6,7 +5,6 @@ import pytest
 
 from texture_simulation.offline import SlidePlan, write_simulated
 
-sys.path.append(str(Path(__file__).parent))  # where tests of sensors find their rig
 SURFACES = ('glass', 'leather', 'ridge_2mm_deep')
 
 

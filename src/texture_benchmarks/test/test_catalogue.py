@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from texture_benchmarks import catalogue
-from texture_benchmarks.catalogue import BENCHMARKS, LONG, SIDE_BY_SIDE, in_processes, run_all
+from texture_benchmarks.catalogue import BENCHMARKS, LONG, SIDE_BY_SIDE, in_processes
 from texture_benchmarks.commands import benchmark as command
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_bringup.command import main
@@ -33,11 +33,6 @@ def test_one_that_fails_or_is_killed_stops_no_other(tmp_path: Path) -> None:
         folder.mkdir()
         codes = in_processes(NAMES, partial(act, folder=folder), at_once)
         assert codes == {'good': 0, 'killed': -signal.SIGKILL, 'bad': 1, 'clock': 0, 'missing': 3}
-
-
-def test_all_run_once_whether_side_by_side_or_alone(tmp_path: Path) -> None:
-    assert run_all(['good', 'clock'], partial(act, folder=tmp_path)) == {'clock': 0, 'good': 0}
-    assert {path.name for path in tmp_path.iterdir()} == {'good', 'clock'}
 
 
 def test_every_benchmark_has_its_line_on_the_page_and_what_is_scheduled_exists() -> None:

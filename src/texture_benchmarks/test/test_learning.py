@@ -6,10 +6,13 @@ import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.learning import run_incremental
+from texture_benchmarks.next_motion import CHOICES, MOTIONS, explored, extracted, training
+from texture_benchmarks.scale import DrawnSize, FeatureSpread
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
 from texture_features.examples import LabelledFeatures
+from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.ros
 
@@ -56,3 +59,73 @@ def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
 def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(InvalidData, match='no recorded data'):
         run_benchmark('learning', BenchmarkOptions(tmp_path))
+
+
+@pytest.mark.benchmark
+def test_every_way_to_choose_is_evaluated_after_every_slide(tmp_path: Path) -> None:
+    result, written = run_benchmark('next_motion', BenchmarkOptions(tmp_path, quick=True))
+    accuracy = result.numbers['accuracy']
+    assert written.is_file()
+    assert all(drawn.is_file() for drawn in result.charts)
+    assert set(accuracy) == set(CHOICES)
+    assert all(len(shares) == 8 and 0.0 <= min(shares) <= max(shares) <= 1.0 for shares in accuracy.values())
+    assert accuracy['informed'][-1] >= 0.6
+
+
+def test_trials_are_recognised_once_a_motion_reports_the_textures_apart() -> None:
+    scene, features, motions = load_scene('oriented'), load_recipe('fast').feature_set, MOTIONS[:1]
+    values = np.zeros((1, len(scene.surfaces), 4, 2))
+    values[..., 0] = 100.0 * np.arange(len(scene.surfaces))[:, None]
+    values += np.random.default_rng(0).standard_normal(values.shape)
+    known = training(scene, motions, values)
+    for way in CHOICES.values():
+        choose = way(known, motions, np.random.default_rng(0))
+        trials = explored(list(scene.surfaces), known, motions, values, choose=choose, n_slides=2)
+        assert trials.right.shape == trials.probability.shape == (2 * len(scene.surfaces), 2)
+        assert trials.right.all()
+    one = extracted(scene, motions, 1, features, np.random.default_rng(0))
+    assert one.shape[:3] == (1, len(scene.surfaces), 1)
+    assert one == pytest.approx(extracted(scene, motions, 1, features, np.random.default_rng(0)))
+
+
+@pytest.mark.benchmark
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+def test_touches_of_recorded_slides_are_chosen_in_every_way(tmp_path: Path) -> None:
+    result, _ = run_benchmark('next_motion_recorded', BenchmarkOptions(out=tmp_path, quick=True, data=DATA))
+    [found] = result.numbers.values()
+    assert set(found['accuracy']) == {'informed', 'fixed order, planned', 'random'}
+    assert all(0.25 < shares[-1] <= 1.0 for shares in found['accuracy'].values())  # chance is a quarter
+
+
+recorded = pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+DEVIATIONS = {'textures': 5.0, 'slides': 2.0, 'windows': 1.0}
+
+
+def test_drawn_features_vary_as_much_among_textures_slides_and_windows_as_the_recorded_ones() -> None:
+    rng = np.random.default_rng(0)
+    textures = DEVIATIONS['textures'] * rng.standard_normal((60, 1, 1, 3))
+    slides = textures + DEVIATIONS['slides'] * rng.standard_normal((60, 20, 1, 3))
+    values = slides + DEVIATIONS['windows'] * rng.standard_normal((60, 20, 10, 3))
+    labels = np.repeat([f'c{number:02d}' for number in range(60)], 200)
+    groups = np.char.add(labels, np.tile(np.repeat([f'/{number}' for number in range(20)], 10), 60))
+    names = ('signal/mean', 'signal/rms', 'signal/peak')
+    spread = FeatureSpread.of(LabelledFeatures(values.reshape(-1, 3), labels, groups, names, 'a1', 0.5, 0.1))
+    centres = spread.textures(2000, rng)
+    drawn = spread.slides(np.zeros((1, 3)), DrawnSize(1, slides=2000, windows=10), rng).values.reshape(2000, 10, 3)
+    assert centres.std(axis=0) == pytest.approx([DEVIATIONS['textures']] * 3, rel=0.2)  # of 60 textures: 9 % each
+    assert drawn.mean(axis=1).std(axis=0) == pytest.approx([DEVIATIONS['slides']] * 3, rel=0.1)
+    # The mean of ten windows takes a tenth of their variance: once when it is measured, once when it is drawn.
+    about_their_mean = (drawn - drawn.mean(axis=1, keepdims=True)).std()
+    assert about_their_mean == pytest.approx(0.9 * DEVIATIONS['windows'], rel=0.02)
+
+
+@pytest.mark.benchmark
+@recorded
+def test_a_small_training_on_drawn_features_recognises_some_and_reports_what_it_took(tmp_path: Path) -> None:
+    result, _ = run_benchmark('scale', BenchmarkOptions(out=tmp_path, quick=True, data=DATA))
+    [few] = result.numbers['textures, default']
+    assert few['training_windows'] == 6 * 5 * 5
+    assert few['slide_accuracy'] > 0.4  # chance is a sixth
+    assert few['train_s'] > 0
+    assert few['memory_of_the_process_mib'] > few['memory_beyond_examples_mib'] >= 0
+    assert [chart.name for chart in result.charts] == ['scale.png']

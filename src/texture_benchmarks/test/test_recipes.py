@@ -1,6 +1,5 @@
+import json
 import os
-import sys
-import types
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -9,35 +8,27 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
+from texture_benchmarks.frontier import TrainingSize, costs
+from texture_benchmarks.overview import PEERS, SHOWN, SOURCES, methods_of
 from texture_benchmarks.recipes import (
     QUICK_RECIPES,
     VIBRATION,
     Setting,
-    _jobs,
-    _shipped,
     at_rate,
     comparable,
     figures_of,
-    trained_every,
 )
 from texture_benchmarks.study import BenchmarkOptions
-from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.cross_validation import ChronologicalSplit, cross_validate
-from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide, find_slides
-from texture_recordings.tables import import_tables, mapping_from
+from texture_recordings.dataset import LabelledSlide, SlideDataset, find_slides
 
 pytestmark = pytest.mark.ros
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 SLIDES = [LabelledSlide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork', 'felt') for k in range(1, 11)]
-
-
-def test_training_windows_begin_at_a_multiple_of_a_short_hop() -> None:
-    parts = comparable(load_recipe('ets-circular-svm'), 1000.0, of_motion=False)
-    assert parts.training.hop_s == pytest.approx(0.56)  # eight parts of 0.07 s: the first multiple over 0.5 s
-    assert comparable(load_recipe('hu-pca-svm'), 1000.0, of_motion=False).training.hop_s == 0.5
 
 
 def slide_signals(gap: int = 0) -> LabelledSlide:
@@ -89,11 +80,6 @@ def test_recipes_that_vote_are_compared_with_the_vote_they_ship_with(name: str, 
     assert (tried.evidence.group, tried.feature_set.windows.length_s) == (voters, length_s)
 
 
-def test_a_missing_input_is_named() -> None:
-    with pytest.raises(ModelMismatch, match="no 'signal_static', only signal; the windows need signal, signal_static"):
-        cut_slide(slide_signals(), load_recipe('kaboli-svm').feature_set)
-
-
 def test_a_recipe_is_tested_on_slides_outside_its_training(simulated: Path) -> None:
     dataset = SlideDataset.from_bags([simulated])
     recipe = comparable(load_recipe('default'), 1000.0, of_motion=False)
@@ -103,24 +89,6 @@ def test_a_recipe_is_tested_on_slides_outside_its_training(simulated: Path) -> N
     assert figures['window_accuracy'] > 0.8
     assert figures['unclassified_windows'] == 0.0
     assert len(find_slides([simulated])) == len(dataset)
-
-
-def test_copies_of_the_slides_are_trained_on_only_where_asked_for() -> None:
-    recipe = load_recipe('default')
-    assert comparable(recipe, 1000.0, of_motion=False, augmented=True).augmentation == recipe.augmentation
-    assert comparable(recipe, 1000.0, of_motion=False).augmentation.copies == 0
-
-
-def test_training_windows_may_overlap_where_test_windows_do_not(simulated: Path) -> None:
-    dataset = SlideDataset.from_bags([simulated])
-    recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)
-    [plain], [more] = (
-        cross_validate(one, dataset, ChronologicalSplit(4 / 6)).folds for one in (recipe, trained_every(0.25, recipe))
-    )
-    # twelve slides of 1 s, windows of 0.5 s
-    assert (plain.model.training['windows'], more.model.training['windows']) == (24, 36)
-    windows = [[len(found.estimates) for found in fold.results.values()] for fold in (plain, more)]
-    assert windows[0] == windows[1]
 
 
 @pytest.mark.benchmark
@@ -149,70 +117,44 @@ def test_the_shorter_run_tries_the_vibration_of_later_slides(tmp_path: Path) -> 
     assert [chart.name for chart in result.charts] == ['recipes_later.png', 'recipes_later_sliding.png']
 
 
-def test_recipes_without_vibration_are_not_tried_on_vibration_alone(tmp_path: Path) -> None:
-    options = BenchmarkOptions(tmp_path, DATA)
-    vibration = Setting(SlideDataset((at_rate(slide_signals(), 'signal', 1000.0),)), [], 1000.0, of_motion=False)
-    tried = {name for job in _jobs({VIBRATION: vibration}, _shipped(options)) for name in job.recipes}
-    assert {'default', 'fast', 'hu-pca-svm'} <= tried
-    assert not any(name.startswith('taxels') for name in tried)
+CHARTS = Path(__file__).resolve().parents[3] / 'docs' / 'charts'
 
 
-class NearestMean:
-    """A classifier with the interface of aeon's: windows (n, n_channels, n_samples) by their power."""
-
-    def fit(self, X: np.ndarray, y: np.ndarray) -> 'NearestMean':
-        power = np.log(X.var(axis=(1, 2)))
-        self.labels = np.unique(y)
-        self.means = np.array([power[y == label].mean() for label in self.labels])
-        return self
-
-    def predict(self, X: np.ndarray) -> np.ndarray:
-        power = np.log(X.var(axis=(1, 2)))
-        return self.labels[np.abs(power[:, None] - self.means).argmin(axis=1)]
+def stored() -> dict:
+    return {name: json.loads((CHARTS / f'{name}.json').read_text())['numbers'] for name in ('recipes_later', 'trust')}
 
 
-def loud_and_quiet(folder: Path) -> Path:
-    rng = np.random.default_rng(0)
-    mapping = mapping_from({
-        'files': '{material}_*.npy',
-        'streams': {'signal': {'columns': ['0', '1'], 'rate_hz': 1000.0}},
-        'label': {'column': 'material'},
-    })  # fmt: skip
-    (folder / 'in').mkdir()
-    for material, amplitude in (('loud', 3.0), ('quiet', 1.0)):
-        for number in range(3):
-            np.save(folder / 'in' / f'{material}_{number}.npy', amplitude * rng.normal(size=(2500, 2)))
-    import_tables(mapping, folder / 'in', folder / 'bags')
-    return folder / 'bags'
+def test_computing_is_added_to_the_sliding_time() -> None:
+    peer = {'decisions': {'s': [0.5, 1.0], 'share': [0.6, 0.8]}, 'latency_us': {'median': 20_000.0}}
+    methods = {method.name: method for method in methods_of({**stored(), 'peers': {'slow': peer}})}
+    assert methods['slow'].seconds == pytest.approx([0.52, 1.02])
+    assert methods['slow'].kind == PEERS
+    assert {title for title, _ in SHOWN.values()} < set(methods)
+
+
+def test_a_figure_that_is_not_stored_is_asked_for(tmp_path: Path) -> None:
+    assert any(SOURCES.values())
+    with pytest.raises(InvalidData, match='run `texture benchmark recipes_later` first'):
+        BENCHMARKS['overview'](BenchmarkOptions(tmp_path))
+
+
+def test_a_training_takes_time_and_little_memory_where_only_means_are_kept() -> None:
+    [found] = costs('texture_papers.jamali:NaiveBayes', [TrainingSize(200, 4)], limit_s=60.0, seed=0).values()
+    assert 0 < found.seconds < 60
+    assert 0 <= found.mebibytes < 100
+
+
+def test_what_takes_too_long_is_not_tried_in_a_larger_size() -> None:
+    sizes = [TrainingSize(windows, 4) for windows in (40, 80, 160)]
+    assert list(costs('texture_papers.jamali:NaiveBayes', sizes, limit_s=0.0, seed=0)) == sizes[:1]
+    assert list(costs('texture_papers.jamali:NaiveBayes', sizes, limit_s=60.0, seed=0)) == sizes
 
 
 @pytest.mark.benchmark
-def test_a_recipe_and_estimators_of_ones_own_stand_beside_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = types.ModuleType('my_estimators')
-    module.NearestMean = NearestMean
-    monkeypatch.setitem(sys.modules, 'my_estimators', module)
-    recipe = tmp_path / 'default.yaml'
-    recipe.write_text(
-        'windows: {length_s: 0.5, hop_s: 0.5}\ninputs: {signal: {features: [log_variance]}}\n'
-        'learner: texture_papers.jamali:NaiveBayes\n'
-    )
-    methods = (str(recipe), 'sklearn.naive_bayes:GaussianNB', 'my_estimators:NearestMean')
-    options = BenchmarkOptions(tmp_path / 'out', quick=True, own_methods=methods, own_bags=(loud_and_quiet(tmp_path),))
-    result = BENCHMARKS['recipes'](options)
-    [cells] = result.numbers['own recordings'].values()
-    assert {'default (own)', 'GaussianNB', 'NearestMean', 'default'} == set(cells)
-    assert cells['default (own)']['window_accuracy'] == cells['NearestMean']['window_accuracy'] == 1.0
-    assert all(cell['latency_us']['median'] > 0 for cell in cells.values())
-    assert '| NearestMean |' in (tmp_path / 'out' / 'recipes_own.md').read_text()
-    assert result.name == 'recipes_own'
-    assert result.split == '3 folds by slide'
-
-
-def test_a_recipe_that_needs_what_the_slides_lack_is_refused(tmp_path: Path) -> None:
-    recipe = tmp_path / 'slow.yaml'
-    recipe.write_text('inputs: {signal_static: {features: [mean]}}\nlearner: texture_papers.jamali:NaiveBayes\n')
-    options = BenchmarkOptions(
-        tmp_path / 'out', quick=True, own_methods=(str(recipe),), own_bags=(loud_and_quiet(tmp_path),)
-    )
-    with pytest.raises(InvalidData, match=r"slow.yaml' needs signal_static; the slides have signal"):
-        BENCHMARKS['recipes'](options)
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+def test_longer_windows_are_recognised_more_often(tmp_path: Path) -> None:
+    result = BENCHMARKS['frontier'](BenchmarkOptions(tmp_path, DATA, quick=True))
+    assert all(chart.is_file() for chart in result.charts)
+    short, long = (result.numbers['by_window_length']['fast'][length] for length in ('0.1 s', '0.5 s'))
+    assert short['window_accuracy'] < long['window_accuracy']
+    assert result.numbers['trainings']['labels']['mlp'][0]['seconds'] > 0

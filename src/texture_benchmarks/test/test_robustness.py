@@ -12,8 +12,11 @@ from texture_benchmarks.recipes import comparable
 from texture_benchmarks.robustness import (
     CONDITIONS,
     DEGRADATIONS,
+    FORCE_N,
     LATER,
     SCENE,
+    SLIDE_S,
+    SPEED_M_S,
     TOPIC,
     Degradation,
     TouchConditions,
@@ -25,10 +28,27 @@ from texture_benchmarks.robustness import (
     robustness_tables,
     simulate_slide_signals,
 )
+from texture_benchmarks.robustness import simulate_slide_signals as simulate
 from texture_benchmarks.study import BenchmarkOptions
-from texture_core.types import ExplorationState, Phase, TactileSignal
+from texture_benchmarks.trust import (
+    RECIPES,
+    ROWS,
+    SIMULATED,
+    TRAINED_SLIDES,
+    UNDISTURBED,
+    UNDISTURBED_SIMULATED,
+    DisturbanceSweep,
+    Outcome,
+    disturbed,
+    grid_panels,
+    run,
+)
+from texture_core.types import ExplorationState, Phase, TactileSignal, TextureEstimate
+from texture_estimation.decisions import ErrorBound
 from texture_estimation.recipe import load_recipe, with_channels
+from texture_evaluation.metrics import SlideResult
 from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.ros
@@ -61,10 +81,6 @@ def test_any_strength_gives_finite_samples_or_says_that_it_loses_some(degradatio
         found = degradation.change(samples(), RATE_HZ, strength, np.random.default_rng(1))
         assert found.ndim == 2
         assert np.isfinite(found).all() or degradation.loses
-
-
-def test_strengths_only_rise_or_only_fall(degradation: Degradation) -> None:
-    assert list(degradation.strengths) in (sorted(degradation.strengths), sorted(degradation.strengths, reverse=True))
 
 
 def test_degradations_do_what_they_say() -> None:
@@ -153,15 +169,6 @@ def test_simulated_slides_have_windows_and_differ_from_those_trained(name: str) 
     assert max(np.abs(values - usual[0]).max() for values in worst[: len(otherwise.fingers)]) > 0.1
 
 
-def test_tables_show_where_each_recipe_breaks_down() -> None:
-    recipes = {
-        'fast': {'window_accuracy': [0.9, 0.8, 0.5], 'breakdown': 1.25},
-        'kaboli-pa': {'window_accuracy': [0.3, 0.3, 0.29], 'breakdown': None},
-    }
-    panels = {'noise': {'strength': 'rms', 'strengths': [0.0, 1.0, 2.0], 'slides': 'recorded', 'recipes': recipes}}
-    assert robustness_tables(panels).splitlines()[-2:] == ['| `fast` | 90.0 % | 1.25 |', '| `kaboli-pa` | 30.0 % | – |']
-
-
 def test_the_page_shows_what_the_bench_measured() -> None:
     numbers = json.loads((DOCS / 'charts' / 'robustness.json').read_text())['numbers']
     assert robustness_tables(numbers) == (DOCS / 'charts' / 'robustness.md').read_text()
@@ -176,3 +183,84 @@ def test_noise_breaks_what_was_trained_without_it(tmp_path: Path) -> None:
     own = result.numbers['white noise']['recipes']['peaks-naive-bayes']
     assert own['window_accuracy'][0] > own['window_accuracy'][-1]
     assert '| `peaks-naive-bayes` |' in (tmp_path / 'robustness.md').read_text()
+
+
+EVERY_ROW = [row.name(strength) for row in ROWS.values() for strength in row.strengths]
+
+
+@pytest.fixture(scope='module')
+def slide() -> LabelledSlide:
+    conditions = TouchConditions(load_scene(SCENE), SimulatedSlide(SPEED_M_S, FORCE_N, SLIDE_S))
+    return simulate(conditions, 1, np.random.default_rng(0))[0]
+
+
+@pytest.fixture(params=ROWS)
+def row(request: pytest.FixtureRequest) -> DisturbanceSweep:
+    return ROWS[request.param]
+
+
+def samples_of_trust(item: LabelledSlide) -> np.ndarray:
+    return np.concatenate([batch.samples for batch in item.signals['signal']])
+
+
+def test_every_row_changes_the_samples_and_keeps_the_slide(row: DisturbanceSweep, slide: LabelledSlide) -> None:
+    for strength in row.strengths:
+        # A short slide may lose nothing of one in a thousand, so some seeds are tried.
+        changed = [disturbed(slide, row, strength, np.random.default_rng(seed)) for seed in range(40)]
+        assert changed[0].name == slide.name
+        before = samples_of_trust(slide)
+        assert any(_differ(samples_of_trust(one), before) for one in changed)
+
+
+def _differ(own: np.ndarray, before: np.ndarray) -> bool:
+    return own.shape != before.shape or not np.array_equal(own, before, equal_nan=True)
+
+
+def test_the_same_other_finger_touches_all_slides(slide: LabelledSlide) -> None:
+    finger = ROWS['another finger']
+    one, other = (samples_of_trust(disturbed(slide, finger, 2.0, np.random.default_rng(seed))) for seed in (0, 1))
+    np.testing.assert_array_equal(one, other)
+
+
+def estimate(label: str, *, known: bool, decided: bool, evidence_s: float, final: bool = False) -> TextureEstimate:
+    return TextureEstimate(
+        stamp_ns=0, exploration_id='e', final=final, label=label, known=known, decided=decided, windows=1,
+        evidence_s=evidence_s,
+    )  # fmt: skip
+
+
+def test_outcomes_are_counted_at_the_first_certain_estimate_and_at_the_end() -> None:
+    unsure = estimate('felt', known=True, decided=False, evidence_s=0.5)
+    right = estimate('cork', known=True, decided=True, evidence_s=1.0)
+    wrong = estimate('felt', known=True, decided=True, evidence_s=1.5)
+    rejected = estimate('cork', known=False, decided=False, evidence_s=2.0)
+    slides = [[unsure, right, wrong], [unsure, wrong, rejected], [unsure, rejected], []]
+    outcome = Outcome.of([SlideResult('cork', [], estimates) for estimates in slides])
+    assert dataclasses.astuple(outcome) == (4, 1, 1, 0, 1, pytest.approx(1.5), 2)
+
+
+@pytest.mark.benchmark
+def test_the_quick_form_on_simulated_slides_gives_figures_and_a_chart(tmp_path: Path) -> None:
+    result = run(BenchmarkOptions(out=tmp_path, quick=True))
+    assert [chart.name for chart in result.charts] == ['trust.png']
+    outcomes = result.numbers['fast']['outcomes']
+    assert 'simulated' in result.data
+    assert len(outcomes) == 1 + 8 + 3 + 2
+    clean = outcomes[UNDISTURBED]
+    assert clean['slides'] == 36
+    assert clean['label_right'] > 18  # chance is 3
+    for outcome in outcomes.values():
+        assert outcome['early_right'] + outcome['early_wrong'] <= outcome['slides']
+    told = result.numbers['told_outside_what_was_trained']['fast']
+    assert told == {'undisturbed, simulated': 0.0, 'circle, simulated': 1.0}
+
+
+def test_the_grid_shows_every_disturbance_once() -> None:
+    shown = [name for ticks in grid_panels([*EVERY_ROW, *SIMULATED]).values() for _, name in ticks]
+    assert sorted({*shown} - {UNDISTURBED, UNDISTURBED_SIMULATED}) == sorted([*EVERY_ROW, *SIMULATED])
+
+
+@pytest.mark.parametrize('name', RECIPES)
+def test_so_many_slides_are_simulated_that_each_recipe_may_be_certain(name: str) -> None:
+    slides = TRAINED_SLIDES * len(load_scene(SCENE).surfaces)
+    assert ErrorBound(slides, load_recipe(name).training.max_error_rate).shown

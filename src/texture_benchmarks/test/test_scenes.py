@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +17,11 @@ from texture_benchmarks.scenes import (
     ablate,
     completed,
     extract_features,
-    simulate_features,
     variants,
     with_one_more,
 )
 from texture_benchmarks.study import BenchmarkOptions
-from texture_simulation.effects import EFFECTS, Noise
+from texture_simulation.effects import EFFECTS
 from texture_simulation.scene import Scene, load_scene, scene_from
 
 pytestmark = pytest.mark.ros
@@ -71,14 +69,6 @@ def test_friction_and_the_patch_filter_can_be_removed_as_effects_can() -> None:
     assert set(others) == {*scene.effects, PATCH, FRICTION}
     assert all(surface.friction is None for surface in others[FRICTION].surfaces.values())
     assert others[PATCH].contact.blur_m < scene.contact.blur_m
-
-
-def test_slides_follow_from_the_seed_and_are_dealt_out_to_fingers() -> None:
-    scene = replace(two_ridges(), effects={'noise': Noise(5.0)})
-    first, again, other = (simulate_features(scene, TOUCHING, 3, seed, (0, 1)) for seed in ([1], [1], [2]))
-    assert np.array_equal(first[0], again[0])
-    assert not np.array_equal(first[0], other[0])
-    assert first[1].tolist() == [0] * 6 + [1] * 6
 
 
 def test_a_difference_matters_if_it_is_certain_and_large() -> None:

@@ -1,8 +1,6 @@
 """What studies share: data sets imported once, work on all cores, charts with names."""
 
-import math
 import threading
-from itertools import combinations
 from pathlib import Path
 
 import matplotlib.image
@@ -44,16 +42,6 @@ def test_all_that_run_together_get_the_same_bags(asked, tmp_path: Path) -> None:
     assert not bags[0].exists()
 
 
-def test_a_part_is_imported_for_itself_and_so_is_what_one_benchmark_needs_alone(asked, tmp_path: Path) -> None:
-    options = BenchmarkOptions(tmp_path, tmp_path)
-    with importing_once(options, ('wool',)) as sharing, imported(sharing, 'wool', '1-3', ('b',)) as bags:
-        assert [bag.name for bag in bags] == ['b']
-    with imported(options, 'wool') as bags:
-        assert len(bags) == 2
-    assert not bags[0].exists()
-    assert asked == [('wool', '', ()), ('wool', '1-3', ('b',)), ('wool', '', ())]
-
-
 def test_what_is_missing_is_reported_by_the_benchmark_that_needs_it(asked, tmp_path: Path) -> None:
     for data in (tmp_path, None):
         with (
@@ -79,12 +67,6 @@ def test_a_damaged_data_set_stops_no_benchmark_but_those_that_need_it(asked, mon
             assert len(bags) == 2
         with pytest.raises(InvalidData, match='no file of this data set'), imported(options, 'cork'):
             pass
-
-
-def test_a_quick_run_imports_its_parts_alone(asked, tmp_path: Path) -> None:
-    with importing_once(BenchmarkOptions(tmp_path, tmp_path, quick=True), ('wool',)):
-        pass
-    assert asked == []
 
 
 def test_each_job_is_done_in_its_place_with_what_could_not_be_sent() -> None:
@@ -117,29 +99,6 @@ FRONT = [0, 1, 2]
 
 def test_every_method_of_the_front_has_its_name() -> None:
     assert set(FRONT) <= set(study._named(VALUES, FRONT))
-
-
-def test_no_name_lies_on_another_or_on_a_point() -> None:
-    places = study._named(VALUES, FRONT)
-    assert 5 in places  # far from all others
-    assert not any(study._covers(one, other, study.LABEL_DECADES) for one, other in combinations(places.values(), 2))
-
-
-def test_no_name_leaves_the_chart_on_the_left() -> None:
-    crowded = [(50.0, 0.17), (55.0, 0.18), (72.0, 0.20), (80.0, 0.15)]
-    starts = [start for start, _ in study._named(crowded, [0]).values()]
-    assert min(starts) >= math.log10(50.0) - study.ROOM_DECADES
-
-
-def test_at_most_ten_methods_are_named() -> None:
-    many = [(10.0 ** (2 + 0.5 * column), 0.05 + 0.1 * row) for row in range(9) for column in range(4)]
-    assert len(study._named(many, [])) == study.DIRECT_LABELS
-
-
-def test_a_method_of_ones_own_is_named_even_where_its_name_covers_another_point() -> None:
-    crowded = [(100.0 + number, 0.70 + 0.002 * number) for number in range(12)]
-    assert 5 not in study._named(crowded, [11])
-    assert 5 in study._named(crowded, [11], always=[5])
 
 
 def test_the_evidence_chart_is_drawn_without_a_display(tmp_path: Path) -> None:

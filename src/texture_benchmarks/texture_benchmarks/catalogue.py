@@ -24,7 +24,6 @@ from texture_benchmarks import (
     scenes,
     trust,
 )
-from texture_benchmarks.roughness import run as roughness
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.config import find
 from texture_estimation.search import single_blas_thread
@@ -39,7 +38,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
-    'roughness': roughness.run,  # from window to grade
+    'roughness': latency.run_roughness,  # from window to grade
     'learning': learning.run,  # trained slide by slide against trained again on the same slides
     'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
     'next_motion_recorded': next_motion.run_recorded,  # the same among recorded speeds and forces

@@ -1,8 +1,9 @@
-"""How long from the last sample of a window to its estimate: in one process, through the nodes, and with a hand."""
+"""How long from the last sample of a window to its estimate or grade: in one process, through nodes, with a hand."""
 
 from __future__ import annotations
 
 import tempfile
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +14,19 @@ import numpy as np
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, histogram_chart
 from texture_core.types import Array
 from texture_estimation.model import TextureModel
+from texture_estimation.roughness import (
+    TEST,
+    TRAIN,
+    RoughnessAccumulator,
+    RoughnessModel,
+    load_roughness_recipe,
+    read_grades,
+    train_grades,
+)
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_features.windows import WindowEvent
+from texture_features.windows import CutWindow, WindowEvent
+from texture_papers.rispal_experiment import FORCE_N, SPEED_M_S, USED_S, SimulatedTextures
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
@@ -159,3 +170,56 @@ def _live_hand(model: Path, surface: str, options: BenchmarkOptions) -> Mapping[
     all_of_them = LiveLatency(latency_s, sum(finger.expected for finger in fingers), cpu | {'all': sum(cpu.values())})
     numbers: dict[str, Any] = all_of_them.numbers()
     return numbers
+
+
+ROUGHNESS_RECIPES = {'ours': 'roughness', 'SVM5': 'ets-roughness-svm5', 'ANN5': 'ets-roughness-ann5'}
+SCANS, QUICK_SCANS = 20, 4
+TIMED, QUICK_TIMED, WARM_UP = 5000, 200, 200
+ROUNDS = 5  # the quickest counts, as other work on the machine only adds
+TARGET_US = 200.0
+
+
+def run_roughness(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train on simulated scans, then time windows of textures never touched, one by one."""
+    grades = read_grades('ets_roughness')
+    simulated = SimulatedTextures(load_scene('roughness'), options.seed)
+    count = QUICK_SCANS if options.quick else SCANS
+    windows = [
+        event for texture in grades.used_for(TEST) for event in simulated.events(texture, count, SPEED_M_S, FORCE_N)
+    ]
+    models = {}
+    for name, recipe_name in list(ROUGHNESS_RECIPES.items())[: 1 if options.quick else None]:
+        recipe = load_roughness_recipe(recipe_name)
+        examples = simulated.extract(recipe.feature_set, grades.used_for(TRAIN), count, SPEED_M_S, FORCE_N)
+        models[name] = train_grades(recipe, examples, grades)
+    timed = QUICK_TIMED if options.quick else TIMED
+    rounds = [{name: grading_us(model, windows, timed) for name, model in models.items()} for _ in range(ROUNDS)]
+    times = {name: min((taken[name] for taken in rounds), key=np.median) for name in models}
+    title = 'From the samples of a window to the grade, in one process (simulated)'
+    percentiles = {name: np.percentile(values, (50, 99)).tolist() for name, values in times.items()}
+    return BenchmarkResult(
+        name='roughness-latency',
+        measured=(
+            f'computing time of a core: features, checks, head and evidence for windows of {USED_S} s at 1 kHz, '
+            f'one by one, in one process; the quickest of {ROUNDS} rounds'
+        ),
+        data='simulated TSF-85, scene roughness',
+        split="by texture, the paper's: 15 for training, windows of the 10 others timed",
+        numbers={
+            'target_us': TARGET_US,
+            **{name: {'median_us': median, 'p99_us': p99} for name, (median, p99) in percentiles.items()},
+        },
+        charts=(histogram_chart(times, title, 'time (µs)', options.out / 'roughness-latency.png'),),
+    )
+
+
+def grading_us(model: RoughnessModel, windows: Sequence[CutWindow], count: int) -> Array:
+    """Return the computing time of `count` windows, taken in turn, µs: of the core, whatever other programs take."""
+    evidence, taken_us = RoughnessAccumulator(model), []
+    for number in range(WARM_UP + count):
+        # each a slide of its own: nothing follows a grade that is final
+        window = windows[number % len(windows)]
+        began = time.thread_time()
+        evidence.update(model.recipe.feature_set.extract(window))
+        taken_us.append(1e6 * (time.thread_time() - began))
+    return np.array(taken_us[WARM_UP:])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import resample_poly
-from sklearn.model_selection import LeaveOneGroupOut, StratifiedGroupKFold, StratifiedKFold
+from sklearn.model_selection import LeaveOneGroupOut, StratifiedKFold
 
 from texture_benchmarks.study import (
     BenchmarkOptions,
@@ -28,11 +27,11 @@ from texture_benchmarks.study import (
     map_forked,
     markdown_table,
 )
-from texture_core.config import find, shipped
-from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.types import AnyArray, Array, TactileSignal
+from texture_core.config import shipped
+from texture_core.errors import InvalidParameter
+from texture_core.types import TactileSignal
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import AUGMENTATION, Recipe, load_recipe, with_channels
+from texture_estimation.recipe import Recipe, load_recipe, with_channels
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation import (
     ChronologicalSplit,
@@ -40,14 +39,13 @@ from texture_evaluation.cross_validation import (
     FoldFeatures,
     Split,
     cross_validate,
-    split_slides,
 )
 from texture_evaluation.evaluate import run_model
 from texture_features.augmentation import Augmentation
 from texture_features.feature import Feature
-from texture_features.feature_set import InputFeatures, read_recipe
+from texture_features.feature_set import InputFeatures
 from texture_features.features.temporal import Force, Speed
-from texture_features.windows import CutWindow, Stretched, WindowParams, cut_recording
+from texture_features.windows import Stretched
 from texture_papers.hu import Spectrum
 from texture_papers.protocol import digest_of
 from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide
@@ -175,143 +173,6 @@ def _adapted_feature(feature: Feature, n_samples: int, of_motion: bool) -> Featu
     return feature
 
 
-AT_S = (0.5, 1.0, 2.5, 5.0)
-FIRST_COUNTS = 1e-6  # of a vote: of equal counts, the label that was voted for first wins
-TIMED = 200
-WARM_UP = 10
-# windows (n, n_channels, n_samples) → votes for the sorted labels of the training (n, n_labels)
-Vote = Callable[[AnyArray], Array]
-
-
-@dataclass(frozen=True, eq=False)
-class RawWindows:
-    """All windows of a data set."""
-
-    samples: NDArray[np.float32]  # (n, n_channels, n_samples) As aeon takes collections of time series
-    # labels, slides: (n,) Surface and name of the slide of each
-    labels: AnyArray
-    slides: AnyArray
-
-    @classmethod
-    def of(cls, dataset: SlideDataset) -> RawWindows:
-        """Return windows that begin LENGTH_S apart, of the first topic of the slides."""
-        params = WindowParams(length_s=LENGTH_S, hop_s=LENGTH_S)
-        topic = next(iter(dataset[0].signals))
-        found = [
-            (event.windows[topic].samples.T, item.surface, item.name)
-            for item in dataset
-            for event in cut_recording({topic: item.signals[topic]}, item.states, params)
-            if isinstance(event, CutWindow)
-        ]
-        if not found:
-            raise InvalidData(f'no slide has a whole window of {LENGTH_S} s; use longer slides without losses')
-        samples, labels, slides = zip(*found, strict=True)
-        return cls(np.stack(samples).astype(np.float32), np.array(labels), np.array(slides))
-
-
-def figures_of_windows(
-    dataset: SlideDataset, split: Split, fit: Callable[[AnyArray, AnyArray], Vote]
-) -> dict[str, Any]:
-    """Return the figures of a method that takes windows of samples, as those of a recipe."""
-    windows = RawWindows.of(dataset)
-    right, decided, taken = [], [], []
-    for training, tested in split_slides(dataset, split.splitter, split.groups):
-        start = time.process_time()
-        rows = np.isin(windows.slides, dataset.names[training])
-        held = np.isin(windows.slides, dataset.names[tested])
-        vote = fit(windows.samples[rows], windows.labels[rows])
-        taken.append(time.process_time() - start)
-        votes = np.asarray(vote(windows.samples[held]))
-        codes = np.searchsorted(np.unique(windows.labels[rows]), windows.labels[held])
-        right.append(votes.argmax(axis=1) == codes)
-        decided += decisions(votes, codes, windows.slides[held])
-    shares = [float(np.mean(own)) for own in zip(*decided, strict=False)]
-    at_s = {round(LENGTH_S * number, 3): share for number, share in enumerate(shares, 1)}
-    return {
-        'window_accuracy': float(np.mean(np.concatenate(right))),
-        'accuracy_at_s': {str(seconds): at_s.get(seconds) for seconds in AT_S},
-        'decisions': {'s': [*at_s], 'share': shares},
-        'unclassified_windows': 0.0,
-        'unclassified_at_s': dict.fromkeys(map(str, AT_S), 0.0),
-        'train_s': round(float(np.mean(taken)), 2),
-        'latency_us': _latency(vote, windows.samples),
-    }
-
-
-def try_estimator(dataset: SlideDataset, split: Split, name: str, seed: int) -> dict[str, Any]:
-    """Return the figures of an estimator with `fit(X, y)` and `predict(X)` of windows, such as those of aeon."""
-    cls: Any = find({}, name, 'estimator')
-    if not all(hasattr(cls, method) for method in ('fit', 'predict')):
-        raise InvalidParameter(f"'{name}' has no methods fit and predict; name a class of aeon or your own like it")
-
-    def fit(samples: AnyArray, labels: AnyArray) -> Vote:
-        estimator = cls()
-        if hasattr(estimator, 'get_params') and 'random_state' in estimator.get_params():
-            estimator.set_params(random_state=seed)
-        trained = estimator.fit(samples, labels)
-        vote: Vote = getattr(trained, 'predict_proba', None) or one_vote(trained.predict, np.unique(labels))
-        return vote
-
-    return figures_of_windows(dataset, split, fit)
-
-
-def one_vote(predict: Callable[[AnyArray], AnyArray], labels: AnyArray) -> Vote:
-    """Return votes of 1 for the predicted label, from what predicts labels of windows."""
-    return lambda windows: (np.asarray(predict(windows))[:, None] == labels).astype(np.float64)
-
-
-def decisions(votes: Array, codes: AnyArray, slides: AnyArray) -> list[list[bool]]:
-    """Return for each slide whether the sum of the votes is right after its first window, its second, and so on."""
-    found = []
-    for slide in np.unique(slides):
-        own = votes[slides == slide]
-        weights = 1.0 - FIRST_COUNTS * np.arange(len(own))
-        sums = np.cumsum(own * weights[:, None], axis=0)
-        found.append((sums.argmax(axis=1) == codes[slides == slide]).tolist())
-    return found
-
-
-def _latency(vote: Vote, samples: AnyArray) -> dict[str, float]:
-    taken = []
-    for window in samples[:TIMED]:
-        start = time.process_time()
-        vote(window[None])
-        taken.append(1e6 * (time.process_time() - start))
-    median, p99 = np.percentile(taken[min(WARM_UP, len(taken) - 1) :], (50, 99))
-    return {'median': float(median), 'p99': float(p99)}
-
-
-OWN_DATA = 'own recordings'
-OWN_FOLDS = 5
-# Beside these a recipe is drawn: what is shipped for use, and one method of each paper.
-BESIDE = (
-    'default', 'fast', 'vibration-and-taxels', 'any-speed', 'ets-linear-svm', 'hu-pca-svm', 'kaboli-svm-rbf',
-    'jamali-naive-bayes-5',
-)  # fmt: skip
-SKLEARN = 'sklearn.'
-
-
-def own_recipe(name: str) -> Recipe:
-    """Return the recipe that a name means: shipped, a file, or `default` with a classifier of scikit-learn."""
-    if not name.startswith(SKLEARN):
-        return load_recipe(name)
-    _, content = read_recipe('default')
-    trained = {key: value for key, value in content['training'].items() if key != AUGMENTATION}  # only networks take it
-    return Recipe.from_mapping({**content, 'training': trained, 'learner': {'sklearn': {'estimator': name}}}, name)
-
-
-def takes_windows(name: str) -> bool:
-    """Return whether a name is of a class that takes windows of samples, as those of aeon do."""
-    return ':' in name and not name.startswith(SKLEARN)
-
-
-def shown_name(name: str) -> str:
-    """Return what a method is called in tables and charts: the class of an estimator, or the name of a recipe."""
-    if ':' in name:
-        return name.partition(':')[2]
-    return f'{Path(name).stem} (own)' if Path(name).suffix else name
-
-
 def recipe_table(settings: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
     """Return one row for each recipe: what it recognises on each data set and split, then what it costs.
 
@@ -344,24 +205,10 @@ def _accuracy(cell: Mapping[str, Any]) -> str:
     return '; '.join('' if share is None else f'{100 * share:.1f}' for share in shares)
 
 
-def folds_of(dataset: SlideDataset, seed: int) -> Split:
-    """Return five folds by slide, or as many as the surface with the fewest slides allows."""
-    labels, counts = np.unique(dataset.labels, return_counts=True)
-    fewest = int(counts.min())
-    if fewest < 2 or len(labels) < 2:
-        raise InvalidData(
-            f"'{labels[counts.argmin()]}' has {fewest} slides of {len(labels)} surfaces; two slides of two "
-            'surfaces are needed to train and to test'
-        )
-    count = min(OWN_FOLDS, fewest)
-    return Split(f'{count} folds by slide', StratifiedGroupKFold(count, shuffle=True, random_state=seed))
-
-
 VIBRATION, ALL_CHANNELS, ARRAY = 'biotac20, PAC at 1 kHz', 'biotac20, all channels', 'ntp21'
 DATA = {
     'biotac20': 'BioTac, 20 materials × 40 slides of 6 s (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
     'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
-    OWN_DATA: 'slides of the bags given',
 }
 RATE_HZ, FOLDS, LAST_TRAINED = 1000.0, 5, 30
 QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_TRAINED = ('material01', 'material02', 'material03'), '1-6', 2, 4
@@ -405,7 +252,7 @@ class Setting:
 
     def recipe(self, name: str) -> Recipe:
         """Return a recipe as it is tried here: with the vibration alone where other inputs are missing."""
-        recipe = own_recipe(name)
+        recipe = load_recipe(name)
         whole = set(recipe.feature_set.topics) <= set(self.dataset[0].signals)
         recipe = with_channels(recipe, 'all' if whole else 'fast')
         return comparable(recipe, self.rate_hz, of_motion=self.of_motion, augmented=True)
@@ -417,51 +264,22 @@ class _RecipeJob(NamedTuple):
 
 
 class _RecipeFigures(NamedTuple):
-    """The figures of one recipe by split, and the model of the last split; None for what is no recipe of ours."""
+    """The figures of one recipe by split, and the model of the last split."""
 
     figures: dict[str, dict[str, Any]]
-    model: TextureModel | None
+    model: TextureModel
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Try all shipped recipes on all recorded data sets that are there, or the user's own methods beside a few."""
-    if options.own_methods or options.own_bags:
-        return run_own(options)
-    numbers = _numbers(_settings(options), _shipped(options), options)
-    return _result('recipes', numbers, options, table=True)
-
-
-def _settings(options: BenchmarkOptions) -> dict[str, Setting]:
+    """Try all shipped recipes on all recorded data sets that are there."""
     settings: dict[str, Setting] = {}
     for name, build in (('biotac20', biotac20_settings), ('ntp21', _ntp21)):
         if options.data and (options.data / name).is_dir():
             settings |= build(options)
     if not settings:
         options.recordings('biotac20')  # says that it is missing
-    return settings
-
-
-def run_own(options: BenchmarkOptions) -> BenchmarkResult:
-    """Try the user's own methods beside some shipped recipes, on the user's own slides if there are any."""
-    if options.own_bags:
-        dataset = SlideDataset.from_bags(options.own_bags)
-        rate_hz = next(iter(dataset[0].signals.values()))[0].sampling_rate_hz
-        tells_speed = bool(np.isfinite([slide.speed_m_s for slide in dataset]).all())
-        settings = {OWN_DATA: Setting(dataset, [folds_of(dataset, options.seed)], rate_hz, of_motion=tells_speed)}
-    else:
-        settings = _settings(options)
-    first = next(iter(settings.values()))
-    shipped = [name for name in (QUICK_RECIPES[:1] if options.quick else BESIDE) if _fits(name, first)]
-    for name in options.own_methods:
-        if not takes_windows(name) and not _fits(name, first):
-            needed = ', '.join(own_recipe(name).feature_set.topics)
-            raise InvalidData(f"'{name}' needs {needed}; the slides have {', '.join(first.dataset[0].signals)}")
-    tried = _numbers(settings, (*shipped, *options.own_methods), options)
-    numbers = {
-        setting: {split: {shown_name(name): cell for name, cell in cells.items()} for split, cells in splits.items()}
-        for setting, splits in tried.items()
-    }
-    return _result('recipes_own', numbers, options, table=True)
+    numbers = _numbers(settings, _shipped(options), options)
+    return _result('recipes', numbers, options, table=True)
 
 
 def _fits(name: str, setting: Setting) -> bool:
@@ -470,7 +288,7 @@ def _fits(name: str, setting: Setting) -> bool:
         topics = setting.recipe(name).feature_set.topics
     except InvalidParameter:  # of a recipe without vibration on slides that have nothing else
         return False
-    return set(topics) <= set(setting.dataset[0].signals) and (name not in NEEDS_ARRAY or setting.of_motion)
+    return set(topics) <= set(setting.dataset[0].signals)
 
 
 def run_later(options: BenchmarkOptions) -> BenchmarkResult:
@@ -509,13 +327,12 @@ def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: Ben
     numbers: dict[str, Any] = {name: {split.name: {} for split in setting.splits} for name, setting in settings.items()}
     jobs = _jobs(settings, names)
     timed = {}
-    for job, tried in zip(jobs, map_forked(partial(_try, settings, options.seed), jobs), strict=True):
+    for job, tried in zip(jobs, map_forked(partial(_try, settings), jobs), strict=True):
         setting = settings[job.setting]
         for name, (of_splits, model) in tried.items():
             for split, figures in of_splits.items():
                 numbers[job.setting][split][name] = figures
-            if model:
-                timed[job.setting, name] = setting.recipe(name), model, setting.dataset
+            timed[job.setting, name] = setting.recipe(name), model, setting.dataset
     for (place, name), latency in latencies_us(timed).items():
         for own in settings[place].splits:
             numbers[place][own.name][name]['latency_us'] = latency
@@ -544,7 +361,7 @@ def _result(
         data='; '.join(text for name, text in DATA.items() if name in sets),
         split='; '.join(f'{split}: {SPLITS[split]}' if split in SPLITS else split for split in sorted(splits)),
         numbers=numbers,
-        charts=(_chart(numbers, options.out / f'{name}.png', [shown_name(own) for own in options.own_methods]),),
+        charts=(_chart(numbers, options.out / f'{name}.png'),),
     )
 
 
@@ -578,9 +395,7 @@ def _jobs(settings: Mapping[str, Setting], names: Sequence[str]) -> list[_Recipe
     """Return what is tried; recipes with the same windows and features together: they are described once."""
     groups: dict[tuple[Any, ...], list[str]] = {}
     for setting, name in product(settings, names):
-        if takes_windows(name):
-            groups.setdefault((setting, name), []).append(name)
-        elif (name not in NEEDS_ARRAY or setting in (ARRAY, OWN_DATA)) and _fits(name, settings[setting]):
+        if (name not in NEEDS_ARRAY or setting == ARRAY) and _fits(name, settings[setting]):
             recipe = settings[setting].recipe(name)
             key = (setting, recipe.feature_set, recipe.training.hop_s, recipe.augmentation)
             groups.setdefault(key, []).append(name)
@@ -588,12 +403,8 @@ def _jobs(settings: Mapping[str, Setting], names: Sequence[str]) -> list[_Recipe
     return sorted(jobs, key=lambda job: not any(SLOW in name for name in job.recipes))
 
 
-def _try(settings: Mapping[str, Setting], seed: int, job: _RecipeJob) -> dict[str, _RecipeFigures]:
+def _try(settings: Mapping[str, Setting], job: _RecipeJob) -> dict[str, _RecipeFigures]:
     setting = settings[job.setting]
-    if takes_windows(job.recipes[0]):
-        [name] = job.recipes
-        found = {split.name: try_estimator(setting.dataset, split, name, seed) for split in setting.splits}
-        return {name: _RecipeFigures(found, None)}
     recipes = {name: setting.recipe(name) for name in job.recipes}
     features = FoldFeatures.of(recipes[job.recipes[0]], setting.dataset)
     tried = {}
@@ -608,7 +419,7 @@ def _try(settings: Mapping[str, Setting], seed: int, job: _RecipeJob) -> dict[st
     return tried
 
 
-def _chart(numbers: Mapping[str, Any], path: Path, always: Sequence[str]) -> Path:
+def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
     panels = {
         f'{name}, {SPLIT_TITLES.get(split, split)}': {
             recipe: (cell['latency_us']['median'], cell['window_accuracy']) for recipe, cell in of_split.items()
@@ -618,4 +429,4 @@ def _chart(numbers: Mapping[str, Any], path: Path, always: Sequence[str]) -> Pat
     }
     title = 'Accuracy of all recipes over computing time; orange: most accurate for the time'
     axis_labels = ('computing time of a window (µs)', 'single windows recognised (%)')
-    return front_chart(panels, title, axis_labels, path, always=always)
+    return front_chart(panels, title, axis_labels, path)

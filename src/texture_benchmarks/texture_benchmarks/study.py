@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import platform
 import tempfile
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -37,11 +37,6 @@ class BenchmarkOptions:
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
     # Folder of data sets that are imported already, each in its own folder; see `imported`
     bags: Path | None = None
-    # Recipes of one's own, by path, and estimators by 'module:Class', that `recipes` tries beside the shipped
-    # ones
-    own_methods: tuple[str, ...] = ()
-    # Labelled bags, or folders of bags, that `recipes` takes in place of the recorded data sets
-    own_bags: tuple[Path, ...] = ()
 
     def recordings(self, name: str) -> Path:
         """Return the folder of a recorded data set, by its name; InvalidData says that it is missing."""
@@ -214,15 +209,13 @@ def front_chart(
     title: str,
     axis_labels: tuple[str, str],
     path: str | Path,
-    *,
-    always: Collection[str] = (),
 ) -> Path:
     """Draw methods by cost and share of successes, with the front that no other betters; a row for each data set."""
     with chart(path, (7.4, 0.6 + 4.0 * len(panels)), title) as figure:
         rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
         for axes, (name, points) in zip(rows, panels.items(), strict=True):
             axes.set(ylabel=axis_labels[1], title=name, xscale='log', ylim=(0, 101))
-            _front(axes, points, always)
+            _front(axes, points)
         rows[-1].set_xlabel(axis_labels[0])
     return Path(path)
 
@@ -243,7 +236,7 @@ def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, pa
     return Path(path)
 
 
-def _front(axes: Any, points: Mapping[str, tuple[float, float]], always: Collection[str]) -> None:
+def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
     values = list(points.values())
     best = pareto_front(values)
     axes.step(
@@ -255,8 +248,7 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]], always: Collect
     costs = [cost for cost, _ in values]
     axes.set_xlim(min(costs) / 10**ROOM_DECADES, 3.5 * max(costs))  # room for the names at both ends
     names = list(points)
-    own = [index for index, name in enumerate(names) if name in always]
-    for index, (start, height) in _named(values, best, own).items():
+    for index, (start, height) in _named(values, best).items():
         left = start < np.log10(values[index][0])
         axes.annotate(
             names[index], (values[index][0], 100 * height), xytext=(-5 if left else 5, 0), textcoords='offset points',
@@ -279,15 +271,13 @@ def _free_places(
     ]
 
 
-def _named(
-    values: Sequence[tuple[float, float]], best: Sequence[int], always: Sequence[int] = ()
-) -> dict[int, tuple[float, float]]:
-    """Return where names stand, in decades and as a share: `always`, the front, then the best that cover nothing."""
+def _named(values: Sequence[tuple[float, float]], best: Sequence[int]) -> dict[int, tuple[float, float]]:
+    """Return where names stand, in decades and as a share: the front, then the best that cover nothing."""
     points = [(float(np.log10(cost)), share) for cost, share in values]
     others = sorted(set(range(len(points))) - set(best), key=lambda index: -points[index][1])
     places: dict[int, tuple[float, float]] = {}
-    for index in dict.fromkeys([*always, *sorted(best, key=lambda index: -points[index][1]), *others]):
-        free = _free_places(points, index, places) or [points[index]] * (index in always)
+    for index in [*sorted(best, key=lambda index: -points[index][1]), *others]:
+        free = _free_places(points, index, places)
         if free and len(places) < DIRECT_LABELS:
             places[index] = free[0]
     return places

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -21,38 +20,6 @@ from texture_simulation.devices.fingers import FRAMES_AT_ONCE, SYSTEM_CONFIG, Em
 
 pytestmark = pytest.mark.realtime
 
-# What of the contract of the other sensors holds here: the test of this file that shows it, or why it cannot apply.
-NO_LINE = 'a sound card has no line of its own: the operating system delivers whole blocks of samples'
-CONTRACT_ROWS = {
-    'test_every_sensor_with_a_device_is_under_contract': 'a sound card is no serial device with an emulator of its own',
-    'test_what_was_sampled_arrives_in_its_place_unit_and_time': (
-        'test_each_sample_of_the_card_arrives_once_in_its_order, test_the_stamps_follow_the_card_s_clock'
-    ),
-    'test_it_may_be_opened_and_closed_any_number_of_times': (
-        'test_closed_and_opened_again_it_goes_on_at_the_index_of_the_time'
-    ),
-    'test_replugged_under_another_name_it_goes_on_at_the_index_of_the_time': (
-        "ALSA's file plugin cannot be unplugged; what the driver does then is shown by "
-        'test_a_silent_card_is_reported, test_a_card_that_is_not_there_is_named and '
-        'test_closed_and_opened_again_it_goes_on_at_the_index_of_the_time'
-    ),
-    'test_a_second_program_is_refused_and_the_first_is_not_disturbed': (
-        "the operating system decides whether a card may be shared, and ALSA's file plugin may be"
-    ),
-    'test_a_device_that_opens_and_stays_silent_is_reported_by_its_path': 'test_a_silent_card_is_reported',
-    'test_wrong_firmware_is_an_error_and_none_of_it_is_published': NO_LINE,
-    'test_bytes_lost_added_or_changed_are_counted_and_no_sample_moves': NO_LINE,
-    'test_frames_left_out_are_lost_and_those_sent_twice_come_once': (
-        'test_an_overflow_is_counted_and_its_samples_are_left_out_of_the_index, '
-        'test_a_gap_that_no_flag_reports_is_known_after_half_a_second'
-    ),
-    'test_a_stall_of_the_line_delays_and_loses_nothing': 'test_blocks_that_come_late_in_one_burst_lose_nothing',
-    'test_a_clock_that_drifts_is_followed_and_reported': 'test_a_card_whose_clock_drifts_is_followed_and_reported',
-    'test_a_device_ten_times_too_fast_is_read_in_order_and_noticed': (
-        'test_a_card_ten_times_too_fast_keeps_its_order_and_the_stamps_of_the_host, '
-        'test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on'
-    ),
-}
 DEADLINE_S = 20.0
 RATE_HZ = 48_000
 TURN = 30_000
@@ -128,15 +95,6 @@ def read_s(sensor: SoundCard, seconds: float) -> list[TactileSignal]:
 
 def numbers(batches: list[TactileSignal]) -> np.ndarray:
     return np.concatenate([batch.samples[:, 0] for batch in batches]) * 32768
-
-
-def test_each_row_of_the_contract_is_shown_here_or_cannot_apply() -> None:
-    contract, own = (
-        set(re.findall(r'^def (test_\w+)', Path(__file__).with_name(name).read_text(), re.MULTILINE))
-        for name in ('test_sensor_contract.py', 'test_sound_card.py')
-    )
-    assert set(CONTRACT_ROWS) == contract
-    assert {name for row in CONTRACT_ROWS.values() for name in re.findall(r'test_\w+', row)} <= own
 
 
 def test_each_sample_of_the_card_arrives_once_in_its_order(make: Callable[..., SoundCard]) -> None:

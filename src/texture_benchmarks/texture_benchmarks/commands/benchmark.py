@@ -11,7 +11,7 @@ from pathlib import Path
 from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions, importing_once
 from texture_core.cli import add_seed
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData
 
 ALL = 'all'
 NO_DATA = 3  # exit code of a process
@@ -31,45 +31,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
     parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
-    parser.add_argument(
-        '--recipe',
-        nargs='+',
-        default=(),
-        metavar='FILE',
-        help="with `recipes`: recipes of one's own, drawn beside ours",
-    )
-    parser.add_argument(
-        '--estimator',
-        nargs='+',
-        default=(),
-        metavar='MODULE:CLASS',
-        help='with `recipes`: classifiers of scikit-learn on the features of `default`; others, such as those of aeon, '
-        'on windows of samples',
-    )
-    parser.add_argument(
-        '--bags', nargs='+', type=Path, default=(), metavar='BAG', help="with `recipes`: labelled bags of one's own"
-    )
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run one benchmark, or all for which the data is there: 1 if one of these fails.
-
-    Raises
-    ------
-    InvalidParameter
-        If another benchmark than `recipes` is given methods or bags of one's own.
-    """
-    benchmark_options = BenchmarkOptions(
-        options.out,
-        options.data,
-        options.seed,
-        options.quick,
-        own_methods=(*options.recipe, *options.estimator),
-        own_bags=tuple(options.bags),
-    )
-    if (benchmark_options.own_methods or benchmark_options.own_bags) and options.name != 'recipes':
-        raise InvalidParameter(f"'{options.name}' takes no --recipe, --estimator or --bags; use `recipes`")
+    """Run one benchmark, or all for which the data is there: 1 if one of these fails."""
+    benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick)
     if options.name != ALL:
         _run_one(options.name, benchmark_options)
         return 0

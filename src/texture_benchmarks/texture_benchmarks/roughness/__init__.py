@@ -1,1 +1,0 @@
-"""Benchmark: time from window to grade."""

@@ -1,0 +1,298 @@
+"""Drivers on their emulated devices: what the contract of all sensors does not ask."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sensor_rig import CASES, Feed, Rig, biotac, feed_papillarray
+
+from texture_core.errors import InvalidParameter
+from texture_core.types import lost_samples
+from texture_drivers.biotac import LAYOUTS, BioTac
+from texture_drivers.papillarray import PapillArray
+from texture_drivers.sensor import SensorParams
+from texture_simulation.devices.fingers import (
+    BoardFaults,
+    ByteFaults,
+    EmulatedBioTac,
+    EmulatedDaq,
+    EmulatedPapillArray,
+)
+
+pytestmark = pytest.mark.realtime
+
+
+Make = Callable[..., Rig]
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Make]:
+    with ExitStack() as rigs:
+
+        def make(serials: tuple[str, ...] = ('BT-0',), prefix: str = '', finger: int = 0, **options: Any) -> Rig:
+            link = tmp_path / 'biotac'
+            device = EmulatedBioTac(link, np.random.default_rng(0), serials)
+            rig = rigs.enter_context(Rig('biotac', link, case=biotac(prefix, fingers=len(serials)), device=device))
+            rig.sensor = BioTac(SensorParams(device=str(link), finger=finger), **options)
+            rig.sensor.open()
+            return rig
+
+        yield make
+
+
+def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(make: Make) -> None:
+    rig = make(serials=('BT-0', 'BT-1', ''), finger=1)
+    rig.set(board_faults=BoardFaults(flip=0.01))
+    batches = rig.signal_s(1.4)
+    values = np.concatenate([batch.samples[:, 0] for batch in batches])
+    assert 0.005 < np.isnan(values).mean() < 0.05  # two bytes a word
+    assert len(set(rig.offsets(batches))) == 1
+    assert lost_samples(batches) == 0
+    assert rig.sensor.counts['damaged_words'] > 0
+
+
+def test_a_reset_of_the_device_is_an_interruption(make: Make) -> None:
+    rig = make()
+    before = rig.signal_s(1.0)
+    rig.run_locked(rig.device.reset)
+    after = rig.signal_s(0.5)
+    assert rig.sensor.counts['restarts'] == 1
+    assert len(set(rig.offsets(after[1:]))) == 1
+    elapsed_s = (after[-1].stamp_ns - before[0].stamp_ns) / 1e9
+    assert (after[-1].first_sample - before[0].first_sample) / 2200 == pytest.approx(elapsed_s, abs=0.03)
+
+
+def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advice(make: Make) -> None:
+    rig = make()
+    rig.signal_s(1.5)
+    assert rig.sensor.details['serial of finger 0'] == 'BT-0'
+    rig.set(silent=True)
+    assert 'sends no whole frames' in rig.fault()
+
+
+def test_the_wrong_kind_of_biotac_is_reported(make: Make) -> None:
+    assert '44 slots' in make(layout=LAYOUTS['biotac_sp']).fault()
+
+
+def test_all_fingers_of_a_board_have_topics_of_their_own(make: Make) -> None:
+    rig = make(serials=('BT-0', 'BT-1', ''), prefix='finger1/', fingers=(0, 1, 2))
+    topics = rig.read_s(0.1)
+    assert not topics['finger2/signal']
+    assert set(topics) == {f'finger{n}/{topic}' for n in range(3) for topic in ('signal', 'signal_static')}
+
+
+@pytest.fixture
+def make_anyskin(tmp_path: Path) -> Iterator[Make]:
+    with ExitStack() as rigs:
+
+        def make_anyskin(**changes: Any) -> Rig:
+            rig = rigs.enter_context(Rig('anyskin', tmp_path / 'anyskin', case=replace(CASES['anyskin'], **changes)))
+            rig.sensor.open()
+            return rig
+
+        yield make_anyskin
+
+
+def test_a_rate_that_nobody_set_is_measured_and_kept(make_anyskin: Make) -> None:
+    rig = make_anyskin(config='')
+    first = rig.signal_s(0.2)[0]
+    assert first.sampling_rate_hz == pytest.approx(250.0, abs=2.0)
+    assert first.sampling_rate_hz == round(first.sampling_rate_hz)
+    rig.sensor.close()
+    rig.sensor.open()
+    again = rig.signal_s(0.2)[0]
+    assert again.sampling_rate_hz == first.sampling_rate_hz == rig.sensor.expected_rates_hz['signal']
+
+
+def test_the_axes_keep_their_order_and_names(make_anyskin: Make) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        device.sample(np.tile(np.arange(15.0), (ticks, 1)))
+
+    batch = make_anyskin(feed=feed).signal_s(0.2)[-1]
+    assert batch.channels[:4] == ('m0_x', 'm0_y', 'm0_z', 'm1_x')
+    np.testing.assert_array_equal(batch.samples[0], np.arange(15.0))
+
+
+def test_the_temperature_is_published_if_wanted(make_anyskin: Make) -> None:
+    assert 'temperature' not in make_anyskin(config='{rate_hz: 250.0}').read_s(0.2)
+    temperature = make_anyskin().read_s(0.2)['temperature'][-1]
+    assert temperature.channels == ('m0', 'm1', 'm2', 'm3', 'm4')
+    assert temperature.samples == pytest.approx(31.25)
+
+
+def test_another_board_is_reported(make_anyskin: Make) -> None:
+    rig = make_anyskin(config='{magnetometers: 4, rate_hz: 250.0}')
+    assert 'no valid frame' in rig.fault()
+
+
+def test_a_brown_out_of_the_board_is_survived_and_nothing_moves(make_anyskin: Make) -> None:
+    rig = make_anyskin()
+    batches = rig.signal_s(0.5)
+    rig.run_locked(rig.device.reset)
+    batches += rig.signal_s(0.5)
+    assert len(set(rig.offsets(batches))) == 1
+    assert rig.sensor.counts['bogus'] == 0
+
+
+@pytest.fixture
+def make_papillarray(tmp_path: Path) -> Iterator[Make]:
+    with ExitStack() as rigs:
+
+        def make_papillarray(name: str = 'papillarray', *, arrays: int = 1, **changes: Any) -> Rig:
+            link = tmp_path / name
+            device = EmulatedPapillArray(link, np.random.default_rng(0), arrays)
+            rig = rigs.enter_context(Rig(name, link, case=replace(CASES[name], **changes), device=device))
+            rig.sensor.open()
+            return rig
+
+        yield make_papillarray
+
+
+@pytest.mark.parametrize('rate_hz', [100, 500])
+def test_the_hub_is_asked_for_the_rate_and_sends_it(make_papillarray: Make, rate_hz: int) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.arange(4 * first, 4 * (first + ticks))  # milliseconds
+        device.sample(np.broadcast_to(numbers[:, None, None, None], (4 * ticks, 1, 9, 6)).astype(np.float64))
+
+    rig = make_papillarray(config=f'{{rate_hz: {rate_hz}}}', feed=feed)
+    batches = rig.signal_s(0.2)
+    assert rig.device.rate_hz == rate_hz
+    assert batches[-1].sampling_rate_hz == rate_hz
+    values = np.concatenate([batch.samples[:, 0] for batch in batches])
+    assert set(np.diff(values)) == {1000 / rate_hz}
+
+
+def test_a_rate_that_the_hub_cannot_do_is_refused() -> None:
+    with pytest.raises(InvalidParameter, match='100, 250, 500, 1000'):
+        PapillArray(SensorParams(device='/dev/null', config='{rate_hz: 300}'))
+
+
+def test_the_force_on_the_array_is_the_sum_over_its_pillars(make_papillarray: Make) -> None:
+    topics = make_papillarray().read_s(0.2)
+    pillars, whole = topics['signal'][-1].samples, topics['wrench'][-1].samples
+    np.testing.assert_allclose(whole[:, 0], pillars[:, ::6].sum(axis=1))
+
+
+def test_an_array_that_the_hub_does_not_carry_is_reported(make_papillarray: Make) -> None:
+    assert (
+        'array 1 is asked for, and the hub'
+        in make_papillarray('papillarray_pair', arrays=1, feed=feed_papillarray(1)).fault()
+    )
+
+
+def test_the_bias_command_takes_the_present_values_for_none(make_papillarray: Make) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        device.sample(np.full((4 * ticks, 1, 9, 6), 0.25))
+
+    rig = make_papillarray(feed=feed)
+    assert rig.signal_s(0.2)[-1].samples.max() == 0.25
+    rig.sensor.send(b'z\n')
+    assert np.abs(rig.signal_s(0.3)[-1].samples).max() == 0.0
+
+
+def test_a_brown_out_of_the_hub_is_survived_and_the_gap_is_reported(make_papillarray: Make) -> None:
+    rig = make_papillarray()
+    batches = rig.signal_s(0.5)
+    rig.run_locked(rig.device.reset)  # the hub is back at its usual rate, too: the driver asks for its own again
+    deadline_s = time.monotonic() + 30.0
+    while rig.device.rate_hz != 250:
+        assert time.monotonic() < deadline_s
+        batches += rig.sensor.read().get('signal', [])
+    batches += rig.signal_s(0.5)
+    assert rig.sensor.counts['device restarts'] >= 1
+    assert lost_samples(batches) == rig.sensor.counts['lost']
+    first, last = batches[0], batches[-1]
+    elapsed_s = (last.stamp_ns - first.stamp_ns) / 1e9
+    assert (last.first_sample - first.first_sample) / 250 == pytest.approx(elapsed_s, abs=0.05)
+
+
+@pytest.fixture
+def make_sampler(tmp_path: Path) -> Iterator[Make]:
+    with ExitStack() as rigs:
+
+        def make_sampler(name: str = 'daq', *, start_us: int | None = None, **changes: Any) -> Rig:
+            link = tmp_path / name
+            device = None if start_us is None else EmulatedDaq(link, np.random.default_rng(0), start_us)
+            rig = rigs.enter_context(Rig(name, link, case=replace(CASES[name], **changes), device=device))
+            rig.sensor.open()
+            return rig
+
+        yield make_sampler
+
+
+def test_the_channels_keep_their_order(make_sampler: Make) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        device.sample(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
+
+    last = make_sampler(feed=feed).signal_s(0.5)[-1]
+    assert last.samples[0, 0] > 0
+    np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
+
+
+def test_sequence_and_clock_wrap_without_a_trace(make_sampler: Make) -> None:
+    rig = make_sampler(start_us=2**32 - 1_000_000)
+    rig.device._frames['daq'] = 65_536 - 200
+    batches = rig.signal_s(1.5)
+    assert len(set(rig.offsets(batches))) == 1
+    assert rig.sensor.counts['lost'] == rig.sensor.counts['device restarts'] == 0
+
+
+def test_a_brown_out_is_survived_and_the_gap_is_reported(make_sampler: Make) -> None:
+    rig = make_sampler()
+    batches = rig.signal_s(0.5)
+    rig.run_locked(rig.device.reset)
+    batches += rig.signal_s(0.5)
+    assert rig.sensor.counts['device restarts'] == 1
+    assert lost_samples(batches) == rig.sensor.counts['lost']
+    first, last = batches[0], batches[-1]
+    elapsed_s = (last.stamp_ns - first.stamp_ns) / 1e9
+    assert (last.first_sample - first.first_sample) / 2500 == pytest.approx(elapsed_s, abs=0.05)
+
+
+def test_a_silent_device_and_a_babbling_one_are_reported_apart(make_sampler: Make) -> None:
+    rig = make_sampler()
+    rig.set(silent=True)
+    assert 'sends nothing' in rig.fault()
+    rig.set(silent=False, faults=ByteFaults(flip=0.2))
+    rig.sensor.open()
+    assert 'no valid frame' in (babble := rig.fault())
+    assert 'baud' in babble
+
+
+def test_settings_that_name_other_channels_are_refused_in_one_sentence(make_sampler: Make) -> None:
+    assert 'sends 8 channels, and 2 are named' in make_sampler(config='{channels: [{name: a}, {name: b}]}').fault()
+
+
+def swing(device: Any, first: int, ticks: int) -> None:
+    """Feed a film that swings at 50 Hz, and a force that rises."""
+    numbers = np.arange(first, first + ticks)
+    film = 1000 * np.sin(2 * np.pi * 50 / 4096 * numbers)
+    device.sample(film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16))
+
+
+SWING: dict[str, Feed] = {'feed': swing}
+
+
+def test_film_and_force_come_as_two_streams_in_their_units(make_sampler: Make) -> None:
+    topics = make_sampler('pvdf', config='', **SWING).read_s(1.0)
+    film, force = topics['signal'], topics['signal_static']
+    assert lost_samples(film) == lost_samples(force) == 0
+    assert (film[0].sensor, film[0].units, film[0].sampling_rate_hz) == ('pvdf/film', ('pC',), 4096.0)
+    assert (force[0].sensor, force[0].units, force[0].sampling_rate_hz) == ('pvdf/force', ('N',), 64.0)
+    charge = np.concatenate([batch.samples for batch in film])
+    assert charge.max() == pytest.approx(2.0, rel=0.01)  # 1000 counts of 0.002 pC
+    assert np.diff(np.concatenate([batch.samples for batch in force]), axis=0) == pytest.approx(0.005, abs=1e-6)
+
+
+def test_the_force_on_the_film_is_restored_if_wanted(make_sampler: Make) -> None:
+    batches = make_sampler('pvdf', config='{restore_from_hz: 0.5}', **SWING).signal_s(2.0)
+    assert batches[-1].units == ('N',)
+    late = np.concatenate([batch.samples for batch in batches])[4096:]
+    assert np.ptp(late) / 2 == pytest.approx(2.0 / 21.0, rel=0.05)  # far above the corner nothing leaks
