@@ -1,20 +1,35 @@
+import argparse
 import json
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_tables import MAPPING, recordings, write_csv
 from scipy.stats import beta
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import TextureEstimate
 from texture_estimation.recipe import Recipe
-from texture_evaluation.cross_validation import ChronologicalSplit, cross_validate, interval, parse_split, slide_counts
+from texture_evaluation.commands import evaluate
+from texture_evaluation.cross_validation import (
+    ChronologicalSplit,
+    CrossValidation,
+    FoldResult,
+    compare,
+    compare_all,
+    cross_validate,
+    interval,
+    mcnemar,
+    parse_split,
+)
 from texture_evaluation.evaluate import evaluate_dataset, table
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
+from texture_recordings.tables import import_tables, load_mapping
 
 RECIPE = Recipe.from_mapping(
     {
@@ -61,19 +76,6 @@ def test_slides_that_are_all_right_or_all_wrong_have_the_exact_bound(n: int) -> 
     assert interval(wrong) == [0.0, pytest.approx(1.0 - edge)]
 
 
-def test_each_fold_and_each_time_has_an_interval_around_its_share() -> None:
-    figures = cross_validate(RECIPE, tones(9, shuffled=True), LeaveOneGroupOut(), groups='speed').as_json()
-    for row in (figures, *figures['folds']):
-        shares = {name: row[f'{name}_accuracy'] for name in ('window', 'slide')}
-        for name, share in shares.items():
-            low, high = row[f'{name}_accuracy_interval']
-            assert low <= share <= high
-            assert high - low > 0.1  # few slides by chance alone: no narrow interval
-        low, high = row['accuracy_at_s_interval']['0.5']
-        assert low <= row['accuracy_at_s']['0.5'] <= high
-        assert row['accuracy_at_s_interval']['5.0'] is None  # no slide is so long
-
-
 def test_shuffled_labels_are_recognised_by_chance_alone() -> None:
     figures = cross_validate(RECIPE, tones(15, shuffled=True), StratifiedGroupKFold(5)).as_json()
     # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial share are 17 %.
@@ -112,19 +114,6 @@ def test_a_chronological_split_tests_later_slides_only() -> None:
     assert {int(name.split('/')[1]) for name in fold.results} == {5, 6}
 
 
-def test_a_chronological_split_keeps_the_windows_of_a_slide_together() -> None:
-    slides = np.repeat(['a', 'b', 'c', 'd'], 3)
-    [(train, test)] = ChronologicalSplit(0.75).split(None, np.repeat('cork', 12), slides)
-    assert (train.tolist(), test.tolist()) == (list(range(9)), [9, 10, 11])
-
-
-def test_a_chronological_split_needs_two_slides_of_each_label() -> None:
-    with pytest.raises(InvalidData, match="'felt' has a single slide"):
-        list(ChronologicalSplit().split(None, ['cork', 'cork', 'felt']))
-    with pytest.raises(InvalidParameter, match='above 0 and below 1'):
-        ChronologicalSplit(1.0)
-
-
 def test_several_processes_give_the_results_of_one() -> None:
     one, two = (cross_validate(RECIPE, tones(), StratifiedGroupKFold(2), n_jobs=jobs).as_json() for jobs in (1, 2))
     assert one == two
@@ -160,16 +149,6 @@ def test_a_surface_that_is_tested_but_never_trained_is_refused() -> None:
         cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=dataset.labels)
 
 
-def test_a_surface_that_some_folds_train_may_be_missing_in_another() -> None:
-    dataset = tones()
-    one = dataset.names[0]  # the fold of `other` leaves all slides of cork but this one out
-    groups = np.array(
-        ['first' if name == one else 'rest' if label == 'cork' else name.split('/')[1]
-         for name, label in zip(dataset.names, dataset.labels, strict=True)]
-    )  # fmt: skip
-    assert len(cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=groups).folds) > 2
-
-
 def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
     dataset = tones().select(labels=['cork', 'felt'])
     only = np.array(['x' if label == 'cork' else 'y' for label in dataset.labels])
@@ -203,14 +182,6 @@ def test_a_split_that_makes_no_sense_is_refused_with_what_is_allowed(text: str) 
         parse_split(text)
 
 
-def test_the_interval_of_one_wrong_slide_in_ten_holds_the_share() -> None:
-    one, dataset = cross_validate(RECIPE, tones(), ChronologicalSplit()).pooled[0], 9
-    wrong = SlideResult('felt', one.window_labels, one.estimates)
-    low, high = interval(slide_counts([*[one] * dataset, wrong]))
-    assert one.surface == 'cork'
-    assert 0.6 <= low <= 0.9 <= high == 1.0
-
-
 def test_the_table_has_a_row_for_each_fold_and_the_file_all_figures(tmp_path: Path) -> None:
     result = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed')
     lines = table(result, 'leave-one-out:speed')
@@ -223,3 +194,98 @@ def test_the_table_has_a_row_for_each_fold_and_the_file_all_figures(tmp_path: Pa
     assert written['version'] == version('texture_evaluation')
     with pytest.raises(InvalidParameter, match='cannot be written'):
         write_json(result.as_json(), tmp_path / 'nowhere' / 'figures.json')
+
+
+SMALL = """
+windows: {length_s: 0.5, hop_s: 0.25}
+inputs: {signal: {features: [%s]}}
+learner: {sklearn: {estimator: 'sklearn.naive_bayes:GaussianNB'}}
+"""
+
+
+def cross_validation(recipe: str, *folds: list[bool]) -> CrossValidation:
+    """Return results in which slide number k of a fold is right or not; its two windows are as the slide."""
+    made = []
+    for fold, right in enumerate(folds, 1):
+        results = {
+            f'cork/{number}': SlideResult('cork', [label] * 2, [TextureEstimate(0, 'e', label)])
+            for number, one in enumerate(right, 1)
+            for label in ['cork' if one else 'felt']
+        }
+        made.append(FoldResult(str(fold), (), results, None, 0.0))
+    return CrossValidation(recipe, ('cork', 'felt'), tuple(made))
+
+
+def test_the_exact_test_gives_the_binomial_probability() -> None:
+    # Of 8 coins at most one, or at least seven, shows heads: 2·(1 + 8)/2⁸.
+    assert mcnemar(1, 7) == pytest.approx(18 / 256)
+    assert mcnemar(7, 1) == mcnemar(1, 7)
+    assert mcnemar(0, 0) == mcnemar(5, 5) == 1.0
+
+
+def test_a_comparison_counts_the_slides_that_the_one_alone_recognises() -> None:
+    one = compare(
+        cross_validation('a', [True] * 2 + [False] * 8), cross_validation('b', [False] + [True] * 8 + [False])
+    )
+    assert (one.only_first, one.only_second, one.n_slides) == (1, 7, 10)
+    assert one.p_value == pytest.approx(18 / 256)
+    assert one.slide_difference == one.window_difference == pytest.approx(0.6)
+    low, high = one.slide_interval
+    assert 0.0 < low < 0.6 < high <= 1.0
+
+
+def test_the_interval_of_the_difference_is_that_of_pairs() -> None:
+    """Slides that both recognise, or both do not, say nothing of the difference and widen it little."""
+    common = [True, False] * 50
+    one = compare(cross_validation('a', common), cross_validation('b', common))
+    assert one.slide_interval == (0.0, 0.0)
+    assert one.p_value == 1.0
+
+
+def test_p_values_of_several_comparisons_are_adjusted() -> None:
+    base, half = [False] * 10, [True] * 6 + [False] * 4
+    compared = compare_all([cross_validation(name, right) for name, right in (('a', base), ('b', half), ('c', base))])
+    assert [one.p_value for one in compared] == pytest.approx([2 / 64, 1.0])
+    assert [one.p_value_adjusted for one in compared] == pytest.approx([4 / 64, 1.0])
+
+
+def test_recipes_come_before_bags(tmp_path: Path) -> None:
+    bags = str(tmp_path)
+    assert evaluate.recipes_and_bags(['default', bags, 'fast']) == (['default'], [bags, 'fast'])
+    assert evaluate.recipes_and_bags(['default', 'fast', 'my/own.yaml', bags]) == (
+        ['default', 'fast', 'my/own.yaml'],
+        [bags],
+    )
+    assert evaluate.recipes_and_bags(['default', 'one.mcap']) == (['default'], ['one.mcap'])
+    with pytest.raises(InvalidParameter, match='default, fast are recipes; name the bags behind them'):
+        evaluate.recipes_and_bags(['default', 'fast'])
+
+
+def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'mapping.yaml').write_text(MAPPING)
+    import_tables(load_mapping(tmp_path / 'mapping.yaml'), write_csv(tmp_path / 'in', recordings()), tmp_path / 'bags')
+    names = []
+    for name, feature in (('bands', 'log_bands'), ('level', 'mean')):
+        (tmp_path / f'{name}.yaml').write_text(SMALL % feature)
+        names.append(str(tmp_path / f'{name}.yaml'))
+    parser = argparse.ArgumentParser()
+    evaluate.configure(parser)
+    evaluate.run(
+        parser.parse_args([
+            '--cross-validate', 'leave-one-out:session', *names, str(tmp_path / 'bags'),
+            '--json', str(tmp_path / 'figures.json'), '--chart', str(tmp_path / 'figures.png'),
+        ])
+    )  # fmt: skip
+    said = capsys.readouterr().out
+    assert "recipe 'bands', split leave-one-out:session: 3 surfaces" in said
+    assert "'level' against 'bands' on 18 slides" in said
+    figures = json.loads((tmp_path / 'figures.json').read_text())
+    assert (figures['split'], figures['seed'], figures['channels']) == ('leave-one-out:session', 0, 'all')
+    assert figures['bags'] == [str(tmp_path / 'bags')]
+    assert [recipe['recipe'] for recipe in figures['recipes']] == ['bands', 'level']
+    assert figures['recipes'][0]['slide_accuracy'] == 1.0
+    assert figures['comparisons'][0]['slide_difference'] < 0
+    assert (tmp_path / 'figures.png').stat().st_size > 10_000
+    assert np.isfinite(figures['comparisons'][0]['p_value'])

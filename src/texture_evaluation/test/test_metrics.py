@@ -34,12 +34,6 @@ def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float,
     assert metrics.accuracy_at(RESULTS, seconds) == pytest.approx(accuracy)
 
 
-def test_slides_that_are_too_short_are_left_out_and_without_any_there_is_no_accuracy() -> None:
-    assert metrics.accuracy_at([*RESULTS, slide('c', 'a')], 1.0) == 1.0
-    assert metrics.accuracy_at_times(RESULTS) == {'0.5': 0.5, '1.0': 1.0, '2.5': None, '5.0': None}
-    assert metrics.accuracy_at(RESULTS, 0.3) is None
-
-
 def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
     sure = slide('a', 'bbaa', certain_from=2)
     novel = slide('a', 'aab', certain_from=0, known=False)
@@ -77,16 +71,6 @@ def test_the_curve_of_windows_that_vote_has_a_point_for_each_complete_vote_alone
     assert seconds.tolist() == pytest.approx([1.0])  # no vote was complete: the slide's end decides
 
 
-def test_the_curve_ends_where_the_shortest_slide_ends() -> None:
-    seconds, accuracy = metrics.curve([*RESULTS, slide('a', 'aaa')])
-    assert seconds == pytest.approx([0.5, 0.6, 0.7])
-    assert accuracy == pytest.approx([2 / 3, 1 / 3, 2 / 3])
-
-
-def test_at_the_end_all_slides_count_however_short() -> None:
-    assert metrics.accuracy_at_end([*RESULTS, slide('c', 'a')]) == pytest.approx(2 / 3)
-
-
 def test_confidence_that_is_right_as_often_as_it_says_has_no_calibration_error() -> None:
     honest = [slide('a', 'aaab', confidences=(0.75,) * 4)]
     assert metrics.calibration_error(honest) == pytest.approx(0.0)
@@ -108,14 +92,3 @@ def test_wrong_and_known_is_counted_once_decided_and_at_the_end() -> None:
     results = [right, soon_wrong, late_wrong, never_decided, strange]
     assert metrics.wrong_known(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(2 / 5)}
     assert metrics.unknown(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(1 / 5)}
-
-
-def test_the_final_estimate_counts_where_it_is_rejected_after_a_decision() -> None:
-    decided = slide('a', 'bbbb', certain_from=1)
-    rejected = SlideResult('a', decided.window_labels, decided.estimates, TextureEstimate(0, 'e', 'b', known=False))
-    assert metrics.wrong_known([rejected]) == {'early': 1.0, 'final': 0.0}
-    assert metrics.unknown([rejected]) == {'early': 0.0, 'final': 1.0}
-
-
-def test_without_slides_nothing_is_wrong_or_unknown() -> None:
-    assert metrics.wrong_known([]) == metrics.unknown([]) == {'early': None, 'final': None}

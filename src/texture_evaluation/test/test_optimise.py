@@ -51,23 +51,6 @@ def test_the_same_seed_writes_the_same_recipe_and_resuming_evaluates_nothing_aga
     assert evaluated[-1] == 0 < evaluated[0]
 
 
-def test_a_front_is_written_as_one_recipe_for_each_of_its_points(simulated: Path, tmp_path: Path) -> None:
-    params = SearchParams(population=8, generations=2, halves=3, objective='front')
-    written = optimise_from_bags(Wanted('ets-linear-svm', (str(simulated),)), params, tmp_path / 'best.yaml')
-    recipes = [path for path in written.files if path.suffix == '.yaml']
-    assert recipes[0] == tmp_path / 'best.yaml'
-    assert len(recipes) == len(written.lines) >= 1
-    assert all(load_recipe(str(path)).learner_name == 'texture_papers.roberge:SvmPairs' for path in recipes)
-
-
-def test_each_pair_of_surfaces_gets_a_recipe(simulated: Path, tmp_path: Path) -> None:
-    wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
-    written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
-    assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
-    assert len(written.files) == 5
-    assert 'all pairs together, most pairs won: training ' in written.lines[-1]
-
-
 def test_the_variables_of_all_pairs_are_trained_as_one_model(simulated: Path, tmp_path: Path) -> None:
     wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
     optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')

@@ -81,11 +81,3 @@ def test_recipes_of_shares_recognise_where_the_load_lies_however_hard_it_is_pres
     model = train(recipe, training_examples(recipe, slides_of_an_array(topic, seed=0)))
     results = predict_slides(model, slides_of_an_array(topic, seed=1).features(recipe.feature_set))
     assert window_accuracy(list(results.values())) > 0.95
-
-
-def test_the_recipes_of_shares_differ_by_the_topic_alone() -> None:
-    slow, fast = (load_recipe(name).as_mapping() for name in OF_SHARES)
-    assert slow['inputs']['signal_static'] == fast['inputs']['signal']
-    assert {key: slow[key] for key in ('windows', 'learner', 'evidence', 'training')} == {
-        key: fast[key] for key in ('windows', 'learner', 'evidence', 'training')
-    }

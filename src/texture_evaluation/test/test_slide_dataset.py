@@ -7,13 +7,15 @@ import pytest
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import load_recipe
+from texture_evaluation.evaluate import evaluate
+from texture_evaluation.train import train_from_bags
 from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow, WindowParams
-from texture_recordings import dataset as slides_module
-from texture_recordings.bags import BagWriter
+from texture_features.windows import CutWindow, WindowParams, cut_recording
+from texture_recordings.bags import BagWriter, read_bag
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.tables import import_tables, mapping_from
+from texture_simulation.offline import SlidePlan, write_simulated
 
 RATE_HZ = 1000.0
 FEATURES = FeatureSet.from_mapping(
@@ -73,22 +75,6 @@ def test_features_are_those_of_each_window_and_of_its_time() -> None:
     assert np.diff(features.start_ns[3:6]).tolist() == [NANOSECONDS // 4] * 2
 
 
-def test_each_bag_is_opened_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    bags = [write(tmp_path / name, from_arrays()) for name in 'ab']
-    opened: list[Path] = []
-    read_bag = slides_module.read_bag
-
-    def count(path: Path, *arguments: object) -> object:
-        opened.append(path)
-        return read_bag(path, *arguments)
-
-    monkeypatch.setattr(slides_module, 'read_bag', count)
-    dataset = SlideDataset.from_bags(bags, '1-2')
-    dataset.features(FEATURES)
-    dataset.to_numpy()
-    assert opened == bags
-
-
 def test_slides_are_selected_by_number_label_and_condition() -> None:
     dataset = from_arrays()
     assert dataset.select('2-3').names.tolist() == ['cork/2', 'felt/2', 'cork/3', 'felt/3']
@@ -103,12 +89,6 @@ def test_speeds_within_five_per_cent_are_one_condition() -> None:
     speed = from_arrays().condition('speed')
     assert len(set(speed)) == 2
     np.testing.assert_array_equal(speed, [0.02, 0.02, 0.04, 0.04, 0.04, 0.02])
-
-
-def test_directions_around_the_half_turn_are_one_condition() -> None:
-    direction = from_arrays(direction_rad=[math.pi, -math.pi, 0.0, 0.01, -3.13, 3.13]).condition('direction')
-    assert direction[2] == direction[3]
-    assert len({direction[0], direction[1], direction[4], direction[5]}) == 1
 
 
 def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> None:
@@ -144,17 +124,6 @@ def test_a_missing_input_is_refused_with_what_there_is() -> None:
 def test_arrays_that_contradict_each_other_are_refused(arguments: tuple, sentence: str) -> None:
     with pytest.raises(InvalidData, match=sentence):
         SlideDataset.from_arrays(*arguments)
-
-
-def test_conditions_of_another_length_are_refused() -> None:
-    with pytest.raises(InvalidData, match='speed_m_s has the shape'):
-        from_arrays(speed_m_s=[0.1, 0.2])
-
-
-def test_one_channel_may_be_given_without_its_axis() -> None:
-    dataset = SlideDataset.from_arrays({'signal': [np.arange(700.0)]}, ['cork'], {'signal': RATE_HZ})
-    samples, _ = dataset.to_numpy()
-    assert samples[0].shape == (700, 1)
 
 
 def test_windows_carry_the_speed_and_force_of_the_slide() -> None:
@@ -228,3 +197,43 @@ def test_windows_over_distances_show_as_much_of_a_surface_at_every_speed() -> No
     np.testing.assert_allclose(fast, slow, atol=2e-3)
     unknown = SlideDataset.from_arrays({'signal': way_m}, ['cork', 'felt'], {'signal': 100.0})
     assert unknown.features_over_distances(features, [0.02], hop_m=0.01) is None
+
+
+BAG_FEATURES = FeatureSet.load('vibration-and-taxels')
+
+
+def test_a_bag_gives_the_features_of_the_recording_itself(simulated: Path) -> None:
+    recording = {
+        topic: [value for _, _, value in read_bag(simulated / 'glass', (topic,))]
+        for topic in ('exploration', *BAG_FEATURES.topics)
+    }
+    states = recording.pop('exploration')
+    direct = [BAG_FEATURES.extract(event) for event in cut_recording(recording, states, BAG_FEATURES.windows)]
+    from_bag = SlideDataset.from_bags([simulated / 'glass']).features(BAG_FEATURES)
+    np.testing.assert_array_equal(from_bag.values, [vector.values for vector in direct if not vector.last])
+    assert from_bag.names == direct[0].names
+    # Windows of 0.5 s every 0.1 s in 1.2 s: the first starts at 0, the last at 0.7 s.
+    assert len(from_bag.labels) == 6 * 8
+
+
+def test_slides_without_a_whole_window_are_refused_with_a_sentence(tmp_path: Path) -> None:
+    bags = write_simulated(tmp_path, SlidePlan(slides=1, slide_s=0.3), np.random.default_rng(0), surfaces=('glass',))
+    with pytest.raises(InvalidData, match='none of the 1 slides has a whole window'):
+        SlideDataset.from_bags(bags).features(BAG_FEATURES)
+
+
+def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
+    tmp_path: Path,
+) -> None:
+    plan = SlidePlan(slides=6, slide_s=1.2, fingers=2)
+    bags = write_simulated(tmp_path, plan, np.random.default_rng(3), surfaces=('glass', 'ridge_2mm_deep'))
+    model = train_from_bags('two-fingers', bags, '1-4')
+    topics = ('finger0/signal', 'finger1/signal')
+    assert model.recipe.feature_set.topics == topics
+    slides = SlideDataset.from_bags(bags, topics=topics).slides
+    for slide in slides:  # each finger has traits of its own, at the same time
+        first, second = (slide.signals[topic] for topic in topics)
+        assert first[0].stamp_ns == second[0].stamp_ns
+        assert not np.array_equal(first[0].samples, second[0].samples)
+    figures = evaluate(model, bags, '5-6').as_json()
+    assert figures['window_accuracy'] > 0.9

@@ -153,9 +153,3 @@ def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tm
             importer(broken, tmp_path / 'out')
         with pytest.raises(InvalidData, match='channels are'):
             importer(source, tmp_path / 'out', channels='some')
-
-
-def test_a_slide_without_the_topic_is_refused(tmp_path: Path) -> None:
-    bags = import_ntp21(make_ntp21(tmp_path / 'in'), tmp_path / 'out', slides='1')
-    with pytest.raises(InvalidData, match='name another topic'):
-        SlideDataset.from_bags(bags).samples('signal_static')

@@ -1,15 +1,27 @@
 import dataclasses
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from texture_core.config import refuse_inputs
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
+from texture_core.types import TactileSignal
 from texture_estimation.decisions import ErrorBound
-from texture_estimation.model import TextureModel
+from texture_estimation.model import TextureModel, load_model
+from texture_estimation.model_files import both_files
 from texture_estimation.recipe import Recipe
+from texture_estimation.roughness import load_roughness_model
 from texture_estimation.training import train
+from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.commands.train import summary
+from texture_evaluation.evaluate import evaluate
+from texture_evaluation.train import train_from_bags, train_grades_from_bags
 from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import read_recipe
+from texture_recordings.bags import BagWriter, read_bag
 
 
 @pytest.fixture(scope='module')
@@ -37,3 +49,143 @@ def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: Text
 def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:
     enough = dataclasses.replace(model, error_bound=ErrorBound(149, 0.02))
     assert not any('certain' in line for line in summary(enough, Path('model.skops')))
+
+
+GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')
+
+
+def table(folder, lines):
+    path = folder / 'grades.csv'
+    path.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return path
+
+
+def test_bags_and_grades_make_a_model_whose_card_says_from_what(simulated, tmp_path) -> None:
+    train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-4', tmp_path / 'rough.skops')
+    model = load_roughness_model(tmp_path / 'rough')
+    assert model.name == 'rough'
+    assert model.grades == {'glass': 1.0, 'leather': 3.0, 'ridge_2mm_deep': 5.0}
+    card = json.loads((tmp_path / 'rough.json').read_text(encoding='utf-8'))
+    assert card['data']['slides'] == '1-4'
+    assert card['training']['slides'] == 12
+
+
+def test_both_files_of_a_model_report_the_extractor_how_to_describe(simulated, tmp_path) -> None:
+    train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-2', tmp_path / 'rough')
+    by_card, by_model = (read_recipe(str(tmp_path / name))[1] for name in ('rough.json', 'rough.skops'))
+    assert by_card == by_model
+    assert 'inputs' in by_card
+
+
+def test_a_surface_without_a_grade_is_named(simulated, tmp_path) -> None:
+    with pytest.raises(UnknownName, match="grade for the texture 'leather'"):
+        train_grades_from_bags('roughness', [simulated], table(tmp_path, [GRADES[0], GRADES[1], GRADES[3]]))
+
+
+@pytest.mark.parametrize('model', ['m1', 'm1.skops', 'm1.json'])
+@pytest.mark.parametrize('output', ['m1.json', './m1.json', 'm1.skops', 'sub/../m1.json'])
+def test_the_files_of_a_model_that_is_read_are_not_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, model: str, output: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'sub').mkdir()
+    with pytest.raises(InvalidParameter, match='would overwrite'):
+        refuse_inputs([output], both_files(model))
+
+
+def test_a_recipe_that_is_read_is_not_overwritten_and_another_file_may_be(tmp_path: Path) -> None:
+    with pytest.raises(InvalidParameter, match='would overwrite'):
+        refuse_inputs([tmp_path / 'own.yaml'], [tmp_path / 'own.yaml', tmp_path / 'bags'])
+    refuse_inputs([tmp_path / 'figures.json', None], [*both_files('m1'), tmp_path / 'bags'])
+
+
+@pytest.mark.parametrize('name', ['figures.yaml', 'figures', 'figures.json'])
+def test_a_chart_of_another_format_is_refused_with_those_allowed(name: str) -> None:
+    with pytest.raises(InvalidParameter, match=r'\.png, \.svg or \.pdf'):
+        refuse_chart_format(name)
+
+
+@pytest.mark.parametrize('name', ['figures.png', 'figures.SVG', 'figures.pdf'])
+def test_a_chart_may_be_a_png_svg_or_pdf(name: str) -> None:
+    refuse_chart_format(name)
+
+
+@pytest.fixture(scope='module')
+def evaluated(simulated: Path) -> TextureModel:
+    return train_from_bags('default', [simulated], '1-4')
+
+
+def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
+    evaluated: TextureModel, simulated: Path
+) -> None:
+    figures = evaluate(evaluated, [simulated], '5-6').as_json()
+    assert list(figures) == [
+        'window_accuracy', 'accuracy_at_s', 'early', 'calibration_error', 'candidates', 'falsely_rejected',
+        'unknown_accepted', 'labels', 'confusion', 'latency_us', 'unclassified',
+        'wrong_known', 'unknown',
+    ]  # fmt: skip
+    table = np.array(figures['confusion'])
+    assert figures['window_accuracy'] == pytest.approx(np.trace(table) / table.sum())
+    assert figures['window_accuracy'] > 0.9
+    assert figures['accuracy_at_s'] == {'0.5': pytest.approx(1.0), '1.0': 1.0, '2.5': None, '5.0': None}
+    assert figures['early']['accuracy'] == 1.0
+    assert 0.5 <= figures['early']['mean_s'] <= 1.2
+    assert figures['unknown_accepted'] is None
+    assert figures['wrong_known'] == {'early': 0.0, 'final': 0.0}
+    assert figures['unknown'] == {'early': 0.0, 'final': 0.0}
+    assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
+
+
+def test_surfaces_that_were_not_trained_count_as_unknown_alone(simulated: Path) -> None:
+    evaluated = train_from_bags('default', [simulated / 'glass', simulated / 'leather'], '1-4')
+    report = evaluate(evaluated, [simulated], '5-6')
+    assert {result.surface for result in report.unknown} == {'ridge_2mm_deep'}
+    assert report.confusion.shape == (2, 2)
+    assert 0.0 <= report.as_json()['unknown_accepted'] <= 1.0
+
+
+def test_a_model_is_saved_with_the_data_it_was_trained_on(simulated: Path, tmp_path: Path) -> None:
+    train_from_bags('default', [simulated], '1-3', tmp_path / 'mine')
+    assert load_model(tmp_path / 'mine').name == 'mine'
+    card = json.loads((tmp_path / 'mine.json').read_text())
+    assert card['data'] == {'bags': ['glass', 'leather', 'ridge_2mm_deep'], 'slides': '1-3'}
+    assert evaluate(load_model(tmp_path / 'mine.skops'), [simulated], '4').as_json()['window_accuracy'] > 0.9
+
+
+def test_fast_channels_leave_the_slow_input_out(simulated: Path) -> None:
+    fast = train_from_bags('vibration-and-taxels', [simulated], '1-4', channels='fast')
+    assert fast.recipe.feature_set.topics == ('signal',)
+    assert fast.feature_set.endswith('signal=1000Hz*1')
+
+
+def test_another_rate_is_refused_and_nothing_is_scored(
+    evaluated: TextureModel, simulated: Path, tmp_path: Path
+) -> None:
+    with BagWriter(tmp_path / 'slow') as bag:
+        for topic, log_ns, value in read_bag(simulated / 'glass'):
+            bag.write(topic, halved(value) if topic == 'signal' else value, log_ns)
+    with pytest.raises(ModelMismatch, match="'signal' is 500 Hz, the model was trained at 1000 Hz"):
+        evaluate(evaluated, [tmp_path / 'slow'])
+
+
+def test_of_two_fingers_in_a_bag_one_is_named(evaluated: TextureModel, simulated: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'two') as bag:
+        for topic, log_ns, value in read_bag(simulated / 'glass'):
+            bag.write(f'/left/{topic}', value, log_ns)
+            bag.write(f'/right/{topic}', value, log_ns)
+    with pytest.raises(InvalidData, match='namespaces /left, /right'):
+        evaluate(evaluated, [tmp_path / 'two'])
+    assert len(evaluate(evaluated, [tmp_path / 'two'], namespace='/left').known) == 6
+
+
+def halved(signal: TactileSignal) -> TactileSignal:
+    return replace(signal, sampling_rate_hz=500.0, first_sample=signal.first_sample // 2, samples=signal.samples[::2])
+
+
+def test_a_wrong_recipe_model_or_choice_of_channels_is_refused(simulated: Path, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="did you mean 'default'"):
+        train_from_bags('defalt', [simulated])
+    with pytest.raises(InvalidParameter, match="'fast' or 'all'"):
+        train_from_bags('default', [simulated], channels='slow')
+    with pytest.raises(ModelMismatch, match='cannot be read'):
+        load_model(tmp_path / 'none')
