@@ -21,7 +21,6 @@ from texture_estimation.search import (
     dask_backend,
     decided_by_slide,
     decisions,
-    fitness,
     optimise,
     optimise_pairs,
     random_halves,
@@ -89,14 +88,6 @@ def test_every_individual_is_a_recipe_and_is_found_again_in_it(search, recipe) -
         assert again.recipe(again.individual(again.of_base())).as_mapping() == found.as_mapping()
 
 
-def test_a_recipe_lies_in_its_own_space() -> None:
-    recipe = load_recipe('ets-linear-svm')
-    space = RecipeSpace.load('ets-svm', recipe)
-    found = space.recipe(space.individual(space.of_base()))
-    assert found.feature_set.as_mapping() == recipe.feature_set.as_mapping()
-    assert found.learner.box_constraint == recipe.learner.box_constraint
-
-
 @pytest.mark.parametrize(
     ('text', 'sentence'),
     [
@@ -130,10 +121,6 @@ def test_half_of_the_slides_of_each_surface_are_for_training_and_no_slide_is_on_
     assert len(np.unique(halves, axis=0)) > 10
     with pytest.raises(InvalidData, match='two at least'):
         random_halves(np.array([0, 1]), np.array([0, 1]), 1, np.random.default_rng(0))
-
-
-def test_fitness_is_the_mean_of_learning_and_test_accuracy() -> None:
-    assert fitness([(1.0, 0.6), (0.8, 0.4)]) == pytest.approx(0.7)
 
 
 def test_a_tie_is_undecided_and_three_of_five_parts_decide_a_slide() -> None:
@@ -198,16 +185,6 @@ def test_two_objectives_give_a_front_from_cheap_to_good(landscape) -> None:
     assert front[0].cost <= 2.0
     assert front[-1].cost <= 31.0  # what costs more than the best is beaten by it
     assert [one.fitness for one in front] == sorted(one.fitness for one in front)
-
-
-def test_the_same_seed_gives_the_same_search_and_another_seed_another(landscape) -> None:
-    space, slides = landscape
-    first, again, other = (
-        optimise(space, replace(slides, seed=seed, _known={}), SearchParams(seed=seed, generations=5), Known())
-        for seed in (3, 3, 4)
-    )
-    assert first.history == again.history
-    assert first.history != other.history
 
 
 def test_a_search_cut_off_and_resumed_ends_as_one_in_one_go(landscape, tmp_path) -> None:

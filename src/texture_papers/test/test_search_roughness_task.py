@@ -9,7 +9,6 @@ from texture_estimation.search import (
     SearchParams,
     SearchSlides,
     SlideArrays,
-    nearness,
     optimise,
 )
 
@@ -25,11 +24,6 @@ def hisses(count: int = 8) -> SlideArrays:
     return SlideArrays(
         {'signal': ArrayStream(samples[..., None], 1000.0)}, names, np.full(len(names), 0.15), np.ones(len(names))
     )
-
-
-def test_a_grade_off_costs_a_quarter_and_none_all() -> None:
-    given, true = np.array([3.0, 2.0, 1.0, np.nan]), np.array([3.0, 3.0, 5.0, 3.0])
-    assert nearness(given, true).tolist() == [1.0, 0.75, 0.0, 0.0]
 
 
 @pytest.mark.parametrize('regressor', ['ann1', 'ann5', 'svm5'])

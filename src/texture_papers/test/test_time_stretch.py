@@ -7,7 +7,7 @@ from texture_core.errors import InvalidParameter
 from texture_core.types import Window
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES, FeatureSet
-from texture_features.windows import CutWindow, Stretched, resample, stretched_lengths
+from texture_features.windows import CutWindow, Stretched, resample
 from texture_papers.roberge import SpectralPeaks
 
 RATE_HZ = 1000.0
@@ -27,22 +27,12 @@ def test_ridges_give_one_tone_at_any_speed(speed_m_s):
     assert amplitude == pytest.approx(1.0, rel=0.1)
 
 
-def test_one_second_at_one_metre_a_second_is_half_a_second_at_two():
-    assert stretched_lengths(np.array(1.0), 1000, 2.0) == 500
-
-
 @pytest.mark.parametrize('speed_m_s', [np.nan, 0.0, -0.1])
 def test_an_unknown_or_no_speed_leaves_a_window_as_it_is(speed_m_s):
     samples = np.random.default_rng(0).normal(size=(500, 2))
     feature = FEATURES['hjorth']()
     given = WindowBatch(samples, RATE_HZ, np.array(speed_m_s))
     np.testing.assert_array_equal(Stretched(feature, 0.1)(given), feature(WindowBatch(samples, RATE_HZ)))
-
-
-def test_no_window_becomes_endless_or_empty():
-    speeds = np.array([1e-9, 1e9, np.inf])
-    np.testing.assert_array_equal(stretched_lengths(speeds, 500, 0.1), [50, 5000, 5000])
-    np.testing.assert_array_equal(stretched_lengths(speeds, 1, 0.1), [1, 1, 1])
 
 
 @pytest.mark.parametrize('length', [50, 333, 499, 500, 501, 1000])
@@ -85,11 +75,6 @@ def test_a_recipe_stretches_an_input_the_same_for_one_window_as_for_many():
     assert plain.extract(events[0]).feature_set != feature_set.extract(events[0]).feature_set
     assert plain.extract(events[0]).names == feature_set.extract(events[0]).names
     np.testing.assert_array_equal(plain.extract(events[0]).values, feature_set.extract(events[0]).values)
-
-
-def test_a_stretched_recipe_written_out_is_the_same_again():
-    feature_set = FeatureSet.from_mapping(RECIPE)
-    assert FeatureSet.from_mapping(feature_set.as_mapping()) == feature_set
 
 
 def test_joined_inputs_see_both_windows_and_are_cut_from_both_topics():

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, ModelMismatch, UnknownName
-from texture_estimation.learners.learner import of_examples
 from texture_estimation.model import load_model
 from texture_estimation.numerics import is_tied
 from texture_estimation.recipe import Recipe, load_recipe
@@ -61,15 +60,6 @@ def test_each_pair_is_decided_by_its_own_learner_on_its_own_features_alone(tuned
         np.testing.assert_array_equal(decisions[:, number] <= 0, expected == 1)
 
 
-def test_a_feature_that_a_pair_does_not_see_does_not_move_its_decision(tuned, examples, numbers):
-    predictor = tuned.predictor(tuned.fit(examples.values, *numbers).parameters)
-    changed = examples.values.copy()
-    changed[:, 2:] += 100.0
-    before, after = predictor.decisions(examples.values), predictor.decisions(changed)
-    np.testing.assert_array_equal(before[:, 0], after[:, 0])  # cork and felt see the first two features
-    assert np.abs(before[:, 1] - after[:, 1]).max() > 0.1
-
-
 def test_the_pairs_won_decide_and_a_tie_is_unclassified(tuned, examples, numbers):
     predictor = tuned.predictor(tuned.fit(examples.values, *numbers).parameters)
     wins = np.zeros((len(examples.values), 4))
@@ -106,12 +96,6 @@ def test_a_model_of_pairs_is_stored_as_arrays_and_loads_with_all_its_variables(r
         TunedPairs.predictor(broken)
 
 
-def test_pairs_of_textures_that_were_not_measured_are_left_out(recipe, make_examples):
-    two = make_examples(labels=('cork', 'plum'))
-    model = train(recipe, dataclasses.replace(two, names=NAMES))
-    assert '0 of 1 pairs have variables of their own' in model.training['calibration']
-
-
 def test_a_window_alone_of_forty_five_pairs_is_decided_as_in_a_batch(make_examples):
     labels = tuple(f'm{number}' for number in range(10))
     examples = make_examples(labels=labels, features=8)
@@ -143,17 +127,6 @@ def test_mistakes_in_a_recipe_are_named(values, error, sentence):
         Recipe.from_mapping(content, 'mine')
 
 
-def test_an_input_that_no_feature_has_is_named(examples):
-    learner = TunedPairs.from_recipe({'pairs': [{'pair': ['cork', 'felt'], 'inputs': ['signal#9']}]}, 'recipe')
-    with pytest.raises(InvalidParameter, match=r"sees the input 'signal#9', which is not among .* \(signal\)"):
-        of_examples(learner, examples.names, LABELS)
-
-
-def test_names_are_asked_for_where_pairs_have_variables_of_their_own(examples, numbers):
-    with pytest.raises(InvalidParameter, match='the names of the features and textures are not known'):
-        TunedPairs.from_recipe({'pairs': ENTRIES}, 'recipe').fit(examples.values, *numbers)
-
-
 def test_the_recipes_of_pairs_become_one_with_equal_inputs_shared():
     base = load_recipe('ets-linear-svm')
     other = base.as_mapping()
@@ -164,11 +137,3 @@ def test_the_recipes_of_pairs_become_one_with_equal_inputs_shared():
     assert [pair.inputs for pair in joined.learner.pairs] == [('signal#1',), ('signal#2',), ('signal#1',)]
     assert joined.feature_set.windows == base.feature_set.windows
     assert Recipe.from_mapping(joined.as_mapping(), joined.name).as_mapping() == joined.as_mapping()
-
-
-def test_pairs_that_differ_in_their_windows_are_not_joined():
-    base = load_recipe('ets-circular-svm')
-    other = base.as_mapping()
-    other['windows']['length_s'] = 0.1
-    with pytest.raises(InvalidParameter, match="differ in 'windows', which a model has once"):
-        joined_recipe({('a', 'b'): base, ('a', 'c'): Recipe.from_mapping(other, 'other')}, base)
