@@ -8,7 +8,7 @@ from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.types import FeatureVector
 from texture_estimation.decisions import Domain
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.incremental import EXPLORATIONS, IncrementalClassifier
+from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.model import load_model
 from texture_features.examples import SlideConditions
 
@@ -118,20 +118,6 @@ def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path):
     assert incremental_classifier.model.labels == model.labels
 
 
-def test_only_the_latest_explorations_are_remembered(model, silk):
-    incremental_classifier = IncrementalClassifier(model)
-    for number in range(EXPLORATIONS + 3):
-        measured(incremental_classifier, silk[:2], f'e{number}')
-    with pytest.raises(InvalidData, match="exploration 'e2'"):
-        incremental_classifier.add('silk', 'e2')
-    assert incremental_classifier.add('silk', 'e3') == 2
-
-
-def test_a_model_without_examples_cannot_be_trained(model):
-    with pytest.raises(ModelMismatch, match='train it again'):
-        IncrementalClassifier(dataclasses.replace(model, examples=None))
-
-
 @pytest.mark.parametrize('label', ['../../etc/x', 'x' * 10_000, 'two\nlines'])
 def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, silk, tmp_path, label):
     path = model.save(tmp_path / 'surfaces')
@@ -167,15 +153,6 @@ def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tm
         assert len(incremental_classifier.model.added_slides) == len(load_model(path).added_slides) == 1
     incremental_classifier.remove_last()
     assert incremental_classifier.add('silk') == 12
-
-
-def test_the_slide_before_one_without_windows_is_not_added_in_its_place(model, silk):
-    incremental_classifier = IncrementalClassifier(model)
-    measured(incremental_classifier, silk)
-    measured(incremental_classifier, [], 'short')
-    with pytest.raises(InvalidData, match=r"'short' has no usable window: .* Can be added: e1$"):
-        incremental_classifier.add('felt')
-    assert incremental_classifier.add('silk', 'e1') == 12
 
 
 def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_restart(model, silk, tmp_path):
@@ -234,13 +211,6 @@ def test_what_is_added_after_a_removal_replaces_no_stored_slide(three_added, mod
     assert load_model(path).labels == model.labels
 
 
-def test_slides_added_to_a_trained_texture_are_removed_and_the_texture_stays_as_trained(three_added, model):
-    incremental_classifier, path = three_added
-    assert [slide.exploration_id for slide in incremental_classifier.remove(' wood ')] == ['e2']
-    assert load_model(path).labels == (*model.labels, 'silk', 'oak')
-    assert len(incremental_classifier.model.examples_of('wood')) == len(model.examples_of('wood'))
-
-
 @pytest.mark.parametrize(
     ('label', 'sentence'),
     [
@@ -257,11 +227,6 @@ def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, 
         incremental_classifier.remove(label)
     assert incremental_classifier.model is before
     assert len(load_model(path).added_slides) == 4
-
-
-def test_with_nothing_added_a_removal_says_so(model):
-    with pytest.raises(InvalidData, match='has no added slides that could be removed'):
-        IncrementalClassifier(model).remove('silk')
 
 
 def estimated(model, values, exploration_id='asked'):
@@ -301,22 +266,6 @@ def test_a_trained_texture_keeps_its_label_and_nearly_its_confidence_beside_an_a
     before, after = (estimated(one, wood)[-1] for one in (model, with_slides(model, silk, 1)))
     assert before.label == after.label == 'wood'
     assert after.confidence == pytest.approx(before.confidence, abs=0.1)
-
-
-def test_live_and_stored_models_give_the_same_estimates_with_added_slides(three_added, silk):
-    incremental_classifier, path = three_added
-    live, stored = (estimated(one, silk + 0.2) for one in (incremental_classifier.model, load_model(path)))
-    for first, second in zip(live, stored, strict=True):
-        assert first.label == second.label
-        np.testing.assert_allclose(first.probabilities, second.probabilities, atol=1e-6)
-
-
-def test_estimates_are_as_before_once_a_texture_is_removed(model, examples, silk):
-    incremental_classifier = IncrementalClassifier(model)
-    measured(incremental_classifier, silk)
-    incremental_classifier.add('silk')
-    incremental_classifier.remove('silk')
-    assert estimated(incremental_classifier.model, examples.values[:9]) == estimated(model, examples.values[:9])
 
 
 @pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')

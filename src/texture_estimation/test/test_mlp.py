@@ -1,14 +1,18 @@
 """The multilayer perceptron against what mathematics says of it."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from sklearn.neural_network import MLPClassifier
 
 from texture_estimation import numerics as log_probabilities
 from texture_estimation.learners import mlp
-from texture_estimation.learners.mlp import AugmentedExamples, Mlp, _first_weights, _slopes
+from texture_estimation.learners.mlp import Mlp, OnsetMlp, _first_weights, _slopes, linear_discriminant
 from texture_estimation.numerics import log_loss, log_softmax
-from texture_features.augmentation import Augmentation
+from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
+from texture_features.examples import LabelledFeatures
 
 
 def test_slopes_are_the_derivatives_of_the_cross_entropy():
@@ -50,12 +54,6 @@ def test_a_feature_that_was_constant_is_ignored_and_units_do_not_matter(examples
     assert log_softmax(in_micro(values * 1e6)) == pytest.approx(log_softmax(predict(values)), abs=1e-3)
 
 
-def test_the_same_seed_learns_the_same(examples):
-    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    first, again = (Mlp(epochs=2).fit(examples.values, codes, groups).parameters for _ in range(2))
-    assert all(np.array_equal(first[name], again[name]) for name in first)
-
-
 @pytest.mark.filterwarnings('ignore::sklearn.exceptions.ConvergenceWarning')
 def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weights(make_examples):
     examples, fresh = make_examples(spread=2.0), make_examples(seed=5, spread=3.0).values
@@ -94,16 +92,83 @@ def test_a_training_that_would_take_too_long_makes_fewer_steps(examples, monkeyp
     )  # four slides of each: four folds, and all
 
 
-def test_networks_of_the_calibration_make_half_of_the_limited_steps_of_an_augmented_training(examples, monkeypatch):
-    codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
-    counts = []
-    step = mlp._Adam.step
-    monkeypatch.setattr(mlp._Adam, 'step', lambda self, *args: (counts.append(1), step(self, *args))[1])
-    monkeypatch.setattr(mlp, 'MAX_WORK', 900 * (examples.values.shape[1] + 4))
-    none, n_features = np.zeros(0, dtype=np.intp), examples.values.shape[1]
-    nothing = np.zeros((0, n_features))
-    augmented = AugmentedExamples(
-        nothing.astype(np.float32), none, none, none, np.zeros(n_features), nothing, none, Augmentation()
-    )
-    Mlp(hidden=4, epochs=2000).fit(examples.values, codes, groups, augmented)
-    assert len(counts) == 4 * 450 + 900
+NAMES = ('signal/a', 'signal/b', 'signal/slide_onset')
+SLIDES, WINDOWS = 20, 6
+
+
+def examples_with_onset(seed=0):
+    """Return slides of two textures that differ in `a` while they slide, and in `b`, the other way, as they start."""
+    rng = np.random.default_rng(seed)
+    values, labels, groups = [], [], []
+    for number, label in enumerate(('cork', 'felt')):
+        for slide in range(SLIDES):
+            own = rng.normal(size=(WINDOWS, 3))
+            own[1:, 0] += 6.0 * number
+            own[0, 0] += 3.0
+            own[0, 1] += 8.0 * (1 - number)
+            own[:, 2] = np.arange(WINDOWS) == 0
+            values.append(own)
+            labels += [label] * WINDOWS
+            groups += [f'{label}/{slide}'] * WINDOWS
+    return LabelledFeatures(np.concatenate(values), np.array(labels), np.array(groups), NAMES, 'a1', 0.5, 0.5)
+
+
+def model_of(learner, training=None):
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner, 'training': training or {}}
+    return train(Recipe.from_mapping(recipe, 'mine'), examples_with_onset())
+
+
+def shares(model):
+    """Return the shares of first and of later windows that are right."""
+    examples = examples_with_onset(seed=1)
+    right, first = np.array(model.decide(examples.values)) == examples.labels, examples.values[:, 2] > 0
+    return right[first].mean(), right[~first].mean()
+
+
+def test_shrunk_to_the_diagonal_a_discriminant_is_that_of_independent_gaussians():
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(60, 3)) * [1.0, 2.0, 5.0], np.repeat([0, 1, 2], 20)
+    weights, offsets = linear_discriminant(X, y, 3, shrinkage=1.0)
+    means = np.stack([X[y == code].mean(axis=0) for code in range(3)])
+    variance = np.mean((X - means[y]) ** 2, axis=0)
+    log_densities = -0.5 * (((X[:, None] - means) ** 2) / variance).sum(axis=-1)
+    scores = X @ weights + offsets
+    np.testing.assert_allclose(scores - scores[:, :1], log_densities - log_densities[:, :1], atol=1e-8)
+
+
+def test_first_windows_that_look_different_are_recognised_by_what_first_windows_look_like():
+    first, later = shares(model_of({'onset_mlp': {'hidden': 1, 'epochs': 20}}))
+    assert first > 0.95
+    assert later > 0.95
+    assert shares(model_of({'mlp': {'hidden': 1, 'epochs': 20}}))[0] < 0.9
+
+
+def test_later_windows_are_decided_by_the_network_alone():
+    examples = examples_with_onset()
+    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+    blind = examples.values * [1.0, 1.0, 0.0]
+    alone = Mlp(epochs=2).fit(blind, codes, groups)
+    both = OnsetMlp(epochs=2).of_examples(NAMES, ('cork', 'felt'))
+    fitted = both.fit(examples.values, codes, groups)
+    later = examples.values[examples.values[:, 2] == 0]
+    assert (
+        both.predictor(fitted.parameters)(later).argmax(axis=1) == Mlp.predictor(alone.parameters)(later).argmax(axis=1)
+    ).all()
+
+
+def test_a_first_window_is_estimated_live_by_the_discriminant_too():
+    model = model_of({'onset_mlp': {'hidden': 4, 'epochs': 5}})
+    first = examples_with_onset(seed=1).values[0]
+    assert first[2] == 1.0
+    np.testing.assert_allclose(model.predict_with_activations(first)[0], model.predictor(first))
+
+
+def test_without_the_feature_it_is_the_network():
+    examples = dataclasses.replace(examples_with_onset(), names=('signal/a', 'signal/b', 'signal/c'))
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}}
+    models = [
+        train(Recipe.from_mapping({**recipe, 'learner': {name: {'epochs': 5}}}, 'mine'), examples)
+        for name in ('mlp', 'onset_mlp')
+    ]
+    first, second = (model.predict_log_proba(examples.values) for model in models)
+    assert first == pytest.approx(second)

@@ -8,7 +8,6 @@ import skops.io
 
 from texture_core.errors import ModelMismatch
 from texture_core.types import SlideMotion
-from texture_estimation.decisions import ErrorBound
 from texture_estimation.model import load_model
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
@@ -27,26 +26,11 @@ def test_a_model_predicts_the_same_after_it_was_saved(saved, model, examples, en
     assert loaded.card == model.card
 
 
-def test_scores_and_hidden_layer_together_are_those_of_each_alone(model, examples):
-    values = examples.values[:3]
-    scores, activations = model.predict_with_activations(values)
-    np.testing.assert_array_equal(scores, model.predictor(values))
-    np.testing.assert_array_equal(activations, model.activations(values))
-    without = train(load_recipe('peaks-naive-bayes'), examples)
-    scores, activations = without.predict_with_activations(values)
-    np.testing.assert_array_equal(scores, without.predictor(values))
-    assert activations is None
-
-
 def test_the_card_holds_recipe_labels_and_facts(saved):
     card = json.loads(saved.with_suffix('.json').read_text())
     assert card['labels'] == ['cork', 'felt', 'slate', 'wood']
     assert card['recipe']['learner']['mlp']['hidden'] == 256
     assert card['accuracy'] == 0.98
-
-
-def test_saving_leaves_two_files_and_nothing_else(saved):
-    assert sorted(path.name for path in saved.parent.iterdir()) == ['surfaces.json', 'surfaces.skops']
 
 
 def refused(path, match):
@@ -157,26 +141,18 @@ def test_a_model_of_an_earlier_version_without_its_held_out_slides_is_refused(sa
 @pytest.mark.parametrize(
     'entry',
     [
-        3,
-        [12, 0.02],
         'none',
-        {},
-        {'slides': 12},
         {**ENTRY, 'more': 1},
         {'slide': 12, 'max_error_rate': 0.02},
         {**ENTRY, 'slides': -1},
         {**ENTRY, 'slides': 12.5},
         {**ENTRY, 'slides': '12'},
         {**ENTRY, 'slides': True},
-        {**ENTRY, 'slides': None},
         {**ENTRY, 'slides': 10**300},
         {**ENTRY, 'max_error_rate': -0.1},
         {**ENTRY, 'max_error_rate': 1.1},
         {**ENTRY, 'max_error_rate': float('nan')},
-        {**ENTRY, 'max_error_rate': float('inf')},
         {**ENTRY, 'max_error_rate': '0.02'},
-        {**ENTRY, 'max_error_rate': False},
-        {**ENTRY, 'max_error_rate': [0.02]},
     ],
     ids=lambda entry: repr(entry)[:60],
 )
@@ -189,10 +165,3 @@ def test_a_model_without_the_conditions_of_its_training_is_refused(saved, entry)
     path = saved.with_suffix('.json')
     path.write_text(json.dumps({**json.loads(path.read_text()), 'domain': entry}))
     refused(saved, "no entry 'domain', the conditions of the training; train it again with 'texture train'")
-
-
-@pytest.mark.parametrize('slides', [0, 12, 149])
-def test_the_held_out_slides_of_the_card_limit_the_loaded_model(saved, slides):
-    loaded = load_model(with_entry(saved, {'slides': slides, 'max_error_rate': 0.02}))
-    assert loaded.error_bound == ErrorBound(slides, 0.02)
-    assert loaded.error_bound.shown is (slides == 149)

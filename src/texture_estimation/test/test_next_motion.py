@@ -40,34 +40,12 @@ def test_the_only_direction_in_which_two_textures_differ_is_chosen_though_it_is_
     assert training.best_motion(training.uniform_log_prior, [SHORT, ACROSS], rng).motion == ACROSS
 
 
-@pytest.mark.parametrize('seed', [None, 1])
-def test_equal_textures_report_nothing_and_the_shortest_motion_is_chosen(seed: int | None) -> None:
-    training = slides({ACROSS: LIKE, SHORT: LIKE, ALONG: LIKE})
-    rng = None if seed is None else np.random.default_rng(seed)
-    motion, information = training.best_motion(training.uniform_log_prior, [ACROSS, SHORT, ALONG], rng)
-    assert motion == SHORT
-    assert information == pytest.approx(0.0, abs=1e-9)
-
-
 def test_the_choice_depends_on_the_candidates_that_remain() -> None:
     training = slides({ACROSS: {'a': -9.0, 'b': 9.0, 'c': 9.0}, ALONG: {'a': 0.0, 'b': 0.0, 'c': 3.0}})
     assert training.best_motion(training.uniform_log_prior, [ACROSS, ALONG]).motion == ACROSS
     after = training.update(training.uniform_log_prior, ACROSS, np.array([9.0, 0.0]))
     assert np.exp(after) == pytest.approx([0.0, 0.5, 0.5], abs=1e-3)
     assert training.best_motion(after, [ACROSS, ALONG]).motion == ALONG
-
-
-def test_one_texture_is_known_before_the_first_slide() -> None:
-    training = slides({ACROSS: {'a': 0.0}, SHORT: {'a': 1.0}})
-    assert training.best_motion(training.uniform_log_prior, [ACROSS, SHORT]) == (SHORT, 0.0)
-    assert training.update(training.uniform_log_prior, ACROSS, np.array([5.0, 5.0])) == pytest.approx([0.0])
-
-
-def test_probabilities_add_up_to_one_after_any_slide_however_improbable() -> None:
-    training = slides({ACROSS: UNLIKE})
-    for value in (0.0, 2.0, -1e6, 1e6):
-        after = training.update(training.uniform_log_prior, ACROSS, np.array([value, 0.0]))
-        assert np.exp(after).sum() == pytest.approx(1.0)
 
 
 def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
@@ -87,13 +65,6 @@ def test_information_of_two_gaussians_is_that_of_a_channel_with_two_signals(apar
     bound = np.log(2) - np.log1p(np.exp(-(apart**2) / 8))
     assert gaussians.least_information(prior) == pytest.approx(bound)
     assert bound <= nats + 1e-9
-
-
-def test_impossible_textures_count_for_nothing() -> None:
-    training = slides({ACROSS: {'a': -9.0, 'b': 9.0, 'c': 0.0}})
-    only = np.array([-np.inf, 0.0, -np.inf])
-    assert training.information(only, ACROSS) == 0.0
-    assert training.information(only, ACROSS, np.random.default_rng(0)) == 0.0
 
 
 def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> None:
@@ -150,19 +121,6 @@ def test_slides_of_an_arm_are_gathered_by_the_motion_that_was_meant() -> None:
     assert more.gaussians.keys() == training.gaussians.keys()
     assert NextTouchModel.of_slides(values[:24], textures, [ACROSS] * 24) is None
     assert NextTouchModel.of_slides(values[:0], [], []) is None
-
-
-def test_its_parts_say_all() -> None:
-    training = slides({ACROSS: UNLIKE, ALONG: LIKE})
-    again = NextTouchModel.from_arrays(training.as_arrays())
-    assert again.textures == training.textures
-    assert again.best_motion(again.uniform_log_prior, [ALONG, ACROSS]) == training.best_motion(
-        training.uniform_log_prior, [ALONG, ACROSS]
-    )
-    values = np.array([0.3, 0.1])
-    assert again.update(again.uniform_log_prior, ACROSS, values) == pytest.approx(
-        training.update(training.uniform_log_prior, ACROSS, values)
-    )
 
 
 def test_a_slide_is_the_mean_of_its_usable_windows() -> None:

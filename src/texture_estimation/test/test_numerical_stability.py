@@ -8,8 +8,7 @@ from scipy.signal import lfilter
 
 from texture_core.config import folder
 from texture_core.types import Window
-from texture_estimation.decisions import FEATURES, ClassDistance, NoveltyDetector
-from texture_estimation.decisions import NOVELTY_WINDOWS as EFFECTIVE_WINDOWS
+from texture_estimation.decisions import FEATURES, NOVELTY_WINDOWS, ClassDistance, NoveltyDetector
 from texture_estimation.gaussians import LENGTHS, SlideGaussians
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.recipe import Recipe, load_recipe
@@ -19,14 +18,10 @@ from texture_features.examples import LabelledFeatures
 from texture_features.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
-# Linear machines take their time; their features are those of the others, their learner is tried above.
-SHIPPED = [name for name in SHIPPED if load_recipe(name).learner_name != 'svm_linear']
-# Where nothing distinguishs surfaces, these find all equally probable; votes between pairs go to one of them.
-EVEN = frozenset({'mlp', 'onset_mlp', 'svm_rbf', 'naive_bayes'})
+# Where nothing distinguishes surfaces, these find all equally probable; votes between pairs go to one of them.
+EVEN = frozenset({'mlp', 'onset_mlp', 'svm_rbf'})
 FLOORED = frozenset({'any-speed'})
 RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
-
-FASTER = {'svm_linear': {'repeats': 1, 'candidates': 3}}
 
 
 def nearly_dependent(values):
@@ -50,7 +45,7 @@ DIFFICULT = {
 
 
 def learn(name, examples):
-    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {name: FASTER.get(name, {})}}
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {name: {}}}
     return train(Recipe.from_mapping(recipe, name), examples)
 
 
@@ -89,7 +84,7 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
     classes = codes[np.unique(groups, return_index=True)[1]]
     distance = ClassDistance.fit(means, classes)
     own = np.array([distance.score(mean, code) for mean, code in zip(means, classes.tolist(), strict=True)])
-    detector = NoveltyDetector.fit({FEATURES: distance}, [own[:, None]] * len(EFFECTIVE_WINDOWS), 0.05)
+    detector = NoveltyDetector.fit({FEATURES: distance}, [own[:, None]] * len(NOVELTY_WINDOWS), 0.05)
     known = [detector.novelty_score([score], 5.0) <= detector.threshold(5.0) for score in own.tolist()]
     assert np.mean(known) > 0.9
     far = distance.score(means[0] + 100.0 * np.ptp(values, axis=0), int(classes[0]))

@@ -77,10 +77,6 @@ def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> 
     assert 0.0 < final.grade_std < first.grade_std
 
 
-def test_a_grade_carries_the_frame_of_its_vectors(model) -> None:
-    assert RoughnessAccumulator(model).update(vector(frame_id='tip')).frame_id == 'tip'
-
-
 def test_more_sliding_never_makes_surer_than_people_agree(model) -> None:
     evidence = RoughnessAccumulator(never_early(model))
     for number in range(500):

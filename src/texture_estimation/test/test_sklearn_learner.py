@@ -11,7 +11,6 @@ from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
 from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
 from texture_estimation import model_files
-from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.learners.learner import standardisation
 from texture_estimation.learners.sklearn_learner import SklearnLearner, SklearnPredictor
 from texture_estimation.model import load_model
@@ -72,18 +71,6 @@ def test_probabilities_are_calibrated_on_slides_held_out(make_examples):
     assert abs(probabilities.max(axis=1).mean() - right.mean()) < 0.08
 
 
-def test_evidence_accumulates_over_a_slide_as_with_any_learner(trees, examples):
-    evidence = EvidenceAccumulator(trees)
-    *estimates, last = [evidence.update(vector) for vector in examples.vectors('felt/0')]
-    assert last.final
-    assert last.label == 'felt'
-    assert last.confidence >= estimates[0].confidence
-
-
-def test_the_recipe_in_the_card_names_the_estimator_and_its_parameters(trees):
-    assert trees.card['recipe']['learner'] == {'sklearn': TREES}
-
-
 @pytest.mark.parametrize(
     ('entry', 'sentence'),
     [
@@ -127,12 +114,6 @@ def test_a_file_with_another_type_is_refused():
     content = skops.io.dumps({'estimator': fractions.Fraction(1, 2)})
     with pytest.raises(TextureError, match=r'it holds fractions\.Fraction'):
         model_files.load_parameters(content, (), estimators=True)
-
-
-def test_estimators_are_refused_in_models_of_other_learners(trees, tmp_path):
-    path = trees.save(tmp_path / 'mine')
-    with pytest.raises(ModelMismatch, match='which no model of this suite holds'):
-        model_files.load_parameters(path.read_bytes(), ())
 
 
 def test_a_tree_that_points_outside_itself_is_refused_before_it_is_used():

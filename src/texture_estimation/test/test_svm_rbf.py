@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from sklearn.linear_model import LogisticRegression
 
-from texture_estimation.learners.svm import SvmRbf, export, uncalibrated
+from texture_estimation.learners.svm import PairCoupling, SvmRbf, export, fit_coupling, uncalibrated
 
 
 def max_wins(decisions, n_labels):
@@ -41,16 +42,6 @@ def test_probabilities_of_the_array_form_are_those_of_scikit_learns_decisions(ma
     np.testing.assert_allclose(svm(examples.values), svm.coupling(decisions), atol=1e-9)
 
 
-def test_one_window_gets_the_same_numbers_as_in_a_batch(model, examples):
-    together = model.predict_log_proba(examples.values)
-    for values, expected in zip(examples.values[:20], together, strict=False):
-        np.testing.assert_allclose(model.predict_log_proba(values), expected, atol=1e-12)
-
-
-def test_a_window_far_from_all_examples_has_finite_log_probabilities(model):
-    assert np.isfinite(model.predict_log_proba(np.full(6, 1e6))).all()
-
-
 def test_with_a_common_scale_what_hardly_varies_stays_small():
     values = np.random.default_rng(0).normal(size=(40, 2)) * (1.0, 1e-3)
     codes = np.arange(40) % 2
@@ -85,10 +76,43 @@ def test_a_turn_that_only_the_start_of_slides_shows_is_taken_out_by_the_whitenin
     assert accuracy(learner, turn) > 0.95
 
 
-def test_whitened_windows_get_the_same_numbers_alone_as_together():
-    values, codes, groups = sheared(0, shear=0.0)
-    learner = SvmRbf(whitening=0.1)
-    predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
-    together = predictor(values)
-    for window, expected in zip(values[:10], together, strict=False):
-        np.testing.assert_allclose(predictor(window), expected, atol=1e-12)
+def test_consistent_pairs_give_back_the_probabilities_they_came_from():
+    probabilities = np.array([0.5, 0.3, 0.15, 0.05])
+    first, second = np.triu_indices(4, k=1)
+    margins = np.log(probabilities[first] / probabilities[second])  # r_ij = p_i / (p_i + p_j)
+    coupling = PairCoupling(4, np.ones(6), np.zeros(6), 1.0)
+    np.testing.assert_allclose(np.exp(coupling(margins)), probabilities, rtol=1e-12)
+
+
+def test_two_labels_have_the_sigmoid_itself():
+    coupling = PairCoupling(2, np.array([1.5]), np.array([0.2]), 1.0)
+    expected = 1 / (1 + np.exp(-(1.5 * 0.7 + 0.2)))
+    assert np.exp(coupling(np.array([0.7])))[0] == pytest.approx(expected)
+
+
+def test_fitted_probabilities_are_as_often_right_as_they_say():
+    rng = np.random.default_rng(0)
+    codes = rng.integers(0, 2, 4000)
+    decisions = np.where(codes == 0, 1.0, -1.0)[:, None] + rng.normal(size=(4000, 1)) * 1.2
+    probabilities = np.exp(fit_coupling(decisions, codes, 2)(decisions))
+    confidence, right = probabilities.max(axis=1), probabilities.argmax(axis=1) == codes
+    for low in (0.5, 0.6, 0.7, 0.8, 0.9):
+        within = (confidence >= low) & (confidence < low + 0.1)
+        assert right[within].mean() == pytest.approx(confidence[within].mean(), abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ('apart', 'scale', 'n_first', 'n_second'), [(1.0, 1.0, 80, 50), (0.2, 30.0, 9, 300), (2.0, 1e-3, 40, 4)]
+)
+def test_sigmoids_are_those_of_a_logistic_regression_on_softened_labels(apart, scale, n_first, n_second):
+    rng = np.random.default_rng(0)
+    codes = np.repeat([0, 1], [n_first, n_second])
+    decisions = scale * (np.where(codes == 0, apart, -apart) + rng.normal(size=len(codes)))
+    coupling = fit_coupling(decisions[:, None], codes, 2)
+    # A label that is true to 0.9 is nine tenths of a row with it, and a tenth of one without.
+    first = np.where(codes == 0, (n_first + 1) / (n_first + 2), 1 / (n_second + 2))
+    regression = LogisticRegression(C=1e12, tol=1e-10, max_iter=1000, solver='newton-cholesky')
+    values = np.tile(decisions / scale, 2)[:, None]
+    regression.fit(values, np.repeat([1, 0], len(codes)), sample_weight=np.concatenate([first, 1 - first]))
+    assert coupling.slopes[0] == pytest.approx(max(regression.coef_[0, 0] / scale, 1e-3), rel=1e-4)
+    assert coupling.offsets[0] == pytest.approx(regression.intercept_[0], rel=1e-4, abs=1e-6)

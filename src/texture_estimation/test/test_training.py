@@ -6,6 +6,8 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.gaussians import MAX_EXAMPLES, spread
+from texture_estimation.learners.learner import assign_folds
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
 from texture_features.augmentation import Augmentation, AugmentedFeatures, FeatureCopies
@@ -25,10 +27,6 @@ def test_a_model_knows_surfaces_it_was_shown(model, make_examples):
     assert model.labels == ('cork', 'felt', 'slate', 'wood')
 
 
-def test_probabilities_add_up_to_one(model, examples):
-    np.testing.assert_allclose(np.exp(model.predict_log_proba(examples.values)).sum(axis=1), 1.0)
-
-
 def test_the_same_examples_make_the_same_model(model, examples):
     again = train(RECIPE, examples)
     np.testing.assert_array_equal(again.predict_log_proba(examples.values), model.predict_log_proba(examples.values))
@@ -40,25 +38,6 @@ def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
     fresh = make_examples(seed=3, spread=2.5, slides=10)
     confidence = np.exp(model.predict_log_proba(fresh.values)).max(axis=1).mean()
     assert confidence == pytest.approx(accuracy(model, fresh), abs=0.08)
-
-
-def test_windows_of_a_slide_weigh_less_than_independent_ones(make_examples):
-    model = train(RECIPE, make_examples(spread=2.5, slides=8))
-    assert 0.0 <= model.tempering_exponent < 1.0
-
-
-@pytest.mark.parametrize('column', [np.full, lambda n, value: np.full(n, value) + 1e-17])
-def test_a_constant_feature_gives_no_nan(make_examples, column):
-    examples = make_examples()
-    values = examples.values.copy()
-    values[:, 2] = column(len(values), 0.1)
-    model = train(RECIPE, dataclasses.replace(examples, values=values))
-    assert np.isfinite(model.predict_log_proba(values)).all()
-
-
-def test_features_that_are_all_constant_give_no_nan(make_examples):
-    examples = dataclasses.replace(make_examples(), values=np.ones((128, 6)))
-    assert np.isfinite(train(RECIPE, examples).predict_log_proba(np.ones(6))).all()
 
 
 @pytest.mark.parametrize(
@@ -127,28 +106,6 @@ def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
     assert not final_estimate(model, values + 50.0).known
 
 
-def test_only_the_named_scores_count_in_the_novelty_of_a_slide(make_examples):
-    examples = make_examples()
-    learner = load_recipe('default').learner
-    of_all, of_two = (
-        train(
-            dataclasses.replace(
-                RECIPE,
-                learner=dataclasses.replace(learner, epochs=1),
-                training=dataclasses.replace(RECIPE.training, false_rejection_rate=0.1, **more),
-            ),
-            examples,
-        ).novelty_detector
-        for more in ({}, {'novelty_scores': ['features', 'log_odds']})
-    )
-    assert (list(of_all.distances), list(of_two.distances)) == (['features', 'hidden', 'onset'], ['features'])
-    usual, without_agreement = of_two.medians[0].tolist(), of_two.medians[0].tolist()
-    without_agreement[-1] += 1.0
-    assert of_two.novelty_score(without_agreement, 1.0) == pytest.approx(of_two.novelty_score(usual, 1.0))
-    usual[1] += 1e3
-    assert of_two.novelty_score(usual, 1.0) > of_two.threshold(1.0)
-
-
 def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_examples):
     labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
     examples = make_examples(labels=labels, slides=12, features=8, seed=3)
@@ -203,13 +160,6 @@ def test_a_classifier_trained_with_gains_recognises_what_is_amplified(make_examp
     assert right['augmented'] > right['plain'] + 0.1
 
 
-def test_copies_of_slides_that_are_not_among_the_examples_are_ignored(make_examples):
-    examples = augmented(make_examples(slides=4), np.zeros(6))
-    recipe = dataclasses.replace(load_recipe('default'), augmentation=Augmentation(copies=2))
-    model = train(recipe, pick(examples, examples.labels != 'wood'))
-    assert model.labels == ('cork', 'felt', 'slate')
-
-
 def test_a_recipe_without_augmentation_ignores_copies(make_examples):
     examples = make_examples(slides=4)
     recipe = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
@@ -235,3 +185,40 @@ def test_windows_of_other_lengths_train_the_learner_and_decide_nothing_else(make
     assert wider.training['windows'] == alone.training['windows'] == len(examples.labels)
     kept = dataclasses.replace(both.of_slides(sorted(set(examples.groups) - {'cork/0'})))
     assert train(RECIPE_OF_PAIRS, kept).training['slides'] == 15  # those of the slide left out are left out, too
+
+
+def test_no_slide_is_on_both_sides_and_parts_are_stretches_of_time():
+    codes = np.repeat([0, 1], 30)
+    groups = np.repeat(np.arange(20), 3)
+    parameters, note = assign_folds(codes, groups, 5)
+    for group in range(20):
+        assert len(set(parameters[groups == group])) == 1
+    for code in (0, 1):
+        assert (np.diff(parameters[codes == code]) >= 0).all()
+        assert set(parameters[codes == code]) == set(range(5))
+    assert 'slides' in note
+
+
+def test_every_label_is_always_trained_on():
+    codes = np.repeat([0, 1], [4, 30])
+    groups = np.concatenate([[0, 0, 1, 1], np.repeat(np.arange(2, 12), 3)])
+    parameters, _ = assign_folds(codes, groups, 5)
+    for part in range(5):
+        assert set(codes[parameters != part]) == {0, 1}
+
+
+def test_a_label_with_one_slide_is_divided_by_windows_and_the_note_says_so():
+    parameters, note = assign_folds(np.repeat([0, 1], 4), np.repeat([0, 1], 4), 2)
+    assert parameters.tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
+    assert 'single slide' in note
+
+
+def test_a_label_with_one_window_cannot_be_divided():
+    assert assign_folds(np.array([0, 0, 1]), np.array([0, 1, 2]), 2) is None
+
+
+def test_examples_are_thinned_evenly():
+    assert spread(3).tolist() == [0, 1, 2]
+    assert len(spread(10 * MAX_EXAMPLES)) == MAX_EXAMPLES
+    assert spread(1001, 3).tolist() == [0, 500, 1000]
+    assert spread(0).tolist() == []

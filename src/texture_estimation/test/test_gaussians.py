@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from scipy.stats import norm
 
-from texture_estimation.gaussians import LENGTHS, SlideGaussians, SlideMoments
+from texture_estimation.gaussians import LENGTHS, GaussianClasses, SlideGaussians, SlideMoments
 
 WINDOWS, SLIDES = 12, 8
 
@@ -65,12 +66,6 @@ def test_two_equal_slides_are_surer_than_one_of_them():
     assert best(once, added) == best(twice, added) == 2
 
 
-def test_a_slide_of_a_single_window_is_an_example():
-    gaussians = trained().with_added([np.array([[0.0, 8.0, 0.0]])], np.array([2]))
-    assert best(gaussians, np.array([[0.0, 7.5, 0.0]]), 1.0) == 2
-    assert int(gaussians.window_shares(np.array([0.0, 8.0, 0.0])).argmax()) == 2
-
-
 def test_added_slides_take_the_place_of_those_added_before_and_none_is_left_of_them():
     first, second = slide([0.0, 8.0, 0.0], 1), slide([0.0, 0.0, 8.0], 2)
     again = trained().with_added([first], np.array([2])).with_added([second], np.array([2]))
@@ -79,39 +74,63 @@ def test_added_slides_take_the_place_of_those_added_before_and_none_is_left_of_t
     np.testing.assert_array_equal(*(one.shares(asked.mean(axis=0), asked.var(axis=0), 3.0) for one in (again, direct)))
 
 
-def test_training_slides_of_one_window_have_gaussians_of_one_length():
-    values, codes = np.array([[0.0], [0.2], [5.0], [5.2]]), np.array([0, 0, 1, 1])
-    gaussians = SlideGaussians.fit(values, codes, np.arange(4), overlap=0.2)
-    assert gaussians.lengths == (1.0,)
-    moments = SlideMoments(n_features=1)
-    moments.add(np.array([5.1]))
-    assert gaussians.shares(moments.mean, moments.variance, 20.0).argmax() == 1
-
-
-def test_the_order_of_added_slides_does_not_matter():
-    slides, asked = [slide([0.0, 8.0, 0.0], seed) for seed in (1, 2, 3)], slide([0.0, 7.0, 0.0], 4)
-    there, back = (trained().with_added(order, np.array([2, 2, 2])) for order in (slides, slides[::-1]))
-    np.testing.assert_allclose(there.window_shares(asked), back.window_shares(asked), atol=1e-9)
-
-
-@pytest.mark.parametrize('count', [1, 2])
-def test_very_few_examples_suffice_for_training(count):
-    values = np.repeat([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]], count, axis=0)
-    codes = np.repeat([0, 1], count)
-    gaussians = SlideGaussians.fit(values, codes, codes, overlap=1.0).with_added([values[:1] + 4.0], np.array([2]))
-    assert np.isfinite(gaussians.window_shares(values)).all()
-    assert (gaussians.window_shares(values).argmax(axis=1) == codes).all()
-
-
-def test_constant_and_doubled_features_do_no_harm():
-    values = np.concatenate([slide([0.0, 0.0, 0.0], 1), slide([8.0, 0.0, 0.0], 2)])
-    values[:, 1], values[:, 2] = 7.0, values[:, 0]
-    codes = np.repeat([0, 1], WINDOWS)
-    gaussians = SlideGaussians.fit(values, codes, np.arange(2 * WINDOWS) // 3, overlap=1.0)
-    assert (gaussians.window_shares(values).argmax(axis=1) == codes).all()
-
-
 def test_probabilities_are_neither_sure_of_everything_nor_of_nothing():
     gaussians = trained().with_added([slide([0.0, 8.0, 0.0], 1)], np.array([2]))
     between = np.exp(gaussians.window_shares(slide([3.0, 0.0, 0.0], 2)))
     assert 0.5 < between.max(axis=1).mean() < 0.99
+
+
+def normal(centre, count, seed):
+    return np.asarray(centre) + np.random.default_rng(seed).normal(size=(count, len(centre)))
+
+
+def fitted(*centres, count=4000):
+    samples = np.concatenate([normal(centre, count, seed) for seed, centre in enumerate(centres)])
+    return GaussianClasses.fit(samples, np.repeat(np.arange(len(centres)), count), np.full(len(centres), count))
+
+
+@pytest.mark.parametrize('distance', [1.0, 2.0, 3.0])
+def test_two_gaussians_are_confused_as_often_as_their_distance_says(distance):
+    classes = fitted([0.0, 0.0], [distance, 0.0])
+    wrong = classes.log_probabilities(normal([0.0, 0.0], 40_000, seed=9)).argmax(axis=1).mean()
+    assert wrong == pytest.approx(norm.cdf(-distance / 2.0), abs=0.01)
+
+
+def test_a_class_of_few_slides_is_wider_and_as_sharp_as_the_others_with_many():
+    classes = fitted([0.0], [10.0])
+    at = np.array([20.0])
+    for slides in (1, 5, 10_000):
+        shares = classes.with_classes(np.array([[22.0]]), np.array([slides])).log_probabilities(at)
+        variance = (1.0 + 1.0 / slides) ** classes.uncertainty_exponent
+        log_odds = 0.5 * classes.inverse_temperature * (100.0 - 4.0 / variance)
+        assert shares[2] - shares[1] == pytest.approx(log_odds, rel=0.1)
+
+
+def test_of_uncorrelated_features_a_diagonal_covariance_says_the_same(monkeypatch):
+    around = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+    samples = np.concatenate([around, around + np.array([9.0, 5.0])])
+    given = samples, np.repeat([0, 1], 4), np.array([4, 4])
+    full = GaussianClasses.fit(*given)
+    monkeypatch.setattr('texture_estimation.gaussians.MAX_CORRELATED', 1)
+    diagonal = GaussianClasses.fit(*given)
+    assert diagonal.projection.shape == (2,)
+    np.testing.assert_allclose(diagonal.log_probabilities(samples), full.log_probabilities(samples))
+
+
+def test_more_features_than_a_covariance_could_hold_still_tell_the_classes():
+    n_features = 200_000  # whose covariance would take 320 GB
+    samples = np.random.default_rng(0).normal(size=(6, n_features))
+    samples[3:] += 1.0
+    classes = GaussianClasses.fit(samples, np.repeat([0, 1], 3), np.array([3, 3]))
+    third = classes.with_classes(np.full((1, n_features), 3.0), np.array([1]))
+    at = np.array([[0.0], [1.0], [3.0]]) + np.zeros(n_features)
+    assert third.log_probabilities(at).argmax(axis=1).tolist() == [0, 1, 2]
+
+
+def test_running_moments_equal_those_of_all_windows_also_far_from_zero():
+    windows = 1e6 + np.random.default_rng(0).normal(size=(500, 3))
+    moments = SlideMoments(n_features=3)
+    for count, window in enumerate(windows, start=1):
+        moments.add(window)
+        np.testing.assert_allclose(moments.mean, windows[:count].mean(axis=0), rtol=1e-12)
+        np.testing.assert_allclose(moments.variance, windows[:count].var(axis=0), atol=1e-6)
