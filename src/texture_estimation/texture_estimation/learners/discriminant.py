@@ -74,7 +74,7 @@ def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPredictor:
+class DiscriminantPredictor:
     """One linear layer.
 
     Parameters
@@ -84,7 +84,7 @@ class LinearPredictor:
 
     Examples
     --------
-    >>> LinearPredictor(np.array([[1.0, -1.0]]), np.zeros(2))(np.array([2.0])).tolist()
+    >>> DiscriminantPredictor(np.array([[1.0, -1.0]]), np.zeros(2))(np.array([2.0])).tolist()
     [2.0, -2.0]
     """
 
@@ -173,9 +173,9 @@ class Discriminant:
         return Fitted(self._fit(X, y, n_labels, temperature), log_softmax(scores / temperature), note, folds)
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> LinearPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> DiscriminantPredictor:
         """Return the predictor made from the stored parameters."""
-        return LinearPredictor(
+        return DiscriminantPredictor(
             np.asarray(parameters['weights'], dtype=np.float64, order='F'),
             np.asarray(parameters['offsets'], dtype=np.float64),
         )
