@@ -91,6 +91,11 @@ def middles(dataset: SlideDataset) -> SlideDataset:
     return SlideDataset(tuple(map(middle, dataset)))
 
 
+def _having(name: str, *values: str, but: bool = False) -> Callable[[LabelledSlide], bool]:
+    """Return what says of a slide whether an attribute of it is one of these values, or is none of them."""
+    return lambda slide: (getattr(slide, name) in values) is not but
+
+
 def _with_other_finger(slides: SlideDataset) -> SlideDataset:
     row = ROWS['another finger']
     rng = np.random.default_rng(0)
@@ -102,11 +107,11 @@ def _biotac20(options: BenchmarkOptions) -> Iterator[Trial]:
         slides = SlideDataset.from_bags(bags, '21-40')
     halves, quarters = slides.in_parts(2), slides.in_parts(4)
     for place in ('1/2', '2/2'):
-        trained = halves.select(EARLIER, where=lambda one, place=place: one.place == place)
+        trained = halves.select(EARLIER, where=_having('place', place))
         tested = across_places(halves.select(LATER), trained)
         yield Trial('biotac20 halves', VIBRATION, trained, {**tested, FINGER: _with_other_finger(tested[SAME])})
     for place in ('1/4', '2/4', '3/4', '4/4'):
-        trained = quarters.select(EARLIER, where=lambda one, place=place: one.place != place)
+        trained = quarters.select(EARLIER, where=_having('place', place, but=True))
         other = {PLACE: across_places(quarters.select(LATER), trained)[PLACE]}
         yield Trial('biotac20 quarters', ('default', 'vibration-and-taxels', 'SVC on log bands'), trained, other)
 
@@ -119,16 +124,16 @@ def _ntp21(options: BenchmarkOptions) -> Iterator[Trial]:
     for force in np.unique(forces):
         left, rest = halves.take(forces == force), halves.take(forces != force)
         for place in ('1/2', '2/2'):
-            trained = rest.select(where=lambda one, place=place: one.place == place)
+            trained = rest.select(where=_having('place', place))
             yield Trial('ntp21 halves', ARRAY, trained, across_places(left, trained))
 
 
 def _fabricslide(options: BenchmarkOptions) -> Iterator[Trial]:
     with imported(options, 'fabricslide') as bags:
         halves = middles(SlideDataset.from_bags(bags).select(labels=COMPLETE).in_parts(2))
-    first, second = (halves.select(where=lambda one, odd=odd: one.number % 2 == odd) for odd in (1, 0))  # repeats
+    first, second = (halves.take(halves.condition('number') % 2 == odd) for odd in (1, 0))  # repeats
     for place in ('1/2', '2/2'):
-        trained = first.select(where=lambda one, place=place: one.place == place)
+        trained = first.select(where=_having('place', place))
         yield Trial('fabricslide halves', TAXELS, trained, across_places(second, trained))
 
 
@@ -137,12 +142,12 @@ def _fingersense(options: BenchmarkOptions) -> Iterator[Trial]:
         slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session > '2021-05')
     slides = middles(slides)
     for date in DATES:
-        trained = slides.select(where=lambda one, date=date: one.session != date)
+        trained = slides.select(where=_having('session', date, but=True))
         known = set(trained.labels.tolist())
-        left = slides.select(labels=known, where=lambda one, date=date: one.session == date)
+        left = slides.select(labels=known, where=_having('session', date))
         yield Trial('fingersense dates', TAXELS, trained, {DAY: left})
-    odd, even = (slides.select(where=lambda one, odd=odd: one.number % 2 == odd) for odd in (1, 0))
-    yield Trial('fingersense dates', TAXELS, odd, {SAME: even.select(where=lambda one: one.session in DATES)})
+    odd, even = (slides.take(slides.condition('number') % 2 == odd) for odd in (1, 0))
+    yield Trial('fingersense dates', TAXELS, odd, {SAME: even.select(where=_having('session', *DATES))})
 
 
 def _lmt29(options: BenchmarkOptions) -> Iterator[Trial]:
