@@ -75,6 +75,13 @@ def test_without_days_slides_are_held_out_by_themselves(examples):
     assert held_out_parts(replace(examples, conditions=by_slide)) is None
 
 
+def test_places_are_held_out_in_turn_where_each_slide_has_a_bag_of_its_own(examples):
+    slides = np.unique(examples.groups).tolist()
+    made = {slide: SlideConditions(session=slide, place=str(int(slide[-1]) % 2)) for slide in slides}
+    parts = held_out_parts(replace(examples, conditions=made))
+    assert parts.tolist() == [int(slide[-1]) % 2 for slide in slides]
+
+
 def test_a_label_of_one_day_is_held_out_slide_by_slide(examples):
     made = of_days(examples)
     of_one = {

@@ -164,12 +164,13 @@ def held_out_parts(examples: LabelledFeatures) -> Codes | None:
     """
     slides, rows = np.unique(examples.groups, return_index=True)
     made = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
-    sessions = np.array([f'{one.session}\n{one.place}\n{one.sensor}' for one in made])
+    alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide tells of no session
+    sessions = np.array([f'{"" if alone else one.session}\n{one.place}\n{one.sensor}' for one in made])
     labels = examples.labels[rows]
     own = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     order = _ranks(sessions, rows)
     count = min(FOLDS, int(order.max()) + 1)
-    if len(set(sessions)) == len(slides) or max(len(set(sessions[of])) for of in own) < 2 or min(map(len, own)) < 2:
+    if max(len(set(sessions[of])) for of in own) < 2 or min(map(len, own)) < 2:
         return None
     parts: Codes = order * count // (order.max() + 1)
     for of in own:
