@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build the site: `.venv/bin/ros-run python docs/build.py [FOLDER]`; then open FOLDER/index.html (out/site)."""
 
 from __future__ import annotations

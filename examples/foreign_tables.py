@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write recordings as other people keep them, to try an import on: simulated, shaped unlike those of the suite.
 
 python foreign_tables.py FOLDER

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fill the measured numbers of the pages from the stored JSON: `python tools/figures.py`, or `--check` to compare only.
 
 A number in a page is followed by a comment that names its source, so that a forge shows the number alone:

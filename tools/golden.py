@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The golden set: what recipes say of fixed slides and arms are sent, so that a change of the structure changes none.
 
 `python tools/golden.py --check` computes all rows anew and compares them with `golden.json`; `--write` stores them.
@@ -156,7 +157,17 @@ SOURCES = {
         _plan(0.15, 2.0, 1.5),
     ),
     'biotac20': Source(
-        ('default', 'fast', 'onset', 'peaks-naive-bayes', 'vibration-and-taxels', 'taxels', 'kaboli-em', 'kaboli-svm'),
+        (
+            'default',
+            'fast',
+            'onset',
+            'peaks-naive-bayes',
+            'vibration-and-taxels',
+            'taxels',
+            'taxels-any-day',
+            'kaboli-em',
+            'kaboli-svm',
+        ),
         ('material02', 'material05', 'material09', 'material14'),
         data_set='biotac20',
     ),

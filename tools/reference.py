@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write the pages of docs/reference from the source: `python tools/reference.py`, or `--check` to compare only.
 
 They hold the messages with their comments, the arguments of the launch files, all parameters, the shipped recipes, and

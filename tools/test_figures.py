@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers in the pages are those of the stored JSON, and no measured number stands without its source."""
 
 from __future__ import annotations

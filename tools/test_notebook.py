@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The notebooks of examples/ run from the first cell to the last, without a kernel."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of the repository as a whole: links, the shared setup.py, versions, names."""
 
 from __future__ import annotations

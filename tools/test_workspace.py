@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The set-up of the workspace, as far as it decides something."""
 
 import re

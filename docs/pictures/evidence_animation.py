@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draw docs/pictures/evidence.gif: `.venv/bin/ros-run python docs/pictures/evidence_animation.py`, a minute.
 
 It shows a simulated slide of a TSF-85 fingertip over a grid of the scene `ets_linear`, and how the evidence of a model

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draw the modules of two source trees as areas: `python docs/pictures/structure.py BEFORE AFTER structure.png`."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build this package. The same text in every Python package of the suite: all facts come from package.xml."""
 
 from pathlib import Path

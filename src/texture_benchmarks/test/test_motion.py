@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The force loop through the explorer, on an arm without a force mode."""
 
 import math

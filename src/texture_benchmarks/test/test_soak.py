@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Endurance without nodes: schedules, books and verdicts."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Endurance, shortened: an explorer that is killed comes back, and every exploration has an end."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What studies share: data sets imported once, work on all cores, charts with names."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What recipes recognise across borders: at another place, on another day, with another finger."""
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ LONGEST_S = 8.0  # of a slide over taxels
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class BorderTrial:
     """One training, and what is tested across each border."""
 
     data: str
@@ -102,21 +103,21 @@ def _with_other_finger(slides: SlideDataset) -> SlideDataset:
     return SlideDataset(tuple(disturbed(one, row, RESPONSE_DB, rng) for one in slides))
 
 
-def _biotac20(options: BenchmarkOptions) -> Iterator[Trial]:
+def _biotac20(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     with imported(options, 'biotac20') as bags:
         slides = SlideDataset.from_bags(bags, '21-40')
     halves, quarters = slides.in_parts(2), slides.in_parts(4)
     for place in ('1/2', '2/2'):
         trained = halves.select(EARLIER, where=_having('place', place))
         tested = across_places(halves.select(LATER), trained)
-        yield Trial('biotac20 halves', VIBRATION, trained, {**tested, FINGER: _with_other_finger(tested[SAME])})
+        yield BorderTrial('biotac20 halves', VIBRATION, trained, {**tested, FINGER: _with_other_finger(tested[SAME])})
     for place in ('1/4', '2/4', '3/4', '4/4'):
         trained = quarters.select(EARLIER, where=_having('place', place, but=True))
         other = {PLACE: across_places(quarters.select(LATER), trained)[PLACE]}
-        yield Trial('biotac20 quarters', ('default', 'vibration-and-taxels', 'SVC on log bands'), trained, other)
+        yield BorderTrial('biotac20 quarters', ('default', 'vibration-and-taxels', 'SVC on log bands'), trained, other)
 
 
-def _ntp21(options: BenchmarkOptions) -> Iterator[Trial]:
+def _ntp21(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     with imported(options, 'ntp21') as bags:
         halves = SlideDataset.from_bags(bags).in_parts(2)
     halves = halves.select(where=lambda one: one.speed_m_s < 0.05)  # half a faster slide is shorter than the windows
@@ -125,19 +126,19 @@ def _ntp21(options: BenchmarkOptions) -> Iterator[Trial]:
         left, rest = halves.take(forces == force), halves.take(forces != force)
         for place in ('1/2', '2/2'):
             trained = rest.select(where=_having('place', place))
-            yield Trial('ntp21 halves', ARRAY, trained, across_places(left, trained))
+            yield BorderTrial('ntp21 halves', ARRAY, trained, across_places(left, trained))
 
 
-def _fabricslide(options: BenchmarkOptions) -> Iterator[Trial]:
+def _fabricslide(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     with imported(options, 'fabricslide') as bags:
         halves = middles(SlideDataset.from_bags(bags).select(labels=COMPLETE).in_parts(2))
     first, second = (halves.take(halves.condition('number') % 2 == odd) for odd in (1, 0))  # repeats
     for place in ('1/2', '2/2'):
         trained = first.select(where=_having('place', place))
-        yield Trial('fabricslide halves', TAXELS, trained, across_places(second, trained))
+        yield BorderTrial('fabricslide halves', TAXELS, trained, across_places(second, trained))
 
 
-def _fingersense(options: BenchmarkOptions) -> Iterator[Trial]:
+def _fingersense(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     with imported(options, 'fingersense') as bags:
         slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session > '2021-05')
     slides = middles(slides)
@@ -145,25 +146,25 @@ def _fingersense(options: BenchmarkOptions) -> Iterator[Trial]:
         trained = slides.select(where=_having('session', date, but=True))
         known = set(trained.labels.tolist())
         left = slides.select(labels=known, where=_having('session', date))
-        yield Trial('fingersense dates', TAXELS, trained, {DAY: left})
+        yield BorderTrial('fingersense dates', TAXELS, trained, {DAY: left})
     odd, even = (slides.take(slides.condition('number') % 2 == odd) for odd in (1, 0))
-    yield Trial('fingersense dates', TAXELS, odd, {SAME: even.select(where=_having('session', *DATES))})
+    yield BorderTrial('fingersense dates', TAXELS, odd, {SAME: even.select(where=_having('session', *DATES))})
 
 
-def _lmt29(options: BenchmarkOptions) -> Iterator[Trial]:
+def _lmt29(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     with imported(options, 'lmt29') as bags:
         slides = SlideDataset.from_bags(bags)
-    yield Trial('lmt29 recordings', SOUND, slides.select('1-4'), {PLACE: slides.select('5-6')})
+    yield BorderTrial('lmt29 recordings', SOUND, slides.select('1-4'), {PLACE: slides.select('5-6')})
 
 
-def _simulated(options: BenchmarkOptions) -> Iterator[Trial]:
+def _simulated(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     """Yield the halves of few simulated slides, for a quick run."""
     halves = simulate(TRAINED, 9, np.random.default_rng(options.seed), told=True).in_parts(2)
     trained = halves.select('1-6', where=lambda one: one.place == '1/2')
-    yield Trial('simulated halves', ('fast', *PEERS), trained, across_places(halves.select('7-9'), trained))
+    yield BorderTrial('simulated halves', ('fast', *PEERS), trained, across_places(halves.select('7-9'), trained))
 
 
-SETS: Mapping[str, Callable[[BenchmarkOptions], Iterator[Trial]]] = {
+SETS: Mapping[str, Callable[[BenchmarkOptions], Iterator[BorderTrial]]] = {
     'biotac20': _biotac20,
     'fingersense': _fingersense,
     'ntp21': _ntp21,
@@ -188,7 +189,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 Cell = tuple[str, str, str]  # border, data and recipe
 
 
-def tried(trials: Sequence[Trial]) -> Mapping[Cell, list[SlideAnswer]]:
+def tried(trials: Sequence[BorderTrial]) -> Mapping[Cell, list[SlideAnswer]]:
     """Return what each recipe says of the slides of each border."""
     found: defaultdict[Cell, list[SlideAnswer]] = defaultdict(list)
     jobs = [(index, name) for index, trial in enumerate(trials) for name in trial.recipes]
@@ -234,7 +235,7 @@ class SlideAnswer:
     result: SlideResult
 
 
-def _try(trials: Sequence[Trial], job: tuple[int, str]) -> dict[str, list[SlideAnswer]]:
+def _try(trials: Sequence[BorderTrial], job: tuple[int, str]) -> dict[str, list[SlideAnswer]]:
     trial, recipe = trials[job[0]], recipe_of(job[1])
     model = train(recipe, training_examples(recipe, for_recipe(trial.trained, recipe)))
     found = {}

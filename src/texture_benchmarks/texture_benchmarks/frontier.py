@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Accuracy against computing time and sliding time by the length of windows, and what a training costs as it grows."""
 
 from __future__ import annotations

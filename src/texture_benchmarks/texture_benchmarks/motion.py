@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How well force, speed and circle are kept, by which robot on which surface; and where force control is stable."""
 
 from __future__ import annotations

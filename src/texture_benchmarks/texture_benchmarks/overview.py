@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Accuracy against the time from first touch to decision, in one picture, from the stored figures of other studies."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """General classifiers of time series, from packages of their own, on the vibration of later recorded slides."""
 
 from __future__ import annotations

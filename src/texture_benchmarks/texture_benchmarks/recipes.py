@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every recipe on the same recorded slides: how often it is right, how long it learns, and how long it thinks."""
 
 from __future__ import annotations

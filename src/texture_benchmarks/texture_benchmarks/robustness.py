@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where recipes break down as noise, wear, losses or other speeds grow in slides of a training in good order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How training and recognition scale with the number of textures and of windows."""
 
 from __future__ import annotations

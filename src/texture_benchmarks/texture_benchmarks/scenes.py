@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What simulated scenes cost, and what each of their terms contributes to recognition."""
 
 from __future__ import annotations

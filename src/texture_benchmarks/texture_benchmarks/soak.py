@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hours of explorations on the emulator with faults at random: what is injected, recorded, required and reported.
 
 `texture_benchmarks.ros.soak` runs the nodes; here is all that needs no ROS.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every study is given and hands back; recordings, workers and charts that several of them share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How often slides end wrong and known when something differs from the training."""
 
 from __future__ import annotations

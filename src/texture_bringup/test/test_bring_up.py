@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The nodes of a robot brought up in order: the explorer takes control of its arm last, or not at all."""
 
 import numpy as np

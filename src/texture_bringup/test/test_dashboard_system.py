@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dashboard as an operator meets it: the emulator, and the page in a real browser.
 
 Where no Chromium is installed the same story runs over the page's own requests and WebSocket, and a warning says so.

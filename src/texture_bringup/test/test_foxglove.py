@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layout for Foxglove shows what the nodes really publish."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The presets of robots: every name and value is one that their nodes take, and the pages agree with them."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files from strangers: cut off, altered, of wrong types. Each is read or refused with one sentence, and runs no code.
 
 FUZZ_SEED and FUZZ_TRIES look further.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The `texture` command: everything a user does with the suite, one sub-command each.
 
 A package brings its sub-commands as modules of its folder `commands`: the shared `setup.py` declares each as an entry

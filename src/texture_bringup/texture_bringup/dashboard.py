@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dashboard: a web page with the state of the nodes, and its server."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The demonstration: record, train and recognise on the emulated rig."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start the nodes of an XML launch file where ROS 2's own launcher is missing."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A client of the suite's nodes: explore, call services, set parameters."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every sub-command of `texture` shares: exit codes, sentences for errors, common options."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names, parameters, YAML and JSON: how a choice is looked up, a value checked and a file read within limits."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames on a serial line: checked, numbered and timed, for devices of our own design.
 
     COBS( kind u8 | version u8 | sequence u16 | time_us u32 | rows u8 | columns u8 | body | crc u16 ) 00

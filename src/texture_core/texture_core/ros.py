@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The suite's types as messages, its parameters in ROS, quality of service, diagnostics, and how a node runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start nodes as processes, and a graph of one's own for a test."""
 
 from __future__ import annotations

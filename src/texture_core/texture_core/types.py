@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What flows between the packages: signals, windows, features, estimates, explorations; and small types of all."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The AnySkin's frames, which have neither header nor checksum."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers and times of samples that carry neither."""
 
 from __future__ import annotations

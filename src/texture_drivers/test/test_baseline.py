@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The level without load: measured, subtracted, and watched."""
 
 from __future__ import annotations

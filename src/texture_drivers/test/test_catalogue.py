@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every sensor of the catalogue must do."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lowering a rate: what passes, what is kept out, and where a sample stands."""
 
 from __future__ import annotations

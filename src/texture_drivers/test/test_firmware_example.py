@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The C++ in docs/sensors/others.md is what people will copy: it must make frames that the driver takes."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The PapillArray's packets."""
 
 from __future__ import annotations

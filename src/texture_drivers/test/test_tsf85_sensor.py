@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sensor on a pseudo-terminal fed with packets made by hand."""
 
 import fcntl

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A TSF-85 whose firmware sends no stamps: what was lost is told by the host's clock, and the times stay right."""
 
 import numpy as np

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drivers of tactile sensors: bytes to numbers to TactileSignal."""

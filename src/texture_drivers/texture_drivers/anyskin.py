@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """AnySkin, five magnetometers under a skin: protocol and sensor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """SynTouch BioTac: protocol over a Cheetah adapter, units, messages of the vendor's driver, the sensor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sensors by name; a user's own is 'module:Class'."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Eight channels of a data acquisition board on a serial line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recording in a file as a sensor: readers of recordings, and the player."""
 
 from __future__ import annotations

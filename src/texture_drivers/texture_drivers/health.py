@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Is a stream as it should be: rate, dead or clipping channels, baseline, and what is said on /diagnostics."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A finger with a PVDF film and strain gauges: charge leak, settings, sensor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every sensor shares: its parameters, and the thread that reads it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sensor at a serial port: find the port, open it, decode its packets, count what is broken or missing."""
 
 from __future__ import annotations

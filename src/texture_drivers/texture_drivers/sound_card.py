@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sound card as a sensor: capture in blocks, and the sensor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The host time and the running index of each sample, whatever the device tells of either."""
 
 from __future__ import annotations

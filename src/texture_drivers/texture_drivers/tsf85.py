@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robotiq TSF-85 fingertip: protocol, sample frames, settings, recordings and messages of the vendor, the sensor."""
 
 from __future__ import annotations

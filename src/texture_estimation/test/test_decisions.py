@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Novelty detection against what is known of the distributions that the slides are drawn from."""
 
 import dataclasses

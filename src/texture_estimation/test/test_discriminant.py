@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shrunken discriminant, and sessions that are held out together."""
 
 from dataclasses import replace

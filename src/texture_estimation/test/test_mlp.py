@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The multilayer perceptron against what mathematics says of it."""
 
 import dataclasses

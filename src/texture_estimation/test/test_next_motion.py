@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motion that gives the largest information gain is chosen, by information that has known values."""
 
 from __future__ import annotations

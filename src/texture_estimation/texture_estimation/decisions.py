@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Known or not, decided or not: novelty, stopping rule, prediction sets, confidence floor, error bound, domain."""
 
 from __future__ import annotations

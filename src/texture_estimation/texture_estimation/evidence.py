@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Accumulation of evidence about a surface over the windows of a slide."""
 
 from __future__ import annotations

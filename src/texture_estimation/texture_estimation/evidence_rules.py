@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rules that combine the window predictions of one slide."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Class-conditional Gaussians with shrunken covariances, and what they are fitted to."""
 
 from __future__ import annotations

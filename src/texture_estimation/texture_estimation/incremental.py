@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Incremental classification: add one slide to a model while it is used, and remove it again."""
 
 from __future__ import annotations

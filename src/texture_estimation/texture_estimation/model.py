@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A trained model and its files: NAME.skops, the card NAME.json, and the slides added since in the folder NAME.added.
 
 Adding slides does not change the two files.

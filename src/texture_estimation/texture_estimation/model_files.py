@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The files of a model, read without running code: NAME.skops, the card NAME.json, added slides in NAME.added."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Choice of the next touch: the motion with the largest expected information gain about the texture."""
 
 from __future__ import annotations

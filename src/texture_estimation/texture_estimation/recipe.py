@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recipe: windows, inputs and features, learner and evidence rule, in one YAML file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A recipe's learner as an estimator of scikit-learn."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What nodes that answer feature vectors with estimates share: messages, the model, the report."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Roughness: grades and ratings, regressors, recipe, training, evidence, model."""
 
 from __future__ import annotations

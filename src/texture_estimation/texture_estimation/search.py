@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Genetic search of a recipe's parameters: what is varied, how an individual is evaluated, what is found.
 
 As Roberge et al. do it: 20 individuals, 30 generations; the fitness is the mean of learning and test accuracy over

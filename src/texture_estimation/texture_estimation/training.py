@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Train a texture model from labelled features: the learner, its calibration, its decisions."""
 
 from __future__ import annotations

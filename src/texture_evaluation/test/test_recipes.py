@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every shipped recipe, from bags to decisions."""
 
 from dataclasses import replace

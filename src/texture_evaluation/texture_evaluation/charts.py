@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Charts that explain themselves: what is shown stands in the title, units on the axes, colours safe for all eyes."""
 
 from __future__ import annotations

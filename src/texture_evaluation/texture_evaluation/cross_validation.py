@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cross-validate recipes on a data set: splits by slide and condition, figures, comparison."""
 
 from __future__ import annotations

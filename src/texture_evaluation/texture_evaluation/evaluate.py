@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Evaluate a model on labelled bags, slide by slide, as in live operation."""
 
 from __future__ import annotations

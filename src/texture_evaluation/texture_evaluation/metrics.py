@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is measured on the growing evidence of slides."""
 
 from __future__ import annotations

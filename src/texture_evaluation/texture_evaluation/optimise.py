@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tune a recipe on labelled bags by a genetic search, and write what was found as recipe files."""
 
 from __future__ import annotations

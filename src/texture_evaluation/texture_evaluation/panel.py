@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Human panels: agreement between people, and with a model."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Train a model from labelled bags: one that recognises surfaces, or one that grades them as people did."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An arm behind a controller manager, for an explorer in a process of its own: `arm:=managed_arm:ManagedArm`.
 
 The topics and the manager are emulated within the process, as the wheels of ROS lack the messages of the manager. Each

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every arm of the catalogue keeps to, on its default parameters."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What happens when the finger loses the surface: it is noticed, named, and nothing of it counts as sliding."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 import pytest
 
 from texture_exploration.explorer import STILL_MOVING, ExplorationEnd, ExplorationOutcome

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A preset asked of a running explorer."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The force loop alone."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A force sensor that freezes, drifts or has the wrong sign: it is noticed soon, and the finger is lifted."""
 
 from dataclasses import replace

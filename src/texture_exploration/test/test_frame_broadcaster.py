@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames of surface and fingertip, as a listener on tf gets them."""
 
 import math

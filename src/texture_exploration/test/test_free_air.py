@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Free air is proven by a rise without a change of the force, never by the height alone."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whatever ends the command of Dynamixel motors ends their torque, and what is wrong with them is named."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """After a fault the finger is lifted until nothing touches it, on every arm, before a motion begins."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every motion of the catalogue keeps to."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether an arm follows what is commanded: an arm that is late, and one that stands still, in simulated time."""
 
 import numpy as np

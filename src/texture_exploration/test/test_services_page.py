@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The lines of docs/operate.md, as requests to running nodes."""
 
 import importlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sensor that falls silent in the slide, as the explorer meets it: a process of its own."""
 
 import subprocess

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How fast the finger may come down."""
 
 from dataclasses import replace

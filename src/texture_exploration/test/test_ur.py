@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The UR arm through the unmodified ur-rtde, on the emulated controller: a process of its own on a loopback address."""
 
 from __future__ import annotations

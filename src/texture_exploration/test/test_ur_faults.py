@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What would hurt the finger or the sample: the UR arm on the emulated controller, with the true force from outside."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The watchdog of the UR controller waits while a command is carried out, and guards the moving arm again after it."""
 
 import pytest

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exploratory motions, the robots that perform them, and their safety."""

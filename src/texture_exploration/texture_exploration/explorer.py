@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Owner of the arm: runs explorations, one at a time, each in a thread of its own."""
 
 from __future__ import annotations

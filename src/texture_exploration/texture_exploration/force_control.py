@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Press with a wanted force by an arm that knows velocities alone.
 
 The contact is a spring: F = k·(h − z), with h the height of the untouched surface under the finger. Each period T the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The motions by name: linear, circular, cross and surface slides, in-hand sliding, touches."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A preset: the motions of a paper or of your own, as a list of requests from one YAML file.
 
 paper: where the numbers come from

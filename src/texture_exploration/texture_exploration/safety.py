@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an exploration may ask for, and what ends it at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The stages of which motions are made: touch, press, slide, lift; each knows what to command and when it is over."""
 
 from __future__ import annotations

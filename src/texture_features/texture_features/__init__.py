@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Windows of a tactile signal and the features that describe them."""

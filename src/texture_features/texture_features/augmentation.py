@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Copies of training windows under computed disturbances, so that a model knows what lies beside its training."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Labelled features: what learners are trained on, with the conditions of their slides."""
 
 from __future__ import annotations

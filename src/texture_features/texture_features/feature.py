@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a feature is: a stateless function of windows that are alike, with named values."""
 
 from __future__ import annotations

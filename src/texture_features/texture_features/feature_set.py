@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A feature set: windows, inputs and features, from the recipe that names them to the numbers."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Find slides and their contact in a continuous recording."""
 
 from __future__ import annotations

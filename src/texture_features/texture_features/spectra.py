@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Spectra of windows, in time and along a surface."""
 
 from __future__ import annotations

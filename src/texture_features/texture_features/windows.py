@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cut a signal into windows while the finger slides: buffers, axes, coverage, time stretch."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The papers' experiments by name, rebuilt on simulated surfaces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fabrics by a finger of PVDF (Hu et al. 2014): power spectrum, principal components, machines by Max Wins."""
 
 from __future__ import annotations

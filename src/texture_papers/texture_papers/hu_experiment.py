@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Five linens measured along x and along y (Hu et al. 2014)."""
 
 from __future__ import annotations

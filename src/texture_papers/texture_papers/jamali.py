@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Materials by surface texture (Jamali & Sammut 2010): peaks grown from regions, naive Bayes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Eight surfaces of a floor and a kitchen (Jamali & Sammut 2010)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Objects in a hand by texture (Kaboli et al. 2015): Hjorth parameters, correlations; three learners."""
 
 from __future__ import annotations

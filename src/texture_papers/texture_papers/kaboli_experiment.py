@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Twenty objects in a hand, trained with two fingers and recognised with two others (Kaboli et al. 2015)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Experiments of papers on simulated surfaces: what was done, by which recipes, over which seeds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Figures of the papers beside ours: tables, charts, and whether the claims hold."""
 
 from __future__ import annotations

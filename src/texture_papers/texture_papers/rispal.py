@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Roughness by dynamic tactile sensing (Rispal et al.): three regressors of grades."""
 
 from __future__ import annotations

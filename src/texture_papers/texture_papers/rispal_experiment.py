@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grades of roughness of textures never touched (Rispal et al.)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Textures by linear and circular motion (Roberge et al.): four, five and ten textures, and friction."""
 
 from __future__ import annotations

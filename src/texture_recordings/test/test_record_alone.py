@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A machine that only records needs the messages, the core, the drivers and this package, and no numerical library."""
 
 import os

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bags and labelled slides: recording, reading, replaying, importing and segmenting."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read and write bags (MCAP) of the suite's messages, of any origin."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Labelled slides from bags, tables or public sets: `SlideDataset`, its conditions, its samples."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Importers of the public recordings."""
 
 from __future__ import annotations

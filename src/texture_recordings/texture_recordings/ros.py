@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics to record, and the check that nobody else publishes them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Give a bag the exploration states that its signals tell: for bags without them, or with wrong ones."""
 
 from __future__ import annotations

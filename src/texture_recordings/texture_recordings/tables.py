@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Import foreign tables by a mapping file: readers, columns, borders of slides, bags."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the simulated fingers of papers 3 and 5 must feel, whatever their gains."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The emulated Dynamixel bus, by the bytes of protocol 2.0."""
 
 import socket

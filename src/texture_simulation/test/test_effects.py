@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each effect of the catalogue does what its name says, and nothing else."""
 
 from __future__ import annotations

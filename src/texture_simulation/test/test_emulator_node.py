@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bench and sensor node together in the graph."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction that a surface asks for, as a finger feels it through the whole chain."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fingers that are no copies of each other, and objects that are not flat."""
 
 import math

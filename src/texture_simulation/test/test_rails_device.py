@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The firmware of the emulated rails, by the bytes of its protocol."""
 
 import struct

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scenes that the package ships, and what is written about them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every sensor that has a device must do, on that device emulated at the wire."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every sensor with a device in the lifecycle node: configured, active, inactive and cleaned up, again and again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drivers on their emulated devices: what the contract of all sensors does not ask."""
 
 from __future__ import annotations

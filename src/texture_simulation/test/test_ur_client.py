@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The unmodified client package ur-rtde on the emulated controller, over TCP."""
 
 from __future__ import annotations

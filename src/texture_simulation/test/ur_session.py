@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Let the unmodified ur-rtde do all that it can with the emulated controller; print what came of it as JSON.
 
 A process of its own, because its constructors cannot be interrupted: python ur_session.py IP.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Force on the skin of a finger along a trajectory: the chain from positions to the variation of the force."""
 
 from __future__ import annotations

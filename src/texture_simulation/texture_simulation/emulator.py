@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The emulated rig: one scene, its finger, its devices, driven by the motion that an arm reports."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Friction between finger and surface: Coulomb, Stribeck, stick-slip, and their integration in time."""
 
 from __future__ import annotations

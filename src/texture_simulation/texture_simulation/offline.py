@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulate slides without a clock: batches, bags, data sets."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How a finger moves in a simulation: trajectories, tracks, filters."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene: surfaces, contact, friction and effects, from YAML."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One slide over a simulated surface, from the relief to the spectrum, as arrays to be drawn."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How each finger turns contact into samples."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Height profiles of simulated surfaces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture benchmark_options`: run a benchmark; writes figures and a chart."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run the nodes for hours: explore, inject faults, listen to everything."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture add`: add the slide that was explored last to a texture; or undo it."""
 
 from __future__ import annotations

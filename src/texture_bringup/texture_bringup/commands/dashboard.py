@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture dashboard`: show a web page of the live estimates, with buttons to explore and stop."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture demo`: the whole thing on an emulator: explore, learn, recognise, report."""
 
 from __future__ import annotations

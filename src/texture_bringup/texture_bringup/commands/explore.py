@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture explore`: slide the finger over the surface and say what it is."""
 
 from __future__ import annotations

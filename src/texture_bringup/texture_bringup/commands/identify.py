@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture identify`: repeat the slide with the largest information gain until the texture is certain."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture launch`: start the nodes of a launch file."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture remove`: remove a texture that was added since the training."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture scene`: draw a simulated surface, the way over it, the signal and its spectrum."""
 
 from __future__ import annotations

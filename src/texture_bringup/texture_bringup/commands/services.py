@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sub-commands of `texture` that send one request without values, an `std_srvs/Trigger`, and print the answer.
 
 The manifest lists them, and the entry point of each is the object of its name.

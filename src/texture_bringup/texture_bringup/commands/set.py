@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture set`: set parameters of a running node, such as the surface of the emulator."""
 
 from __future__ import annotations

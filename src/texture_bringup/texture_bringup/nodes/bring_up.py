@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bring the nodes of a robot up in order: wait for those that compute, then activate the one that moves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Show what the nodes publish on a web page, and pass on what its buttons ask for."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node of every sensor: reads it in a thread and publishes its batches."""
 
 from __future__ import annotations

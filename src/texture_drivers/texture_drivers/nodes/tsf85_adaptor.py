@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The node that turns the messages of the vendor's TSF-85 driver into the suite's signals."""
 
 from __future__ import annotations

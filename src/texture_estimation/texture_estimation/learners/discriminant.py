@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linear discriminant analysis with a shrunk covariance, in plain arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a learner is: fit, predict, export; folds and standardisation that learners share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The networks of our recipes: training with augmented copies, plain-array predictors, onset network."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Any classifier of scikit-learn as a learner."""
 
 from __future__ import annotations

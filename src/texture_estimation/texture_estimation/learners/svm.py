@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Support vector machines with coupled pairs: training by scikit-learn, plain-array predictor."""
 
 from __future__ import annotations

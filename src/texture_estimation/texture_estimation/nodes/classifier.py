@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Node that classifies the touched surface from the evidence so far, and adds new textures."""
 
 from __future__ import annotations

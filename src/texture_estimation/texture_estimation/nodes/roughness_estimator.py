@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Node that estimates how rough the surface is, with its uncertainty."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture evaluate`: say how good a model is on labelled bags, or cross-validate a recipe on them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture optimise`: tune a recipe on labelled bags by a genetic search."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture train`: learn a model from labelled bags."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """The robots that carry the exploring finger, behind one small protocol."""

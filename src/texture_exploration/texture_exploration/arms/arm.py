@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an arm is to the explorer: commands, states, limits of commands, the surface's frame, zeroing of forces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hands with Dynamixel motors: the bus, the hand, and the process that takes torque off when its parent dies."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a hand is to the explorer: profiles, models of force, finger sets, and a simulated hand."""
 
 from __future__ import annotations

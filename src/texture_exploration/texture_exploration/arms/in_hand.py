@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sliding fingers of a hand as an arm: they move as one, while the other fingers hold."""
 
 from __future__ import annotations

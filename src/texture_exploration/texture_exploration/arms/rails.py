@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two linear rails with encoders and a pressing motor, behind a microcontroller on a serial line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An arm that ROS drives: a twist controller, poses and wrenches on topics."""
 
 from __future__ import annotations

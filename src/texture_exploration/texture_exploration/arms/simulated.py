@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An arm without a robot: a kinematic finger over an elastic surface; with a force mode of its own, or without."""
 
 from __future__ import annotations

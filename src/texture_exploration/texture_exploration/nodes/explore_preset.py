@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ask the explorer for every motion of a preset, one after the other."""
 
 from __future__ import annotations

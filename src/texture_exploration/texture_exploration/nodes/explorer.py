@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Move the finger over the surface on request, and return the estimates."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """The only part of texture_exploration beside its nodes that imports ROS."""

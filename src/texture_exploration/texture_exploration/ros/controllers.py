@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics of an arm that ROS drives, and the guard that stops it when the explorer has died."""
 
 from __future__ import annotations

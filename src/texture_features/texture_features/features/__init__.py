@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """The features, one a file; `texture_features.feature_set` lists them."""

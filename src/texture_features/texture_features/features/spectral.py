@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Features of the spectrum: band powers, peaks, spectral exponent, short-time spectra, wavelets."""
 
 from __future__ import annotations

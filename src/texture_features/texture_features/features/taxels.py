@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Features of arrays of taxels: spatial bands and variation, shares, correlation."""
 
 from __future__ import annotations

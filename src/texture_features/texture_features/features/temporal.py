@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Features of the signal over time: moments, Hjorth parameters, differences, ordinal patterns; speed and force."""
 
 from __future__ import annotations

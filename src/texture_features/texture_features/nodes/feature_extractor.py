@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Node that cuts windows of sliding from the tactile streams and extracts their features."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture experiment`: rebuild a paper's experiment: its figures beside ours."""
 
 from __future__ import annotations

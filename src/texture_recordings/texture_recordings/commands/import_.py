@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture import`: turn other people's recordings into labelled bags."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture record`: record the running system into a bag."""
 
 from __future__ import annotations

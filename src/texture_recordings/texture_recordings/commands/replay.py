@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture replay`: play a bag to the running system."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`texture segment`: find the slides in bags that do not tell them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Record the topics of the suite into a bag."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publish a bag into the graph, at any rate, and exit when it is through."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dynamixel motors and a hand emulated at the wire."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fingers emulated at the wire: encoders of their protocols and the devices that send them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two rails and a pressing motor emulated at the wire."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A twist controller with poses and wrenches, as a ROS arm offers them."""
 
 from __future__ import annotations

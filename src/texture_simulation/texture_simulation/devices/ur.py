@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A UR controller emulated at the wire: RTDE, dashboard, program, and a robot in contact."""
 
 from __future__ import annotations
