@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the pages of docs/reference from the source: `python tools/reference.py`, or `--check` to compare only.
 
-They hold the messages with their comments, the arguments of the launch files, all parameters, the shipped recipes, and
-the tables of the experiments with the figures of the papers beside ours.
+They hold the messages with their comments, the arguments of the launch files, all parameters, the catalogues of
+sensors, motions, features and simulated surfaces, the shipped recipes, and the figures of the papers beside ours.
 """
 
 from __future__ import annotations
@@ -21,7 +21,16 @@ from xml.etree import ElementTree
 import yaml
 
 from texture_core.config import markdown_table
+from texture_drivers.catalogue import SENSORS
+from texture_estimation.learners.catalogue import LEARNERS
+from texture_exploration.arms.catalogue import ARMS
+from texture_exploration.motions import MOTIONS
+from texture_features.feature_set import FEATURES
 from texture_papers.protocol import digest_of
+from texture_simulation.effects import EFFECTS
+from texture_simulation.friction import FRICTIONS
+from texture_simulation.scene import load_scene
+from texture_simulation.surfaces import KINDS
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / 'docs' / 'reference'
@@ -43,13 +52,13 @@ EXPERIMENTS = (
     'hu-components',
     'roughness',
 )
-KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
+INTERFACE_KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 
 
 def messages(root: Path) -> str:
     """Return all interfaces as Markdown: what a file says before its first field, then the file as it is."""
     parts = []
-    for kind, title in KINDS.items():
+    for kind, title in INTERFACE_KINDS.items():
         parts.append(f'## {title}\n')
         for path in sorted((root / INTERFACES / kind).glob(f'*.{kind}')):
             about, definition = split(path.read_text(encoding='utf-8'))
@@ -245,6 +254,30 @@ def _name(choice: Any) -> str:
     return f'`{name}`' if name else '–'
 
 
+def catalogue(entries: Mapping[str, Any]) -> Callable[[Path], str]:
+    """Return what makes a table of a catalogue: each name with the first sentence of what it names."""
+
+    def rows(root: Path) -> Iterator[str]:
+        yield from ('| name | what it is |', '|---|---|')
+        for name, entry in entries.items():
+            made = getattr(entry, 'func', entry)  # several sensors are a partial of one class
+            about = inspect.cleandoc(made.__doc__ or '').split('\n', 1)[0].replace('|', '\\|')
+            given = ', '.join(f'`{key}={value!r}`' for key, value in getattr(entry, 'keywords', {}).items())
+            yield f'| `{name}` | {about}{f" With {given}." if given else ""} |'
+
+    return lambda root: '\n'.join(rows(root)) + '\n'
+
+
+def scenes(root: Path) -> str:
+    """Return a table of the scenes that the packages ship."""
+    rows = ['| scene | sensor | surfaces | about |', '|---|---|---|---|']
+    for path in sorted(root.glob('src/*/config/scenes/*.yaml')):
+        scene = load_scene(str(path))
+        link = f'[{path.stem}](../../{path.relative_to(root)})'
+        rows.append(f'| {link} | `{scene.sensor}` | {len(scene.surfaces)} | {scene.about} |')
+    return '\n'.join(rows) + '\n'
+
+
 def experiments(root: Path) -> str:
     """Return the tables of all experiments: methods, anchor and findings."""
     return '\n'.join(f'### Experiment {name}\n\n{experiment(name, root)}' for name in EXPERIMENTS)
@@ -274,6 +307,30 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
         'scenes as `name: {parameter: value}`. '
         'A value outside its range is refused with a sentence that names the range.',
         parameters,
+    ),
+    'catalogues': (
+        'Catalogues',
+        'All names that recipes, scenes, requests and parameters may use. Instead of a name write `module:Class` for '
+        'one of your own.',
+        parts(
+            ('Sensors', 'Values of the parameter `sensor`.', catalogue(SENSORS)),
+            ('Arms', 'Values of the parameter `arm`.', catalogue(ARMS)),
+            (
+                'Motions',
+                'Values of `motion` in a request. A number of 0 takes the default of the motion.',
+                catalogue(MOTIONS),
+            ),
+            (
+                'Features',
+                'Names in the section `inputs` of a recipe; those of the papers are in `texture_papers`.',
+                catalogue(FEATURES),
+            ),
+            ('Learners', 'Names in the section `learner` of a recipe.', catalogue(LEARNERS)),
+            ('Simulation', 'A surface of a scene is a list of these terms.', catalogue(KINDS)),
+            ('Frictions', 'At most one for each surface.', catalogue(FRICTIONS)),
+            ('Effects', 'All are off unless the scene names them.', catalogue(EFFECTS)),
+            ('Scenes', 'Sizes of printed samples are as drawn, all others are guesses of the usual order.', scenes),
+        ),
     ),
     'recipes': (
         'Recipes',

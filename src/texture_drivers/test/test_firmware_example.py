@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C++ in docs/sensors/others.md is what people will copy: it must make frames that the driver takes."""
+"""The C++ in docs/sensors.md is what people will copy: it must make frames that the driver takes."""
 
 import re
 import shutil
@@ -11,7 +11,7 @@ import pytest
 
 from texture_core.framing import FrameDecoder
 
-PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'sensors' / 'others.md'
+PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'sensors.md'
 COMPILER = shutil.which('g++')
 # Reads rows of 8 samples and writes frames of 10 rows.
 MAIN = """

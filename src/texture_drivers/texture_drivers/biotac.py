@@ -181,7 +181,7 @@ FINGERS = 5  # most that one board holds
 # --------------------
 # A microcontroller that samples a BioTac board over SPI and streams the replies over a serial line.
 #
-# Our own design, for whoever has no Cheetah adapter: see docs/sensors/biotac.md. It sends without being asked, framed
+# Our own design, for whoever has no Cheetah adapter: see docs/sensors.md. It sends without being asked, framed
 # as
 # in `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
 

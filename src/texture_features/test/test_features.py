@@ -1,6 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -436,9 +434,3 @@ def test_relative_changes_do_not_know_which_level_a_taxel_has():
         FEATURES['relative_changes']()(WindowBatch(samples + x, SPATIAL_RATE_HZ)) for x in ([90, 10], [10, 90])
     )
     np.testing.assert_allclose(one, other, rtol=1e-2)  # the same load in all
-
-
-def test_the_table_of_the_readme_names_the_features_of_the_catalogue_and_no_others():
-    table = (Path(__file__).parent.parent / 'README.md').read_text().split('| feature |')[1].split('\n## ')[0]
-    first_cells = re.findall(r'^\| (`[^|]+) \|', table, re.MULTILINE)
-    assert sorted(name for cell in first_cells for name in re.findall(r'`(\w+)`', cell)) == sorted(FEATURES)

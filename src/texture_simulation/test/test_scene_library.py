@@ -8,27 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from texture_core.config import find_file, markdown_table, shipped
-from texture_simulation.effects import EFFECTS
-from texture_simulation.emulator import EmulatorParams
-from texture_simulation.friction import FRICTIONS
+from texture_core.config import find_file, shipped
 from texture_simulation.scene import load_scene
 from texture_simulation.sensor_models import SENSORS
 from texture_simulation.surfaces import KINDS
 
-PACKAGE = Path(__file__).resolve().parents[1]
-README = (PACKAGE / 'README.md').read_text(encoding='utf-8')
 FILES = sorted(shipped('texture_simulation', 'config/scenes').values())
 SENSOR_OF = {
     'ets_linear': 'tsf85_3x4', 'ets_circular': 'tsf85_3x4', 'ets_fine': 'tsf85_3x4', 'roughness': 'tsf85',
     'jamali': 'daq', 'kaboli': 'biotac', 'kaboli_shapes': 'biotac', 'hu': 'pvdf',
 }  # fmt: skip
-
-
-def test_the_readme_reports_every_parameter_effect_and_kind_of_surface() -> None:
-    assert markdown_table(EmulatorParams) in README
-    assert all(f'| `{name}` |' in README for name in (*EFFECTS, *KINDS, *FRICTIONS))
-    assert all(f'`{path.stem}`' in README for path in FILES)
 
 
 @pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)

@@ -66,7 +66,7 @@ HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
 
 
 class InHandArm:
-    """Hold from `connect` on, move the sliding fingers alike; see `texture_exploration.arms.arm.Arm`.
+    """A Dynamixel hand: hold from `connect` on, move the sliding fingers alike; see `texture_exploration.arms.arm.Arm`.
 
     The state is the mean of the sliding fingers. A holding finger that presses with less than half of the wanted force
     is a fault.

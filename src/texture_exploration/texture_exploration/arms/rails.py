@@ -100,7 +100,7 @@ class RailsParams(CommandLimits):
 
 
 class RailsArm:
-    """The rails as an arm; see `texture_exploration.arms.arm.Arm`."""
+    """Two rails and a pressing motor behind a microcontroller; see `texture_exploration.arms.arm.Arm`."""
 
     Params = RailsParams
 

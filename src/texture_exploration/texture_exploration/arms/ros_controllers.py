@@ -559,7 +559,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
 
 
 class RosControllersArm:
-    """The arm as the explorer uses it; see `texture_exploration.arms.arm.Arm`.
+    """An arm that ROS drives by a Cartesian velocity controller; see `texture_exploration.arms.arm.Arm`.
 
     Zero velocity is commanded on every way out: a stop, a fault, a command that is too old, `close`, and by a process
     of its own if this one is killed.

@@ -740,7 +740,7 @@ UNSTEADY = (
 
 
 class UrArm:
-    """The arm as the explorer uses it. Nothing here waits for the controller longer than it says.
+    """A Universal Robots e-Series through ur-rtde. Nothing here waits for the controller longer than it says.
 
     Parameters
     ----------

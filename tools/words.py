@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Count pages and words written by hand: `python tools/words.py`. Code, comments and generated pages do not count."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = ('README.md', 'CONTRIBUTING.md', 'docs/*.md', 'docs/appendix/*.md', 'docs/robots/*.md', 'src/*/README.md')
+LEFT_OUT = re.compile(r'<!--.*?-->|^```.*?^```|^    .*?$', re.DOTALL | re.MULTILINE)
+
+
+def words(page: Path) -> int:
+    """Return the number of words of a page."""
+    return len(LEFT_OUT.sub('', page.read_text(encoding='utf-8')).split())
+
+
+if __name__ == '__main__':
+    counts = {page.relative_to(ROOT): words(page) for pattern in PAGES for page in sorted(ROOT.glob(pattern))}
+    for path, count in sorted(counts.items(), key=lambda item: item[1]):
+        print(f'{count:6d} {path}')
+    print(f'{sum(counts.values()):6d} words on {len(counts)} pages')
