@@ -95,6 +95,8 @@ def _plan(speed_m_s: float, force_n: float, slide_s: float, fingers: int = 1) ->
 SOURCES = {
     'twelve_textures': Source(
         (
+            'any-place',
+            'any-place-and-taxels',
             'default',
             'fast',
             'onset',

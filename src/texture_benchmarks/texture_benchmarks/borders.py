@@ -34,8 +34,9 @@ PEERS: Mapping[str, Mapping[str, Any]] = {
     'SVC on log bands': {'svm_rbf': {'c': 10.0}},
     '1-NN on log bands': {'sklearn': {'estimator': 'sklearn.neighbors:KNeighborsClassifier', 'n_neighbors': 1}},
 }
-VIBRATION = ('default', 'fast', 'vibration-and-taxels', *PEERS)
-TAXELS = ('taxels', 'fast', *PEERS)  # `fast` and the peers read the taxels as channels of a vibration
+PLACES = ('any-place', 'any-place-and-taxels')
+VIBRATION = (*PLACES, 'default', 'fast', 'vibration-and-taxels', *PEERS)
+TAXELS = ('taxels-any-day', 'taxels', 'fast', *PEERS)  # `fast` and the peers read the taxels as channels of a vibration
 ARRAY = ('any-speed', 'taxels-signal', *PEERS)
 SOUND = ('default', *PEERS)
 FABRICS, DATES = ('BlackPolymer', 'BlackWool', 'GreenVelvet', 'NavyDenim'), ('2021-05-27', '2021-05-31', '2021-06-01')
@@ -114,7 +115,7 @@ def _biotac20(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     for place in ('1/4', '2/4', '3/4', '4/4'):
         trained = quarters.select(EARLIER, where=_having('place', place, but=True))
         other = {PLACE: across_places(quarters.select(LATER), trained)[PLACE]}
-        yield BorderTrial('biotac20 quarters', ('default', 'vibration-and-taxels', 'SVC on log bands'), trained, other)
+        yield BorderTrial('biotac20 quarters', (*PLACES, 'default', 'vibration-and-taxels', *PEERS), trained, other)
 
 
 def _ntp21(options: BenchmarkOptions) -> Iterator[BorderTrial]:

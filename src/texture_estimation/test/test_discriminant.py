@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from texture_core.config import folder
-from texture_estimation.decisions import ONE_PLACE
+from texture_estimation.decisions import FLOOR_WINDOWS, ONE_PLACE, fit_confidence_floor
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.learners.discriminant import Discriminant
+from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant, linear_discriminant
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.training import held_out_parts, train
+from texture_estimation.training import held_out_parts, in_places, train
 from texture_features.examples import SlideConditions
 
 RELEASED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
@@ -136,3 +136,97 @@ def test_the_load_is_no_part_of_the_discriminant_and_a_load_never_seen_is_outsid
     assert final.label == 'cork'
     assert not final.known
     assert 'signal level 20 of signal_static, trained 300' in final.message
+
+
+def of_forces(rng, slides=8, windows=12):
+    """Return windows whose one feature tells cork from felt by its sign, which turns where the force is above 2 N."""
+    forces = np.tile(np.where(np.arange(windows) < windows // 2, 1.0, 4.0), 2 * slides)
+    forces = forces * np.exp(0.02 * rng.standard_normal(len(forces)))
+    codes = np.repeat([0, 1], slides * windows)
+    sign = np.where(codes == 0, 1.0, -1.0) * np.where(forces > 2.0, -1.0, 1.0)
+    values = np.stack([3.0 * sign + rng.standard_normal(len(codes)), forces], axis=1)
+    return values, codes, np.arange(len(codes)) // windows
+
+
+def test_what_turns_with_the_force_is_judged_by_what_was_trained_near_it():
+    names, labels = ('signal/mean/pac', 'signal/force'), ('cork', 'felt')
+    values, codes, groups = of_forces(np.random.default_rng(0))
+    learner = ForceDiscriminant().of_examples(names, labels)
+    scores = learner.predictor(learner.fit(values, codes, groups).parameters)(values)
+    assert (scores.argmax(axis=1) == codes).mean() > 0.98  # Φ(3) = 0.9987
+    alone = Discriminant().fit(values, codes, groups)  # both signs for both labels
+    assert (Discriminant.predictor(alone.parameters)(values).argmax(axis=1) == codes).mean() < 0.6
+
+
+def test_a_window_far_from_all_trained_forces_says_little():
+    values, codes, groups = of_forces(np.random.default_rng(0))
+    learner = ForceDiscriminant().of_examples(('signal/mean/pac', 'signal/force'), ('cork', 'felt'))
+    predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
+    within, above = predictor(np.array([3.0, 4.0])), predictor(np.array([3.0, 40.0]))
+    assert np.ptp(within) > 1.0
+    assert np.ptp(above) < 1e-6 * np.ptp(within)
+
+
+def test_the_force_is_no_part_of_the_discriminants_and_without_it_there_is_one():
+    values, codes, groups = of_forces(np.random.default_rng(0))
+    fitted = ForceDiscriminant().of_examples(('signal/mean/pac', 'signal/force'), ('cork', 'felt'))
+    assert not fitted.fit(values, codes, groups).parameters['weights'][:, 1].any()
+    plain = codes[:, None] + np.random.default_rng(1).standard_normal((len(codes), 1))
+    blind = ForceDiscriminant(stretch_weight=0.0).of_examples(('signal/mean/pac',), ('cork', 'felt'))
+    scores = blind.predictor(blind.fit(plain, codes, groups).parameters)(plain)
+    alone = Discriminant().fit(plain, codes, groups)
+    assert scores == pytest.approx(Discriminant.predictor(alone.parameters)(plain))
+
+
+def test_one_window_is_judged_as_among_many():
+    values, codes, groups = of_forces(np.random.default_rng(1))
+    learner = ForceDiscriminant().of_examples(('signal/mean/pac', 'signal/force'), ('cork', 'felt'))
+    predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
+    assert np.stack([predictor(row) for row in values[:20]]) == pytest.approx(predictor(values[:20]))
+
+
+def test_a_difference_between_places_counts_less_the_more_weight_its_covariance_has():
+    noise = np.random.default_rng(2).standard_normal((1000, 2))
+    codes, stretches = np.repeat([0, 1], 4000), np.tile(np.repeat([0, 1], 2000), 2)
+    X = np.tile(np.concatenate([noise, -noise]), (4, 1)) + np.stack(
+        [codes, codes + 3.0 * stretches], axis=1
+    )  # the second one drifts
+    share = []
+    for weight in (0.0, 10.0):
+        layer, _ = linear_discriminant(X, codes, 2, 0.0, stretches=stretches, stretch_weight=weight)
+        share.append(layer[1, 1] / layer[0, 1])
+    # of class means 1 apart, variance 1 and 1 + 2.25 (1 + weight): the ratio of the weights is that of the variances
+    assert share == pytest.approx([1 / 3.25, 1 / 25.75], rel=0.15)
+
+
+def test_one_track_is_cut_into_parts_that_are_held_out_as_places(make_examples):
+    examples = make_examples(slides=8, windows=12)
+    cut = in_places(examples, 3)
+    names = np.unique(cut.groups).tolist()
+    assert names[:3] == ['cork/0 part 1/3', 'cork/0 part 2/3', 'cork/0 part 3/3']
+    # windows of 0.5 s every 0.25 s: the last one of a part reaches into the next
+    assert [int((cut.groups == name).sum()) for name in names[:3]] == [3, 3, 4]
+    assert held_out_parts(cut).tolist() == [int(name[-3]) - 1 for name in names]
+    assert in_places(of_days(examples), 3).groups.tolist() == of_days(examples).groups.tolist()
+
+
+def test_a_training_over_one_track_stays_one_in_the_card(make_examples):
+    examples = make_examples(slides=8, windows=12)
+    parts = train(replace(RECIPE, training=replace(RECIPE.training, held_out_places=3)), examples)
+    assert parts.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
+    assert parts.domain.slides['cork'] == 8
+    assert parts.training['slides'] == parts.error_bound.slides == 32
+    assert 'sessions held out in turn, 3 parts' in parts.training['calibration']
+
+
+def test_the_confidence_floor_keeps_all_but_few_wrong_labels_unknown():
+    confidences = [np.array([0.6, 0.7, 0.99]), np.array([0.5, 0.8, 0.98])]
+    lengths = [np.array([1.0, 2.0, 10.0])] * 2
+    wrong = [np.array([0.9, 0.8] + [0.0] * 18)] * len(FLOOR_WINDOWS)
+    strict = fit_confidence_floor(confidences, lengths, 0.0, wrong, 0.0)
+    assert not strict.reached(0.9, effective_windows=3.0)
+    assert strict.reached(0.91, effective_windows=3.0)
+    one_of_20 = fit_confidence_floor(confidences, lengths, 0.0, wrong, 0.05)
+    assert not one_of_20.reached(0.8, effective_windows=3.0)
+    assert one_of_20.reached(0.81, effective_windows=3.0)
+    assert fit_confidence_floor(confidences, lengths, 0.0).log_odds == ()

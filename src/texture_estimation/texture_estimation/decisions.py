@@ -277,9 +277,13 @@ class ConfidenceFloor:
 
 
 def fit_confidence_floor(
-    confidences: Sequence[Array], effective_window_counts: Sequence[Array], rate: float
+    confidences: Sequence[Array],
+    effective_window_counts: Sequence[Array],
+    rate: float,
+    errors: Sequence[Array] = (),
+    max_error_rate: float = 1.0,
 ) -> ConfidenceFloor:
-    """Return the limit that a fraction of the slides over known surfaces stays below.
+    """Return the limit that a fraction of the slides over known surfaces stays below, and all but few wrong labels.
 
     Parameters
     ----------
@@ -289,20 +293,29 @@ def fit_confidence_floor(
         Length of the evidence after each window.
     rate
         Fraction of the slides that may lie below the limit at each length of evidence.
+    errors : of FLOOR_WINDOWS (n_slides,)
+        Confidence of each undisturbed held-out slide at these lengths where its label is wrong, 0 where it is right.
+    max_error_rate
+        Fraction of the slides whose label may be wrong above the limit.
 
     Returns
     -------
     ConfidenceFloor
-        Without a limit if the slides are too few for the fraction.
+        Without a limit if the slides are too few for both fractions.
     """
     rank = int((len(confidences) + 1) * rate)
-    if not rank:
+    if not rank and not len(errors):
         return ConfidenceFloor()
     log_odds = []
-    for length in FLOOR_WINDOWS:
-        places = [int(np.abs(own - length).argmin()) for own in effective_window_counts]
-        found = np.sort([own[place] for own, place in zip(confidences, places, strict=True)])
-        limit = min(float(found[rank - 1]), LARGEST)
+    for number, length in enumerate(FLOOR_WINDOWS):
+        limit = 0.0
+        if rank:
+            places = [int(np.abs(own - length).argmin()) for own in effective_window_counts]
+            limit = np.sort([own[place] for own, place in zip(confidences, places, strict=True)])[rank - 1]
+        if len(errors):
+            wrong = np.sort(errors[number])[::-1]
+            limit = max(limit, math.nextafter(wrong[min(int(len(wrong) * max_error_rate), len(wrong) - 1)], 1.0))
+        limit = min(max(float(limit), 1.0 - LARGEST), LARGEST)
         log_odds.append(math.log(limit / (1.0 - limit)))
     return ConfidenceFloor(FLOOR_WINDOWS, tuple(log_odds))
 

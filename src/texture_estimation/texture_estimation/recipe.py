@@ -136,6 +136,21 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=0.5,
     )
+    max_known_error_rate: float = param(
+        1.0,
+        'Largest fraction of held-out slides that may be known under a wrong label, at each length of a slide: the '
+        'confidence below which a slide is unknown rises until it is kept; 1: no limit. It needs a '
+        'false_rejection_rate above 0.',
+        low=0.0,
+        high=1.0,
+    )
+    held_out_places: int = param(
+        1,
+        'Sets into how many parts of the track slides are cut that were all made over one track: what is fitted to '
+        'held-out slides is fitted to held-out parts of the track, as places that the training does not have; 1: none.',
+        low=1,
+        high=20,
+    )
     novelty_scores: list[str] = param(  # noqa: RUF009 – it gives a field
         list(SCORES),
         'Names the scores that are summed to the novelty score: distances to training slides by the features, by the '

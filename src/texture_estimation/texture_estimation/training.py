@@ -18,6 +18,7 @@ from texture_core.types import AnyArray, Array
 from texture_estimation import decisions as prediction_sets
 from texture_estimation import decisions as stopping_rule
 from texture_estimation.decisions import (
+    FLOOR_WINDOWS,
     HIDDEN,
     NOVELTY_WINDOWS,
     SCORES,
@@ -32,6 +33,7 @@ from texture_estimation.decisions import (
 )
 from texture_estimation.evidence_rules import EvidenceRule, deciding_rows, running_means
 from texture_estimation.gaussians import TrainingExamples
+from texture_estimation.learners.discriminant import FORCE, ForceDiscriminant
 from texture_estimation.learners.learner import (
     Codes,
     Fitted,
@@ -181,6 +183,32 @@ def held_out_parts(examples: LabelledFeatures) -> Codes | None:
     return parts
 
 
+def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
+    """Return slides over one track cut into so many parts of it, each a slide at a place of its own.
+
+    Windows that lie in two parts are left out. Where the slides are of several places, sessions or fingers already, and
+    where a slide has too few windows, they stay as they are.
+    """
+    if count < 2 or held_out_parts(examples) is not None:
+        return examples
+    spanned = math.ceil(examples.window_s / examples.hop_s) - 1  # windows after one that overlap it
+    groups, kept = examples.groups.astype(object), np.ones(len(examples.groups), dtype=bool)
+    conditions = dict(examples.conditions)
+    for slide in np.unique(examples.groups).tolist():
+        rows = np.flatnonzero(examples.groups == slide)
+        if len(rows) < count * (spanned + 1):
+            return examples
+        parts = np.arange(len(rows)) * count // len(rows)
+        for number in range(count):
+            name = f'{slide} part {number + 1}/{count}'
+            own = rows[parts == number]
+            groups[own] = name
+            kept[own[len(own) - spanned :] if number < count - 1 else []] = False
+            made = examples.conditions.get(slide, SlideConditions())
+            conditions[name] = replace(made, place=f'{number + 1}/{count}')
+    return replace(examples, groups=groups.astype(np.str_), conditions=conditions).take(kept)
+
+
 def _ranks(names: Any, rows: Codes) -> Codes:
     """Return 0, 1, … for names in the order of their first rows."""
     found, numbers = np.unique(names, return_inverse=True)
@@ -320,7 +348,9 @@ def fit_novelty(
     ]
     disturbed = _disturbed_slides(examples, names, classes[first])
     copies = _reference_copies(examples, names, classes[first], gain_range)
-    compared = np.array([name.rsplit('/', 1)[-1] != temporal.SLIDE_ONSET for name in examples.names], dtype=np.float64)
+    # what says when and how a window was made, and not what of: not compared
+    apart = {temporal.SLIDE_ONSET, FORCE} if isinstance(learner, ForceDiscriminant) else {temporal.SLIDE_ONSET}
+    compared = np.array([name.rsplit('/', 1)[-1] not in apart for name in examples.names], dtype=np.float64)
     traces: list[SlideTrace] = []
     for held_out, predictor in _folds(learner, fitted, classes, groups, held_out_parts(examples)):
         distances = _fit_distances(
@@ -595,7 +625,7 @@ def fit_open_set(
         return rule, None, ConfidenceFloor()
     detector, traces = found
     courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
-    floor = _fit_floor(courses, decisions.low_confidence_rejection_rate)
+    floor = _fit_floor(courses, decisions.low_confidence_rejection_rate, decisions.max_known_error_rate)
     courses = [_with_floor(course, floor) for course in courses]
     rule = stopping_rule.fit_open_set_rule(
         courses, decisions.max_error_rate, decisions.max_disturbed_error_rate, decisions.early_novelty_score
@@ -619,11 +649,28 @@ def _course(
     )
 
 
-def _fit_floor(courses: Sequence[stopping_rule.SlideCourse], rate: float) -> ConfidenceFloor:
-    """Return the smallest confidence of undisturbed slides that end with the right label, but for this fraction."""
-    right = [course for course in courses if course.right[-1] and not course.disturbance]
+def _fit_floor(courses: Sequence[stopping_rule.SlideCourse], rate: float, max_error_rate: float) -> ConfidenceFloor:
+    """Return the smallest confidence of undisturbed slides that end with the right label, but for this fraction.
+
+    It rises until no more than `max_error_rate` of the undisturbed slides are known under a wrong label.
+    """
+    plain = [course for course in courses if not course.disturbance]
+    right = [course for course in plain if course.right[-1]]
+    errors = []
+    if max_error_rate < 1.0:
+        for length in FLOOR_WINDOWS:
+            places = [int(np.abs(course.effective_windows - length).argmin()) for course in plain]
+            wrong = [
+                course.confidences[place] if course.known[place] and not course.right[place] else 0.0
+                for course, place in zip(plain, places, strict=True)
+            ]
+            errors.append(np.array(wrong))
     return fit_confidence_floor(
-        [course.confidences for course in right], [course.effective_windows for course in right], rate
+        [course.confidences for course in right],
+        [course.effective_windows for course in right],
+        rate,
+        errors,
+        max_error_rate,
     )
 
 
@@ -710,8 +757,9 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         If there are no examples, only one label, or a value that is not finite.
     """
     _check(examples)
+    made, examples = examples, in_places(examples, recipe.training.held_out_places)
     labels, codes = np.unique(examples.labels, return_inverse=True)
-    slides, groups = np.unique(examples.groups, return_inverse=True)
+    groups = np.unique(examples.groups, return_inverse=True)[1]
     trained = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
     fitted = fit_learner(trained, examples, codes, groups)
     overlap = min(examples.hop_s / examples.window_s, 1.0)
@@ -731,18 +779,18 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         prediction_sets=fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
         novelty_detector=novelty_detector,
         confidence_floor=floor,
-        next_touch_model=_fit_next_touch_model(examples),
+        next_touch_model=_fit_next_touch_model(made),
         training={
             'windows': len(codes),
-            'slides': len(slides),
+            'slides': len(np.unique(made.groups)),
             'window_s': examples.window_s,
             'hop_s': examples.hop_s,
             'calibration': fitted.note,
             'held_out_window_accuracy': _held_out_accuracy(fitted, codes),
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
-        domain=_domain(examples, recipe.training),
-        error_bound=ErrorBound(len(slides_held_out), decisions.max_error_rate),
+        domain=_domain(made, recipe.training),
+        error_bound=ErrorBound(min(len(slides_held_out), len(np.unique(made.groups))), decisions.max_error_rate),
     )
 
 

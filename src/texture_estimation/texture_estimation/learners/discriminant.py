@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, FoldFit, assign_folds
+from texture_estimation.learners.learner import Codes, Fitted, FoldFit, Predictor, assign_folds
 from texture_estimation.numerics import log_loss, log_softmax
 
 # --------------------
@@ -21,7 +21,16 @@ from texture_estimation.numerics import log_loss, log_softmax
 CONSTANT = 1e-12
 
 
-def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> tuple[Array, Array]:
+def linear_discriminant(
+    X: Array,
+    y: Codes,
+    n_labels: int,
+    shrinkage: float,
+    *,
+    weights: Array | None = None,
+    stretches: Codes | None = None,
+    stretch_weight: float = 0.0,
+) -> tuple[Array, Array]:
     """Return the layer that gives the log-probabilities of Gaussian classes with one covariance, up to a constant.
 
     Parameters
@@ -34,6 +43,13 @@ def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> 
         Number of labels, which are equally probable before.
     shrinkage
         0 for the covariance within classes as it is, 1 for its diagonal alone.
+    weights : (n,) or None
+        How much each example counts, above 0; all the same if None.
+    stretches : (n,) or None
+        Number of the stretch of the path, from 0, at which each example was made.
+    stretch_weight
+        How much more the differences between the stretches of one label count in the covariance than what varies
+        within a stretch: these are differences between places, which a slide elsewhere has in another way.
 
     Returns
     -------
@@ -42,7 +58,8 @@ def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> 
     (n_labels,)
         Offsets.
 
-    Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis".
+    Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis"; Hatch et al. 2006, "Within-class covariance
+    normalization for SVM-based speaker recognition", for the differences between places.
 
     Examples
     --------
@@ -55,19 +72,32 @@ def linear_discriminant(X: Array, y: Codes, n_labels: int, shrinkage: float) -> 
     nothing = np.zeros((X.shape[1], n_labels)), np.zeros(n_labels)
     if np.bincount(y, minlength=n_labels).min() < 2:
         return nothing
-    means = np.stack([X[y == code].mean(axis=0) for code in range(n_labels)])
+    counted = np.ones(len(X)) if weights is None else weights
+    counted = counted / np.bincount(y, counted, n_labels)[y]  # in each class they add up to 1
+    means = _sums(X, y, counted, n_labels)
     centre = means.mean(axis=0)
     rest = X - means[y]
-    scale = np.sqrt(np.mean(rest * rest, axis=0))
+    shares = counted / n_labels
+    covariance = (rest.T * shares) @ rest
+    if stretches is not None and stretch_weight:
+        places = np.unique(np.stack([y, stretches]), axis=1, return_inverse=True)[1].reshape(-1)
+        own = np.bincount(places, shares)
+        between = _sums(rest, places, shares, len(own)) / own[:, None]
+        covariance += stretch_weight * (between.T * own) @ between
+    scale = np.sqrt(np.diag(covariance))
     scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
-    rest /= scale
-    correlations = (1.0 - shrinkage) * (rest.T @ rest) / len(rest)
+    correlations = (1.0 - shrinkage) * covariance / np.outer(scale, scale)
     correlations[np.diag_indices_from(correlations)] += shrinkage + CONSTANT
     relative = (means - centre) / scale
-    weights = np.linalg.solve(correlations, relative.T)
-    offsets = -0.5 * np.einsum('cf,fc->c', relative, weights)
-    weights /= scale[:, None]
-    return weights, offsets - centre @ weights
+    layer = np.linalg.solve(correlations, relative.T)
+    offsets = -0.5 * np.einsum('cf,fc->c', relative, layer)
+    layer /= scale[:, None]
+    return layer, offsets - centre @ layer
+
+
+def _sums(X: Array, y: Codes, weights: Array, n_labels: int) -> Array:
+    """Return the weighted sum of the examples of each label, (n_labels, n_features)."""
+    return np.stack([weights[y == code] @ X[y == code] for code in range(n_labels)])
 
 
 # --------------------
@@ -144,7 +174,7 @@ class Discriminant:
             Number of the label of each, from 0, without gaps.
         groups : (n,)
             Number of the slide of each.
-        parts : (n_groups,) or None
+        parts : (ngroups,) or None
             Part in which the slide of each number is held out; by slides if None.
 
         Returns
@@ -157,30 +187,218 @@ class Discriminant:
         n_labels = int(y.max()) + 1
         split = assign_folds(y, groups, self.folds, parts)
         if split is None:
-            return Fitted(self._fit(X, y, n_labels, 1.0), None, 'not calibrated, as a label has a single window')
+            return Fitted(
+                self._fit(X, y, groups, n_labels, 1.0), None, 'not calibrated, as a label has a single window'
+            )
         folds_of, note = split
         scores = np.empty((len(y), n_labels))
         for part in np.unique(folds_of):
             held = folds_of == part
-            scores[held] = self.predictor(self._fit(X[~held], y[~held], n_labels, 1.0))(X[held])
+            scores[held] = self.predictor(self._fit(X[~held], y[~held], groups[~held], n_labels, 1.0))(X[held])
         best = minimize_scalar(
             lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), y), bounds=(-2.0, 8.0), method='bounded'
         )
         temperature = math.exp(best.x)
         folds = [
-            FoldFit(np.unique(groups[held]), self._fit(X[~held], y[~held], n_labels, temperature))
+            FoldFit(np.unique(groups[held]), self._fit(X[~held], y[~held], groups[~held], n_labels, temperature))
             for held in (folds_of == part for part in np.unique(folds_of))
         ]
-        return Fitted(self._fit(X, y, n_labels, temperature), log_softmax(scores / temperature), note, folds)
+        return Fitted(self._fit(X, y, groups, n_labels, temperature), log_softmax(scores / temperature), note, folds)
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> DiscriminantPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
         return DiscriminantPredictor(
             np.asarray(parameters['weights'], dtype=np.float64, order='F'),
             np.asarray(parameters['offsets'], dtype=np.float64),
         )
 
-    def _fit(self, X: Array, y: Codes, n_labels: int, temperature: float) -> dict[str, Array]:
+    def _fit(self, X: Array, y: Codes, _: Codes, n_labels: int, temperature: float) -> dict[str, Array]:
         weights, offsets = linear_discriminant(X, y, n_labels, self.shrinkage)
         return {'weights': weights / temperature, 'offsets': offsets / temperature}
+
+
+# --------------------
+# One discriminant for each range of forces: the spectrum that a surface excites changes with the force of the finger.
+
+FORCE = 'force'  # ends the name of the feature
+UNBOUND = -1
+STRETCHES = 6  # of a slide
+ELSEWHERE = 0.02  # of the weight of a window at the middle of a range, for those far from it: no class is without any
+OUTERMOST = 0.05  # of the windows lie below the trained range, and as many above it
+
+
+@dataclass(frozen=True, eq=False)
+class ForceDiscriminantPredictor:
+    """The layer of the nearest force; what lies outside the trained forces counts less.
+
+    Parameters
+    ----------
+    weights : (n_ranges, n_features, n_labels)
+    offsets : (n_ranges, n_labels)
+    log_forces : (n_ranges,)
+        Middle of each range, logarithm of N.
+    trained : (2,)
+        Lowest and highest trained force, logarithms.
+    reach
+        Difference of the logarithms beyond these by which a window counts 1 / e.
+    column
+        Number of the feature that is the force; UNBOUND if none is.
+
+    Examples
+    --------
+    >>> layers = np.array([[[1.0, -1.0], [0.0, 0.0]], [[-1.0, 1.0], [0.0, 0.0]]])  # what 1 N and 10 N say
+    >>> log_forces = np.log([1.0, 10.0])
+    >>> predictor = ForceDiscriminantPredictor(layers, np.zeros((2, 2)), log_forces, log_forces, 0.1, column=1)
+    >>> predictor(np.array([[2.0, 1.0], [2.0, 9.0], [2.0, 100.0]])).round(6).tolist()
+    [[2.0, -2.0], [-2.0, 2.0], [-0.0, 0.0]]
+    """
+
+    weights: Array
+    offsets: Array
+    log_forces: Array
+    trained: Array
+    reach: float
+    column: int
+
+    def __call__(self, X: Array) -> Array:
+        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
+        force = _log_force(X, self.column)
+        near = np.abs(force[..., None] - self.log_forces).argmin(axis=-1)
+        scores = np.empty((*near.shape, self.offsets.shape[-1]))
+        for number in np.unique(near).tolist():
+            rows = near == number
+            scores[rows] = X[rows] @ self.weights[number] + self.offsets[number]
+        beyond = np.maximum(np.maximum(self.trained[0] - force, force - self.trained[1]), 0.0)
+        scores *= np.exp(-beyond / self.reach)[..., None]
+        return scores
+
+
+def _log_force(X: Array, column: int) -> Array:
+    """Return the logarithm of the force of each window, (...); the same for all where none is a feature."""
+    if column == UNBOUND:
+        return np.zeros(X.shape[:-1])
+    forces: Array = np.log(np.maximum(X[..., column], CONSTANT))
+    return forces
+
+
+@dataclass(frozen=True)
+class ForceDiscriminant(Discriminant):
+    """A shrunk discriminant for each range of forces, and less weight for windows outside the trained forces.
+
+    Amplitude and spectrum of a vibration change with the force, and on a surface that is not level the force changes
+    from place to place. A window is therefore judged by what was trained near its force, and one that was made far from
+    any trained force says little. Differences between the places along a slide count more in the covariance than what
+    varies at one place. Needs the feature `force`; without it there is one discriminant for all.
+
+    Source: Fisher 1936; Friedman 1989; Hatch et al. 2006; Cleveland & Devlin 1988, "Locally weighted regression", for
+    the weights around a force.
+
+    Examples
+    --------
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 2))
+    >>> values[:, 1] = np.tile([1.0, 1.2, 1.4, 1.6, 1.8], 8)
+    >>> learner = ForceDiscriminant().of_examples(['signal/mean/pac', 'signal/force'], ['cork', 'felt'])
+    >>> fitted = learner.fit(values, codes, groups)
+    >>> bool((learner.predictor(fitted.parameters)(values).argmax(axis=1) == codes).all())
+    True
+    """
+
+    ranges: int = param(
+        4,
+        'Sets the number of ranges of force; more follow the force more closely and need more windows.',
+        low=1,
+        high=32,
+    )
+    width: float = param(
+        0.1,
+        'Sets how far from the middle of a range windows train its discriminant, standard deviation of the logarithm '
+        'of the force; a larger one makes the ranges more alike.',
+        low=0.01,
+        high=10.0,
+    )
+    reach: float = param(
+        0.1,
+        'Sets how fast a window counts less outside the trained forces: 1 / e where the logarithm of the force is so '
+        'far outside; a smaller one trusts the trained forces alone.',
+        low=0.01,
+        high=1e6,
+    )
+    stretch_weight: float = param(
+        5.0,
+        'Sets how much differences between places along a slide add to the covariance; a larger one relies less on '
+        'what changes from place to place.',
+        low=0.0,
+        high=1e3,
+    )
+    column: int = param(
+        UNBOUND, 'Number of the feature `force`; set by the training from the names of the features.', low=UNBOUND
+    )
+
+    def of_examples(self, names: Sequence[str], _labels: Sequence[str]) -> ForceDiscriminant:
+        """Return the learner for examples with these features."""
+        found = [number for number, name in enumerate(names) if name.rsplit('/', 1)[-1] == FORCE]
+        return replace(self, column=found[0] if found else UNBOUND)
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
+        """Return the predictor made from the stored parameters."""
+        return ForceDiscriminantPredictor(
+            *(
+                np.asarray(parameters[name], dtype=np.float64)
+                for name in ('weights', 'offsets', 'log_forces', 'trained')
+            ),
+            reach=float(parameters['reach']),
+            column=int(parameters['column']),
+        )
+
+    def _fit(self, X: Array, y: Codes, groups: Codes, n_labels: int, temperature: float) -> dict[str, Array]:
+        forces = _log_force(X, self.column)
+        middles = np.quantile(forces, (np.arange(self.ranges) + 0.5) / self.ranges)
+        blind = X.copy()
+        if self.column != UNBOUND:
+            blind[:, self.column] = 0.0  # what is constant tells nothing
+        stretches = stretches_of(groups, STRETCHES)
+        layers = [
+            linear_discriminant(
+                blind,
+                y,
+                n_labels,
+                self.shrinkage,
+                weights=np.exp(-0.5 * ((forces - middle) / self.width) ** 2) + ELSEWHERE,
+                stretches=stretches,
+                stretch_weight=self.stretch_weight,
+            )
+            for middle in middles
+        ]
+        return {
+            'weights': np.stack([weights for weights, _ in layers]) / temperature,
+            'offsets': np.stack([offsets for _, offsets in layers]) / temperature,
+            'log_forces': middles,
+            'trained': np.quantile(forces, [OUTERMOST, 1.0 - OUTERMOST]),
+            'reach': np.array(self.reach),
+            'column': np.array(self.column),
+        }
+
+
+def stretches_of(groups: Codes, count: int) -> Codes:
+    """Return the stretch of its slide in which each window lies, (n,), of `count` with as many windows each.
+
+    Parameters
+    ----------
+    groups : (n,)
+        Slide of each window; those of one slide in the order of time.
+    count
+        Number of stretches.
+
+    Examples
+    --------
+    >>> stretches_of(np.array([0, 0, 0, 0, 1, 1]), 2).tolist()
+    [0, 0, 1, 1, 0, 1]
+    """
+    found = np.zeros(len(groups), dtype=np.intp)
+    for group in np.unique(groups):
+        rows = np.flatnonzero(groups == group)
+        found[rows] = np.arange(len(rows)) * count // len(rows)
+    return found
