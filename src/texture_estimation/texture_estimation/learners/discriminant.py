@@ -345,10 +345,10 @@ class ForceDiscriminant(Discriminant):
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
         return ForceDiscriminantPredictor(
-            *(
-                np.asarray(parameters[name], dtype=np.float64)
-                for name in ('weights', 'offsets', 'log_forces', 'trained')
-            ),
+            weights=np.asarray(parameters['weights'], dtype=np.float64),
+            offsets=np.asarray(parameters['offsets'], dtype=np.float64),
+            log_forces=np.asarray(parameters['log_forces'], dtype=np.float64),
+            trained=np.asarray(parameters['trained'], dtype=np.float64),
             reach=float(parameters['reach']),
             column=int(parameters['column']),
         )
