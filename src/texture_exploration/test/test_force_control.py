@@ -97,8 +97,8 @@ def test_the_observer_sees_where_a_bend_leads():
 def test_a_finger_at_rest_is_pressed_on_no_faster_than_the_stiffest_base_allows():
     params = ForceLoopParams(loop_delay_s=0.008, max_stiffness_n_m=20000.0)
     loop, height_m, force_n = ForceLoop(params, PERIOD_S), 0.0, 0.05
-    for _ in range(50):
-        contact = ContactState(height_m, 0.0, force_n)
+    for period in range(100):
+        contact = ContactState(round(period * PERIOD_S * 1e9), height_m, 0.0, force_n)
         loop.observe(contact)
         speed_m_s = loop.velocity_m_s(1.0, contact, 0.0, PERIOD_S)
         height_m, force_n = height_m + speed_m_s * PERIOD_S, force_n - 200.0 * speed_m_s * PERIOD_S

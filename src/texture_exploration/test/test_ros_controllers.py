@@ -50,8 +50,11 @@ class Robot:
         x, y, z = self.arm.position.tolist()
         return PoseSample(self.now_ns, self.frames[0], (x, y, z), TOOL_DOWN) if self.pose_comes else None
 
-    def newest_force(self):
+    def measure(self):
         self.readings.append((self.now_ns, self.arm.reading_n().tolist()))
+
+    def newest_force(self):
+        self.measure()
         due_ns = self.now_ns - round(self.late_s * 1e9)
         while len(self.readings) > 1 and self.readings[1][0] <= due_ns:
             self.readings.pop(0)
@@ -111,9 +114,11 @@ class Robot:
         self.pass_time(0.4, ArmCommand())
         assert self.driven.zeroed
 
-    def explore(self, request, touch, meanwhile=lambda phase: None, home=None, on_slide=lambda: None):
+    def explore(
+        self, request, touch, meanwhile=lambda phase: None, home=None, on_slide=lambda: None, limits=LIMITS
+    ):
         home = home or self.driven.state().position
-        motion = MOTIONS[request.motion](request, home, touch, LIMITS)
+        motion = MOTIONS[request.motion](request, home, touch, limits)
         forces = {}
 
         def note(state):
@@ -126,8 +131,8 @@ class Robot:
             'one',
             request,
             arm=self.driven,
-            motion=LiftFirst(motion, touch, LIMITS, lambda: self.driven.zeroed),
-            limits=LIMITS,
+            motion=LiftFirst(motion, touch, limits, lambda: self.driven.zeroed),
+            limits=limits,
             clock=lambda: self.now_ns,
             on_state=note,
         )
@@ -543,6 +548,54 @@ def test_a_late_force_whose_stamps_are_new_is_told_by_the_first_touch(late_s, st
     assert re.search(r'the force rose for \d+ ms or more after the finger stood still', outcome.message)
     assert outcome.lifted
     assert max(map(max, forces.values())) < 5.0
+
+
+class BusyRobot(Robot):
+    """Both ends now and then get no computing time: nothing new comes, and steps are made up for in quick succession."""
+
+    def __init__(self, *args, seed, **given):
+        self.rng = np.random.default_rng(seed)
+        self.paused_ns = self.asleep_ns = 0
+        super().__init__(*args, **given)
+
+    def newest_force(self):
+        newest = super().newest_force()
+        return newest if self.now_ns >= self.paused_ns else None
+
+    def newest_pose(self):
+        return super().newest_pose() if self.now_ns >= self.paused_ns else None
+
+    def pass_time(self, time_s, command=None):
+        if command is not None:
+            self.driven.command(command)
+        for _ in range(round(time_s * 1e9 / PERIOD_NS)):
+            self.now_ns += PERIOD_NS
+            self.arm.advance(self.now_ns)
+            if self.rng.random() < 0.05:
+                self.paused_ns = self.now_ns + int(self.rng.uniform(5e6, 60e6))
+            if self.rng.random() < 0.05:
+                self.asleep_ns = self.now_ns + int(self.rng.uniform(5e6, 40e6))
+            if self.now_ns < self.asleep_ns:
+                self.measure()
+                continue
+            self.driven.step()
+            if self.now_ns < self.asleep_ns + 2 * PERIOD_NS:
+                self.now_ns += 100_000
+                self.driven.step()
+
+
+@pytest.mark.parametrize('seed', [0, 1, 2])
+def test_a_late_force_whose_stamps_are_new_is_told_also_on_a_busy_machine(seed):
+    emulated = TwistControllerParams(force_noise_n=0.002)
+    robot = BusyRobot(emulated, seed=seed, deadman_s=0.4, heartbeat_s=1.0)
+    robot.stamps_are_honest = False
+    robot.driven.connect()
+    robot.hold_up_force(0.5)
+    patient = replace(LIMITS, state_timeout_s=1.0, approach_timeout_s=60.0)
+    outcome, forces = robot.explore(PRESS, TouchParams(approach_stiffness_n_m=20000.0), limits=patient)
+    assert 'the force rose for' in outcome.message
+    assert outcome.lifted
+    assert max(map(max, forces.values())) < 3.0
 
 
 def test_an_explorer_that_was_stopped_in_the_slide_lifts_a_finger_whose_arm_obeys(noisy):

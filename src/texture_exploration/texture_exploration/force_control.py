@@ -104,6 +104,9 @@ class LagEstimate:
 class ForceLag:
     """Measure how late the force follows the finger: it is told to stop, and the force goes on rising for the lag.
 
+    Only measurements that are new count: on a busy machine the same one is seen in many periods, which is no force that
+    stands.
+
     Attributes
     ----------
     value_s : float
@@ -113,44 +116,50 @@ class ForceLag:
     def __init__(self, noise_n: float) -> None:
         self.value_s = math.nan
         self._noise_n = noise_n
-        self._samples: deque[tuple[float, float]] = deque(maxlen=2 * BLOCK)  # height and force
-        self._first_m = math.nan  # way of a block as it began to stop
+        self._samples: deque[tuple[float, float, float]] = deque(maxlen=2 * BLOCK)  # time, height and force
+        self._first_m_s = self._begin_s = math.nan  # speed as it began to stop
         self._stood_s = self._rose_s = math.nan
-        self._time_s = 0.0
+        self._calm = 0  # samples since the force rose
 
-    def update(self, height_m: float, force_n: float, dt_s: float) -> bool:
-        """Take a sample; return whether it is over: the force is constant, or it never stopped to rise.
+    def update(self, time_ns: int, height_m: float, force_n: float) -> bool:
+        """Take a sample; return whether it is over: the force stands, or it never stopped to rise.
 
         Parameters
         ----------
+        time_ns
+            When it was measured; a sample that is not newer than the last changes nothing.
         height_m, force_n
             As measured, while zero velocity is asked for.
-        dt_s
-            Time since the last call.
         """
-        self._time_s += dt_s
-        self._samples.append((height_m, force_n))
-        if self._time_s > 4 * LONGEST_S:
-            return True  # it does not stand still: nothing can be told
-        if len(self._samples) >= BLOCK and len({force_n for _, force_n in list(self._samples)[-BLOCK:]}) == 1:
-            return True  # without any noise: constant or frozen, which a movement shows
+        time_s = time_ns * 1e-9
+        if self._samples and time_s <= self._samples[-1][0]:
+            return False
+        self._samples.append((time_s, height_m, force_n))
+        if len(self._samples) == 1 and math.isnan(self._begin_s):
+            self._begin_s = time_s
         if len(self._samples) < 2 * BLOCK:
             return False
-        went_m, rose_n = (
-            (sum(row[of] for row in list(self._samples)[BLOCK:]) - sum(row[of] for row in list(self._samples)[:BLOCK]))
-            / BLOCK
-            for of in (0, 1)
+        samples = list(self._samples)
+        took_s, went_m, rose_n = (
+            (sum(row[of] for row in samples[BLOCK:]) - sum(row[of] for row in samples[:BLOCK])) / BLOCK
+            for of in range(3)
         )
-        if math.isnan(self._first_m):
-            self._first_m = max(abs(went_m), LAG_SLOWEST_M_S * dt_s)
+        self._calm += 1
         if rose_n > RISING * self._noise_n * math.sqrt(2.0 / BLOCK):
-            self._rose_s = self._time_s
+            self._rose_s, self._calm = time_s, 0
+        speed_m_s = abs(went_m) / took_s
+        if math.isnan(self._first_m_s):
+            self._first_m_s = max(speed_m_s, LAG_SLOWEST_M_S)
+        if math.isnan(self._stood_s) and speed_m_s <= STOPPED * self._first_m_s:
+            self._stood_s, self._rose_s, self._calm = time_s, time_s, 0
         if math.isnan(self._stood_s):
-            if abs(went_m) > STOPPED * self._first_m:
+            # A place that is noisy hides when it stood: no arm goes on for longer than LONGEST_S.
+            if time_s - self._begin_s <= 4 * LONGEST_S:
                 return False
-            self._stood_s = self._rose_s = self._time_s
+            self._stood_s = self._begin_s + LONGEST_S
+            self._rose_s = max(self._stood_s, self._rose_s)  # in this order NaN is no rise
         lag_s = self._rose_s - self._stood_s
-        if lag_s > LONGEST_S or self._time_s - self._rose_s > 2 * BLOCK * dt_s:
+        if lag_s > LONGEST_S or self._calm > 2 * BLOCK:
             self.value_s = lag_s
             return True
         return False
@@ -647,8 +656,9 @@ class ForceController:
 
 @dataclass(frozen=True)
 class ContactState:
-    """State of the contact: height of the finger, distance travelled along the surface, force on the finger."""
+    """State of the contact: height of the finger, distance travelled along the surface, force, when it was measured."""
 
+    time_ns: int
     height_m: float
     travelled_m: float
     force_n: float
@@ -682,6 +692,7 @@ class ForceLoop:
         self._chosen_for = math.nan
         self._forces: list[float] = []
         self._noise_n = math.inf
+        self._newest_ns = -1
         self._touch: ForceLag | None = None  # while the finger stands after the first touch, to hear the force
         self._heard = False
         self.force_lag_s = 0.0
@@ -694,7 +705,9 @@ class ForceLoop:
 
     def observe(self, contact: ContactState, speed_m_s: float = 0.0) -> None:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
-        self._note_noise(contact.force_n)
+        if contact.time_ns > self._newest_ns:
+            self._newest_ns = contact.time_ns
+            self._note_noise(contact.force_n)
         if contact.force_n < self._params.touching_n:
             self.stiffness.restart()
             self._touch, self._heard = None, False
@@ -752,7 +765,7 @@ class ForceLoop:
             self.restart()
             return -self.approach_m_s(height_m)
         if speed_m_s <= SLOWEST_M_S and not self._heard:
-            self._listen(contact, dt_s)
+            self._listen(contact)
             return 0.0
         estimated_n_m = self.stiffness.value_n_m
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
@@ -780,13 +793,13 @@ class ForceLoop:
             'the force late, such as a filter, or declare it'
         )
 
-    def _listen(self, contact: ContactState, dt_s: float) -> None:
+    def _listen(self, contact: ContactState) -> None:
         """Stand until the force does, and take over how late it is, before anything is pressed."""
         self._touch = self._touch or ForceLag(self.noise_n)
-        if not self._touch.update(contact.height_m, contact.force_n, dt_s):
+        if not self._touch.update(contact.time_ns, contact.height_m, contact.force_n):
             return
         self._heard = True
-        self.force_lag_s = 0.0 if math.isnan(self._touch.value_s) else self._touch.value_s
+        self.force_lag_s = self._touch.value_s
         self._adapt_to_lag()
         self._choose_gain()
 

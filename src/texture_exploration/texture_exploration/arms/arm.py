@@ -434,7 +434,7 @@ class CommandedVelocity:
         return (*command.tangential_m_s, normal_m_s)
 
     def _normal_m_s(self, command: ArmCommand, state: ArmState, held_s: float) -> float:
-        contact = ContactState(state.position[2], self._travelled_m, state.force_n)
+        contact = ContactState(state.time_ns, state.position[2], self._travelled_m, state.force_n)
         speed_m_s = math.hypot(*command.tangential_m_s)
         self._loop.observe(contact, speed_m_s)
         if command.force_n is None:
