@@ -44,7 +44,7 @@ from texture_exploration.arms.arm import (
     Zeroing,
 )
 from texture_exploration.motions import MOTIONS
-from texture_exploration.safety import WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, SafetyLimits
+from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, SafetyLimits
 from texture_exploration.stages import LiftFirst, Motion, MotionStep, Rise, TouchParams
 
 # --------------------
@@ -109,8 +109,6 @@ class ExplorationEstimates:
 # One exploration: the loop that ties a motion to an arm and watches over both.
 
 STATE_PERIOD_NS = 20_000_000
-# After a longer gap between two steps it was we who slept: the age of the arm's state says nothing about the arm.
-GAP_NS = 50_000_000
 # A tick that comes a little early must not wait for the next one.
 STATE_SLACK_NS = 5_000_000
 NO_SLIDE_OBSERVED = (

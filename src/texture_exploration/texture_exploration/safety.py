@@ -18,6 +18,9 @@ from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading, Vec
 # --------------------
 # For how long nothing was heard while somebody listened.
 
+# After a longer gap between two steps it was we who slept: the age of the arm's state says nothing about the arm.
+GAP_NS = 50_000_000
+
 
 @dataclass(frozen=True)
 class Listening:

@@ -383,7 +383,7 @@ ARM = {
     'arm': 'ros_controllers',
     'accept_no_timeout': True,
     'watch_signal': False,
-    'connect_timeout_s': 40.0,  # a killed commander is forgotten after 20 s
+    'connect_timeout_s': 10.0,
     # Patient with a busy machine; what comes 0.5 s late is too late all the same.
     'deadman_s': 0.4,
     'state_timeout_s': 1.0,
@@ -404,8 +404,8 @@ class HazardRig(Listener):
         super().__init__('watcher', domain_id)
         self.force = soak.ForceAccount()
         self._explorations, self._settings = clients
-        self._controller = NodeProcess('texture_simulation', 'twist_controller', CONTROLLER, domain_id=domain_id)
         self._domain_id = domain_id
+        self._controller = self._new_controller({})
         self._explorer = self._new_explorer()
         self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
 
@@ -423,10 +423,10 @@ class HazardRig(Listener):
         """Explore while something befalls the arm, put it right, and return how it went."""
         hazard = soak.HAZARDS.get(name, soak.ArmHazard())
         if hazard.wired_wrong:
-            self._restart(hazard.given)
+            self._begin_anew(hazard.given)
         elif hazard.given:
             self._settings.set_parameters('twist_controller', hazard.given)
-        self._explorations.wait_for_explorer(START_DEADLINE_S)
+        self._wait_for_explorer()
         self.force = soak.ForceAccount()
         happened = [] if hazard.process or hazard.commander else ['before']
 
@@ -445,11 +445,10 @@ class HazardRig(Listener):
         time.sleep(SETTLED_S)
         left_n, force = self.force.newest_n, self.force
         if not hazard.obeys:
-            self._restart(soak.HARMLESS)
-            self._lift()
+            self._lift_anew()
             left_n = self.force.newest_n
-        elif hazard.wired_wrong:
-            self._restart(soak.HARMLESS)
+        if hazard.wired_wrong or not hazard.obeys:
+            self._begin_anew(soak.HARMLESS)
         elif hazard.given:
             self._settings.set_parameters('twist_controller', soak.HARMLESS)
         return soak.HazardRecord(name, bool(happened), ending, message, force.peak_n, force.above_s, left_n)
@@ -477,18 +476,30 @@ class HazardRig(Listener):
             time.sleep(OTHER_PERIOD_S)
         self.node.destroy_publisher(publisher)
 
-    def _restart(self, given: Mapping[str, Any]) -> None:
-        """Start another explorer on a controller with other parameters."""
+    def _begin_anew(self, given: Mapping[str, Any]) -> None:
+        """Start a controller with other parameters, with its finger where all began, and an explorer on it."""
         self._explorer.stop()
-        self._settings.set_parameters('twist_controller', given)
+        self._controller.stop()
+        self._controller = self._new_controller(given).__enter__()
         self._explorer = self._new_explorer().__enter__()
-        self._explorations.wait_for_explorer(START_DEADLINE_S)
 
-    def _lift(self) -> None:
-        """Lift the finger as an operator does after an explorer that was killed."""
+    def _lift_anew(self) -> None:
+        """Put the controller right, and lift the finger by another explorer, as an operator does after a fault."""
+        self._explorer.stop()
+        self._settings.set_parameters('twist_controller', soak.HARMLESS)
+        self._explorer = self._new_explorer().__enter__()
+        self._wait_for_explorer()
         with suppress(TextureError):  # what is left of the force tells
             self._settings.call('lift', 'start the explorer')
         time.sleep(SETTLED_S)
+
+    def _wait_for_explorer(self) -> None:
+        """Wait until the explorer answers: it is there for nobody as long as it connects to its arm."""
+        self._explorations.wait_for_explorer(START_DEADLINE_S)
+        self._settings.call('stop', 'start the explorer')
+
+    def _new_controller(self, given: Mapping[str, Any]) -> NodeProcess:
+        return NodeProcess('texture_simulation', 'twist_controller', {**CONTROLLER, **given}, domain_id=self._domain_id)
 
     def _new_explorer(self) -> NodeProcess:
         return NodeProcess('texture_exploration', 'explorer', ARM, domain_id=self._domain_id)

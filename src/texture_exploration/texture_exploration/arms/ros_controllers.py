@@ -30,6 +30,7 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
+from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, Listening
 
 # --------------------
 # What can be chosen about an arm that is driven by ROS controllers.
@@ -328,7 +329,9 @@ class FollowWatch:
         return f'the arm went {1e3 * gone_m:.1f} mm of the {1e3 * asked_m:.1f} mm commanded in {took_s:.1f} s'
 
 
-def stale(params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int) -> str:
+def stale(
+    params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int, listening: Listening = WITHOUT_GAPS
+) -> str:
     """Return in a sentence that pose or force are older than the parameters allow, '' if they are not.
 
     Parameters
@@ -339,6 +342,8 @@ def stale(params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int
         The time, ns.
     pose_ns, force_ns
         When pose and force came last, ns.
+    listening
+        When this process stood still itself: what it could not take then is not what did not come.
 
     Returns
     -------
@@ -346,7 +351,7 @@ def stale(params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int
         A sentence without a full stop, or ''.
     """
     for what, topic, time_ns in (('pose', params.pose_topic, pose_ns), ('force', params.wrench_topic, force_ns)):
-        age_s = (now_ns - time_ns) * 1e-9
+        age_s = listening.silence_s(time_ns, now_ns)
         if age_s > params.deadman_s:
             return (
                 f"no {what} has come on '{topic}' for {1e3 * age_s:.0f} ms, so zero velocity was commanded; check that "
@@ -382,6 +387,8 @@ class ToolState:
         where the clocks agree, else when they came; 0 before the first.
     misplaced : str
         In a sentence, that a pose or a force came in an unknown frame; '' if none did.
+    listening : Listening
+        When this process stood still itself; what waited for it meanwhile is not late.
     """
 
     def __init__(self, params: RosControllersParams) -> None:
@@ -392,6 +399,7 @@ class ToolState:
         self._force_came_ns = 0
         self._late = {'pose': '', 'force': ''}
         self.misplaced = ''
+        self.listening = WITHOUT_GAPS
         self.rotation: Array = np.eye(3)  # of the tool in the base frame
         self._position: Vector = (math.nan, math.nan, math.nan)
         self._velocity = REST
@@ -412,7 +420,7 @@ class ToolState:
             return
         if not self._is_new('pose', sample.stamp_ns):
             return
-        self.pose_ns = now_ns - self._age_ns('pose', sample.age_ns)
+        self.pose_ns = now_ns - self._age_ns('pose', now_ns, sample.age_ns)
         self.rotation = quaternion_matrix(sample.rotation)
         self._position = self._frame.place(sample.position_m)
         self._update_velocity(sample.stamp_ns or now_ns)
@@ -440,7 +448,7 @@ class ToolState:
             return
         passed_s = (now_ns - self._force_came_ns) * 1e-9 if self._force_came_ns else math.inf
         self._force_came_ns = now_ns
-        self.force_ns = now_ns - self._age_ns('force', sample.age_ns)
+        self.force_ns = now_ns - self._age_ns('force', now_ns, sample.age_ns)
         to_base = self.rotation if sample.frame_id == params.tool_frame_id else np.eye(3)
         reading = np.array(sample.force_n) * (-1.0 if params.invert_force else 1.0)
         repeated = self._reading_n is not None and bool((reading == self._reading_n).all())
@@ -475,7 +483,7 @@ class ToolState:
         self._stamps_ns[kind] = stamp_ns
         return new
 
-    def _age_ns(self, kind: str, age_ns: int) -> int:
+    def _age_ns(self, kind: str, now_ns: int, age_ns: int) -> int:
         """Return the age of a sample as far as clocks agree, and note whether that is too much."""
         if not 0 <= age_ns <= AGREE_NS:
             age_ns = 0
@@ -483,7 +491,7 @@ class ToolState:
         topic = params.pose_topic if kind == 'pose' else params.wrench_topic
         self._late[kind] = (
             ''
-            if age_ns * 1e-9 <= params.deadman_s
+            if self.listening.silence_s(now_ns - age_ns, now_ns) <= params.deadman_s
             else (
                 f"the {kind} on '{topic}' comes {age_ns * 1e-6:.0f} ms after its stamp, and "
                 f"{1e3 * params.deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find what "
@@ -751,6 +759,8 @@ class RosControllersArm:
         topics = self._connected()
         now_ns = self._clock()
         held_s = (now_ns - self._sent_ns) * 1e-9 if self._sent_ns else 0.0
+        if self._sent_ns and now_ns - self._sent_ns > GAP_NS:
+            self._tool.listening = Listening(gap_start_ns=self._sent_ns, gap_end_ns=now_ns)
         self._sent_ns = now_ns
         self._take(topics, now_ns)
         if not self._lost:
@@ -868,7 +878,12 @@ class RosControllersArm:
 
     def _fault(self, now_ns: int) -> str:
         tool = self._tool
-        return self._lost or tool.misplaced or tool.late or stale(self._params, now_ns, tool.pose_ns, tool.force_ns)
+        return (
+            self._lost
+            or tool.misplaced
+            or tool.late
+            or stale(self._params, now_ns, tool.pose_ns, tool.force_ns, tool.listening)
+        )
 
     def _due(self, now_ns: int) -> ArmCommand | None:
         """Return the command that holds now, None if none does."""

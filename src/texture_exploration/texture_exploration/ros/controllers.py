@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import functools
 import importlib
 import os
@@ -11,9 +12,12 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+import uuid
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
@@ -30,14 +34,60 @@ from texture_exploration.arms.arm import Vector
 from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersParams
 
 # --------------------
+# Which publishers are of a killed process: ROS shows them until their lease ends, about 20 s, and an explorer that is
+# started again must not take its own past for another commander. Each process locks a file named after its participant
+# in the graph, and the kernel unlocks it however the process ends. A name without a file says nothing.
+
+PARTICIPANT = slice(0, 12)  # of the id of an endpoint: the prefix of its GUID in RTPS
+FORGOTTEN_S = 600.0  # long after ROS has forgotten a participant, its file goes
+
+
+def claims() -> Path:
+    """Return the folder of the locked files: on this machine, as a lock over a network may not be seen."""
+    return Path(tempfile.gettempdir()) / f'texture_arm_{os.getuid()}'
+
+
+def _is_free(path: Path) -> bool:
+    """Return whether a file is there that nobody has locked."""
+    with contextlib.suppress(OSError), path.open('r+') as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
+
+
+def claim(node: Node) -> IO[str] | None:
+    """Lock the file of a node's participant until the process ends or closes it, None if files cannot be written."""
+    publisher = node.create_publisher(TwistStamped, f'claim_{uuid.uuid4().hex}', 1)
+    (info,) = node.get_publishers_info_by_topic(publisher.topic_name)
+    node.destroy_publisher(publisher)
+    folder = claims()
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        if folder.stat().st_uid != os.getuid():
+            return None
+        for old in folder.iterdir():
+            if time.time() - old.stat().st_mtime > FORGOTTEN_S and _is_free(old):
+                old.unlink()
+        file = (folder / bytes(info.endpoint_gid[PARTICIPANT]).hex()).open('w')
+        fcntl.flock(file, fcntl.LOCK_EX)
+    except OSError:
+        return None
+    return file
+
+
+def has_ended(info: Any) -> bool:
+    """Return whether a publisher is of a process of this user that has ended: its file is there, and free."""
+    return _is_free(claims() / bytes(info.endpoint_gid[PARTICIPANT]).hex())
+
+
+# --------------------
 # A process that commands zero velocity when the process that commanded the arm is silent or gone.
 #
-# A controller may hold the last velocity for ever: the twist controller of `ur_robot_driver` has no timeout. The
-# guard
-# hears a heartbeat on a pipe whose other end only the commanding process holds. It commands zero velocity when an arm
-# that moves is no longer spoken for, as when that process hangs, is stopped (SIGSTOP) or frozen; the kernel closes
-# the
-# pipe however the process ends, also by SIGKILL. Whoever ends in order says so first.
+# A controller may hold the last velocity for ever: the twist controller of `ur_robot_driver` has no timeout. The guard
+# hears a heartbeat on a pipe whose other end only the commanding process holds. It commands zero velocity, and zero
+# force to a compliance controller, when an arm that moves or presses is no longer spoken for, as when that process
+# hangs, is stopped (SIGSTOP) or frozen; the kernel closes the pipe however the process ends, also by SIGKILL. Whoever
+# ends in order says so first.
 
 TWIST_GUARD_NODE = 'arm_guard'
 DONE, MOVING, RESTING = b'.', b'm', b'r'
@@ -68,19 +118,24 @@ class TwistGuard:
 
     Parameters
     ----------
-    topic
-        Full name of the topic of the velocities.
-    frame_id
-        What their header carries.
     heartbeat_s
         Longest silence while the arm moves.
+    topic, frame_id
+        Full name of the topic of the velocities, and what their header carries.
+    wrench_topic, wrench_frame_id
+        The same of the force that a compliance controller is commanded; '' if there is none.
     """
 
-    def __init__(self, topic: str, frame_id: str, heartbeat_s: float) -> None:
+    def __init__(
+        self, heartbeat_s: float, topic: str, frame_id: str, wrench_topic: str = '', wrench_frame_id: str = ''
+    ) -> None:
         # A session and, if possible, a control group of its own: what ends all processes of a terminal, a launch file
         # or a service must not end the guard first.
         self._process = subprocess.Popen(
-            [*scope(), sys.executable, '-m', __name__, topic, frame_id, str(heartbeat_s)],
+            [
+                *(*scope(), sys.executable, '-m', __name__, str(heartbeat_s)),
+                *(topic, frame_id, wrench_topic, wrench_frame_id),
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -134,18 +189,24 @@ class TwistGuard:
 
 
 def main() -> None:
-    """Run as `python -m texture_exploration.ros.controllers TOPIC FRAME HEARTBEAT_S`; the arm starts it."""
-    topic, frame_id, heartbeat_s = sys.argv[1:]
+    """Run as `python -m texture_exploration.ros.controllers …`, with what `TwistGuard` takes; the arm starts it."""
+    heartbeat_s, topic, frame_id, wrench_topic, wrench_frame_id = sys.argv[1:]
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(TWIST_GUARD_NODE, enable_rosout=False, start_parameter_services=False)
+    _file = claim(node)  # locked as long as this process lives
     publisher = node.create_publisher(TwistStamped, topic, 1)
+    wrenches = node.create_publisher(WrenchStamped, wrench_topic, 1) if wrench_topic else None
 
     def command_standstill() -> None:
         message = TwistStamped()
         message.header.stamp, message.header.frame_id = node.get_clock().now().to_msg(), frame_id
         publisher.publish(message)
+        if wrenches is not None:
+            wrench = WrenchStamped()
+            wrench.header.stamp, wrench.header.frame_id = message.header.stamp, wrench_frame_id
+            wrenches.publish(wrench)
 
     os.set_blocking(sys.stdout.fileno(), False)
     if not guarded(publisher, float(heartbeat_s), command_standstill):
@@ -228,6 +289,7 @@ class RosTopics:
         node = self._node
         wrench_topic = params.target_wrench_topic
         self._commanded_topics = [node.resolve_topic_name(name) for name in (params.twist_topic, wrench_topic) if name]
+        self._claim = claim(node)
         self._unnamed_s = 0.0  # since when there has been such a publisher, 0 if there is none
         self._wait_for_the_command()
         self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
@@ -235,7 +297,8 @@ class RosTopics:
         self._poses = node.create_subscription(PoseStamped, params.pose_topic, _ignore, MEASURED_QOS)
         self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, _ignore, MEASURED_QOS)
         self._frame_id = params.twist_frame_id or params.base_frame_id
-        self._guard = TwistGuard(self._twists.topic_name, self._frame_id, params.heartbeat_s)
+        force_topic = (self._wrenches.topic_name, params.base_frame_id) if self._wrenches else ()
+        self._guard = TwistGuard(params.heartbeat_s, self._twists.topic_name, self._frame_id, *force_topic)
         if not scope():
             node.get_logger().warning(NO_SCOPE)
 
@@ -350,15 +413,15 @@ class RosTopics:
         while (other := self._other_commander()) or self._unnamed_s or time.monotonic() - begin_s < DISCOVERY_S:
             if other and time.monotonic() - begin_s > self._params.connect_timeout_s:
                 self._leave()
-                raise DeviceError(f'{other}; end it first. One that was killed is forgotten after about 20 s')
+                raise DeviceError(f'{other}; end it first. One of another user that was killed is forgotten after 20 s')
             time.sleep(LOOKING_S)
 
     def _other_commander(self, own: tuple[str, ...] = ()) -> str:
         """Return in a sentence who else commands, '' if nobody does; each name of ours may publish once."""
         found = {
-            topic: self._node.get_publishers_info_by_topic(topic)
-            for number, topic in enumerate(self._commanded_topics)
-            if self._node.count_publishers(topic) > (len(own[:1]) if number else len(own))
+            topic: [info for info in self._node.get_publishers_info_by_topic(topic) if not has_ended(info)]
+            for topic in self._commanded_topics
+            if self._node.count_publishers(topic) > len(own)
         }
         unnamed = any(info.node_name == UNNAMED for infos in found.values() for info in infos)
         self._unnamed_s = (self._unnamed_s or time.monotonic()) if unnamed else 0.0
@@ -382,6 +445,8 @@ class RosTopics:
     def _leave(self) -> None:
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
+        if self._claim is not None:
+            self._claim.close()
 
 
 def _newest(subscription: Any) -> Any:
