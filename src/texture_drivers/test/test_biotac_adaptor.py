@@ -64,7 +64,17 @@ def test_messages_of_another_driver_become_signals_and_faults_are_reported(graph
     status = reports[0].status[0]
     assert (status.level, status.hardware_id) == (b'\x02', 'BT-1')
     assert '5 electrodes' in status.message
-    assert {value.key: value.value for value in status.values}['refused messages'] == '1'
+    values = {value.key: value.value for value in status.values}
+    assert (values['refused messages'], values['lost before the start']) == ('1', 'unknown')
+
+
+def test_a_bridge_tells_what_it_misses_and_that_nobody_knows_what_was_missed_before(graph: LocalGraph) -> None:
+    node = graph.add(BiotacAdaptor)
+    for number in (0, 1, 2, 12, 13):  # nine of ten messages of 22 samples did not come
+        node._on_message(hand(number))
+    level, sentence, values = node._report()
+    assert (level, sentence) == ('WARN', '198 samples lost since the last report')
+    assert (values['lost'], values['lost before the start']) == (198, 'unknown')
 
 
 def test_a_message_package_that_is_missing_is_reported_in_one_sentence(graph: LocalGraph) -> None:

@@ -395,6 +395,8 @@ RATE_TOLERANCE = 0.05  # WARN: a rate this far off
 MAX_BAD_PACKETS_PER_S = 5.0  # WARN: a damaged line; single refusals come with every opening
 
 HealthReport = tuple[str, str, Mapping[str, Any]]
+# Who is started again numbers anew: nobody can tell what its stream lost until then, least of all in a flood.
+BEFORE_THE_START = {'lost before the start': 'unknown'}
 
 
 class SensorHealth:
@@ -436,6 +438,7 @@ class SensorHealth:
             **{f'{topic} rate [Hz]': rate for topic, rate in rates.items()},
             **{f'{topic} expected [Hz]': rate for topic, rate in self._reader.sensor.expected_rates_hz.items()},
             **counts,
+            **BEFORE_THE_START,
             'age of last sample [s]': age_s,
             **self.details,
             **watched,

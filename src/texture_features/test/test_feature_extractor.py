@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -119,6 +121,15 @@ def test_broken_messages_are_counted_and_survived(bench):
     bench.until(lambda: bench.node._cutter._slides)
     bench.play(recording())
     bench.until(lambda: len(bench.features) == 4)
+
+
+def test_known_losses_are_counted_and_those_of_a_restart_named_as_unknown(bench):
+    for first_sample in (0, 20, 90, 0):  # 50 samples are missing, then the bridge was started again
+        bench.node._on_signal('signal', to_msg(replace(recording(0.02)[0], first_sample=first_sample)))
+    level, sentence, numbers = bench.node._report()
+    assert (level, sentence) == ('WARN', '50 samples lost, and unknown losses in a restart of a driver or bridge')
+    assert (numbers['lost_samples'], numbers['restarts']) == (50, 1)
+    assert bench.node._report()[:2] == ('OK', 'extracting')
 
 
 FINGERS = ('finger0/signal', 'finger0/signal_static', 'finger1/signal', 'finger1/signal_static')

@@ -494,9 +494,17 @@ class HazardRig(Listener):
         time.sleep(SETTLED_S)
 
     def _wait_for_explorer(self) -> None:
-        """Wait until the explorer answers: it is there for nobody as long as it connects to its arm."""
+        """Wait until the explorer answers: it is there for nobody as long as it connects to its arm.
+
+        An answer to one whom it has not discovered yet is lost, so that it is asked again.
+        """
         self._explorations.wait_for_explorer(START_DEADLINE_S)
-        self._settings.call('stop', 'start the explorer')
+        deadline_s = time.monotonic() + START_DEADLINE_S
+        while time.monotonic() < deadline_s:
+            with suppress(LaunchFailed):
+                self._explorations.stop()
+                return
+        raise LaunchFailed(f'the explorer does not answer (waited {START_DEADLINE_S:.0f} s)')
 
     def _new_controller(self, given: Mapping[str, Any]) -> NodeProcess:
         return NodeProcess('texture_simulation', 'twist_controller', {**CONTROLLER, **given}, domain_id=self._domain_id)

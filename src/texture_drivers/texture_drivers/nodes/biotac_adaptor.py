@@ -13,6 +13,7 @@ from texture_core.config import find, param
 from texture_core.errors import InvalidData
 from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
 from texture_drivers.biotac import MESSAGES, BioTacMessageConverter
+from texture_drivers.health import BEFORE_THE_START
 from texture_drivers.nodes.tsf85_adaptor import import_message
 
 TOPICS = ('signal', 'signal_static')
@@ -45,7 +46,7 @@ class BiotacAdaptor(Node):
         self._stream = BioTacMessageConverter(
             layout, self._params.finger, frame_name(self.get_namespace(), self._params.frame_id)
         )
-        self._messages = self._refused = 0
+        self._messages = self._refused = self._lost = 0
         self._fault = ''
         self._signals = {topic: self.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in TOPICS}
         message_class = import_message(self._params.message_type, 'message_type')
@@ -68,13 +69,15 @@ class BiotacAdaptor(Node):
         if self._stream.serial:
             self._diagnostics.hardware_id = self._stream.serial
         new, self._messages = self._messages, 0
-        numbers = {'samples': self._stream.samples, 'lost': self._stream.lost, 'refused messages': self._refused}
+        lost, self._lost = self._stream.lost - self._lost, self._stream.lost
+        counts = {'samples': self._stream.samples, 'lost': self._stream.lost, 'refused messages': self._refused}
         conditions = (
             (bool(self._fault), 'ERROR', self._fault),
             (new == 0, 'ERROR', f"no message on '{self._params.topic}'; start the driver, or set the parameter topic"),
+            (lost > 0, 'WARN', f'{lost} samples lost since the last report'),
         )
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
-        return level, sentence, numbers
+        return level, sentence, {**counts, **BEFORE_THE_START}
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from texture_msgs import msg
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
+from texture_drivers.health import BEFORE_THE_START
 from texture_drivers.tsf85 import Tsf85MessageConverter, Tsf85Settings
 
 # --------------------
@@ -118,7 +119,7 @@ class Tsf85Adaptor(Node):
         received, fault = self._received, self._fault
         self._counts, self._received, self._fault = counts, 0, ''
         silent = f"no message on '{self._params.prefix}/…'; start the driver, or set the parameter prefix"
-        unstamped = f"no '{self._params.prefix}/Timestamp': samples are numbered through, and losses go unseen"
+        unstamped = f"no '{self._params.prefix}/Timestamp': samples are numbered through, and losses are unknown"
         conditions = (
             (bool(fault), 'ERROR', fault),
             (received == 0, 'ERROR', silent),
@@ -126,7 +127,7 @@ class Tsf85Adaptor(Node):
             (new['unstamped'] > new['samples'] / 2, 'WARN', unstamped),
         )
         level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
-        return level, sentence, {**counts, 'refused messages': self._refused}
+        return level, sentence, {**counts, **BEFORE_THE_START, 'refused messages': self._refused}
 
 
 def main() -> None:

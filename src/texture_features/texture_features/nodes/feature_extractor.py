@@ -48,7 +48,8 @@ class FeatureExtractor(Node):
         super().__init__('feature_extractor', **kwargs)
         self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.window_names)
-        self._invalid = self._reported = self._sent = 0
+        self._invalid = self._sent = 0
+        self._reported: dict[str, int] = {}
         self._frame_id = ''  # of the fingertip, of several that of the first input
         self._sensors: dict[str, str] = {}  # by topic
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
@@ -105,9 +106,16 @@ class FeatureExtractor(Node):
         tare_faults = self._feature_set.tare_faults(self._sensors)
         if tare_faults:
             return 'WARN', '; '.join(tare_faults), numbers
-        faults = sum(numbers.values()) - numbers['windows']
-        new, self._reported = faults - self._reported, faults
-        return ('WARN', 'samples or messages were lost', numbers) if new else ('OK', 'extracting', numbers)
+        new, self._reported = {name: total - self._reported.get(name, 0) for name, total in numbers.items()}, numbers
+        # Of a restart, which numbers anew, nobody can tell how much it lost.
+        unknown = 'unknown losses in a restart of a driver or bridge' if new['restarts'] else ''
+        lost = f'{new["lost_samples"]} samples lost' if new['lost_samples'] else ''
+        if sentence := ', and '.join(filter(None, (lost, unknown))):
+            return 'WARN', sentence, numbers
+        faults = sum(new.values()) - new['windows']
+        return (
+            ('WARN', 'windows were left out or messages refused', numbers) if faults else ('OK', 'extracting', numbers)
+        )
 
 
 def main() -> None:
