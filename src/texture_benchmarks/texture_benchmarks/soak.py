@@ -523,16 +523,16 @@ class ArmHazard(NamedTuple):
     number: int = 0
     hold_s: float = 0.0  # a stopped process goes on afterwards; the other commander leaves
     commander: bool = False
-    wired_wrong: bool = False  # from before the arm is connected, and put right before the finger must be free
+    from_start: bool = False  # from before the arm is connected, with the finger where all began
     obeys: bool = True  # whether the arm does what the explorer commands, and the explorer can command
 
 
 HAZARDS: Mapping[str, ArmHazard] = {
-    'wall of 20 kN/m in the slide': ArmHazard({'wall_m': 0.02, 'wall_stiffness_n_m': 20000.0}),
-    'velocities inverted': ArmHazard({'invert_twist': True}, wired_wrong=True, obeys=False),
-    'force inverted': ArmHazard({'invert_force': True}, wired_wrong=True),
-    'force 0.5 s late': ArmHazard({'force_delay_s': 0.5}, wired_wrong=True),
-    'force 0.5 s late with new stamps': ArmHazard({'force_delay_s': 0.5, 'stamp_when_sent': True}, wired_wrong=True),
+    'wall of 20 kN/m in the slide': ArmHazard({'wall_m': 0.02, 'wall_stiffness_n_m': 20000.0}, from_start=True),
+    'velocities inverted': ArmHazard({'invert_twist': True}, from_start=True, obeys=False),
+    'force inverted': ArmHazard({'invert_force': True}, from_start=True),
+    'force 0.5 s late': ArmHazard({'force_delay_s': 0.5}, from_start=True),
+    'force 0.5 s late with new stamps': ArmHazard({'force_delay_s': 0.5, 'stamp_when_sent': True}, from_start=True),
     'explorer paused for 0.5 s': ArmHazard(process='explorer', number=signal.SIGSTOP, hold_s=0.5),
     'explorer stopped for 3 s': ArmHazard(process='explorer', number=signal.SIGSTOP, hold_s=3.0),
     'explorer killed': ArmHazard(process='explorer', number=signal.SIGKILL, obeys=False),

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.srv import SetParameters
@@ -208,6 +208,18 @@ def test_an_invalid_lifecycle_request_is_refused_and_the_explorer_lives(graph, t
         assert 'Traceback' not in explorer.output
 
 
+def test_a_guard_commands_zero_force_as_well_once_nobody_speaks_for_the_arm(graph):
+    wrenches = graph.listen(WrenchStamped, 'target')
+    guard = controller_topics.TwistGuard(0.05, '/twist', 'base', '/target', 'base')
+    try:
+        graph.until(lambda: guard.beat(moving=True) or graph.peer.count_publishers('target'))
+        graph.until(lambda: wrenches)
+    finally:
+        guard.dismiss()
+    force = wrenches[0].wrench.force
+    assert (wrenches[0].header.frame_id, force.x, force.y, force.z) == ('base', 0.0, 0.0, 0.0)
+
+
 def x_of(places):
     return places[-1].pose.position.x
 
@@ -230,6 +242,50 @@ def test_when_the_process_that_commands_is_stopped_the_guard_brings_the_arm_to_r
     print(f'{1e3 * gone_m:.2f} mm after the stop of who commanded')
     assert gone_m < 0.005  # 20 mm without a guard
     assert way_m[0] == pytest.approx(way_m[-1], abs=1e-6)
+
+
+CLAIMING = """
+import time
+
+import rclpy
+from geometry_msgs.msg import TwistStamped
+from texture_exploration.ros.controllers import claim
+
+rclpy.init()
+node = rclpy.create_node('other')
+file = claim(node)
+publisher = node.create_publisher(TwistStamped, 'twist', 1)
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize('known', [True, False], ids=['of ours', 'of somebody else'])
+def test_a_publisher_of_a_killed_process_is_passed_over_if_that_process_was_ours(graph, tmp_path, known):
+    """ROS shows it for 20 s more; one whose file is elsewhere may be alive."""
+    environment = {**os.environ, **({} if known else {'TMPDIR': str(tmp_path)})}
+
+    def found():
+        return graph.peer.get_publishers_info_by_topic('twist')
+
+    with subprocess.Popen([sys.executable, '-c', CLAIMING], env=environment) as process, killed_on_error(process):
+        graph.until(found)
+        assert not controller_topics.has_ended(found()[0])
+        process.kill()
+    assert controller_topics.has_ended(found()[0]) is known
+
+
+@pytest.mark.parametrize(('offered', 'started_by'), [(True, controller_topics.SCOPE), (False, ())])
+def test_the_guard_has_a_control_group_of_its_own_where_systemd_offers_one(tmp_path, monkeypatch, offered, started_by):
+    """A stand-in for systemd-run: most containers have none."""
+    stand_in = tmp_path / 'systemd-run'
+    stand_in.write_text(f'#!/bin/sh\nexit {int(not offered)}\n')
+    stand_in.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path))
+    controller_topics.scope.cache_clear()
+    try:
+        assert controller_topics.scope() == started_by
+    finally:
+        controller_topics.scope.cache_clear()
 
 
 def test_a_guard_that_is_killed_ends_the_slide_with_the_finger_lifted(graph, make_explorer):

@@ -422,10 +422,8 @@ class HazardRig(Listener):
     def explore(self, name: str) -> soak.HazardRecord:
         """Explore while something befalls the arm, put it right, and return how it went."""
         hazard = soak.HAZARDS.get(name, soak.ArmHazard())
-        if hazard.wired_wrong:
+        if hazard.from_start:
             self._begin_anew(hazard.given)
-        elif hazard.given:
-            self._settings.set_parameters('twist_controller', hazard.given)
         self._wait_for_explorer()
         self.force = soak.ForceAccount()
         happened = [] if hazard.process or hazard.commander else ['before']
@@ -447,10 +445,8 @@ class HazardRig(Listener):
         if not hazard.obeys:
             self._lift_anew()
             left_n = self.force.newest_n
-        if hazard.wired_wrong or not hazard.obeys:
-            self._begin_anew(soak.HARMLESS)
-        elif hazard.given:
-            self._settings.set_parameters('twist_controller', soak.HARMLESS)
+        if hazard.from_start or not hazard.obeys:
+            self._begin_anew({})
         return soak.HazardRecord(name, bool(happened), ending, message, force.peak_n, force.above_s, left_n)
 
     def _act(self, hazard: soak.ArmHazard) -> None:

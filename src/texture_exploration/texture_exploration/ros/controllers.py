@@ -214,6 +214,8 @@ def main() -> None:
         while time.monotonic() < end_s:
             command_standstill()
             time.sleep(PERIOD_S)
+    node.destroy_node()  # else ROS shows it for 20 s as another commander
+    rclpy.shutdown()
 
 
 def guarded(publisher: Any, heartbeat_s: float, command_standstill: Any) -> bool:
