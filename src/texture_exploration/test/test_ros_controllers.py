@@ -649,12 +649,11 @@ def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot
 
 def test_a_check_commands_nothing_and_leaves_the_topics():
     robot = Robot(connect_timeout_s=0.1)
-    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
-    explorer.check()
+    robot.driven.check()
     assert (robot.sent, robot.closed) == ([], True)
     robot.pose_comes = False
     with pytest.raises(DeviceError, match='no pose comes on'):
-        explorer.check()
+        robot.driven.check()
     assert robot.sent == []
 
 

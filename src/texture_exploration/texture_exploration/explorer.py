@@ -31,17 +31,8 @@ from texture_exploration.arms.arm import (
     Arm,
     ArmCommand,
     ArmState,
-    Checkable,
-    Counting,
-    Doubting,
-    ForceReading,
-    Rebootable,
-    Recoverable,
-    SurfaceBound,
     SurfaceFrame,
     Vector,
-    Warns,
-    Zeroing,
 )
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, SafetyLimits
@@ -195,8 +186,7 @@ class Exploration:
         self._clock = clock
         self._on_state = on_state
         self._signal_fault = signal_fault
-        reading = getattr(arm, 'force_reading', ForceReading.CONTROLLED)
-        self._force_watch = ForceWatch(limits, reading, motion.force_n)
+        self._force_watch = ForceWatch(limits, arm.force_reading, motion.force_n)
         self._guard = ForceGuard(limits)
         self._commanded = ArmCommand()
         self._stop_reason = ''
@@ -238,12 +228,11 @@ class Exploration:
         if fault:
             self._give_up(f'{fault}; the finger was not lifted')
             return True
-        relative = self._guard.relative(arm, self._zeroed, self._commanded)
-        doubt = self._arm.doubt() if isinstance(self._arm, Doubting) else ''
+        relative = self._guard.relative(arm, self._arm.zeroed, self._commanded)
         reason = (
             self._stop_reason
             or self._violation(arm, relative)
-            or doubt
+            or self._arm.doubt()
             or self._signal_fault(self._listening)
             or self._overdue(now_ns)
         )
@@ -273,10 +262,6 @@ class Exploration:
         """Return whether the finger rests until the sensor delivers; silence from before the request counts."""
         self._signal_seen = self._signal_seen or bool(self._abort_reason) or not self._signal_fault(WITHOUT_GAPS)
         return not self._signal_seen
-
-    @property
-    def _zeroed(self) -> bool:
-        return self._arm.zeroed if isinstance(self._arm, Zeroing) else True
 
     def _violation(self, arm: ArmState, relative: ArmState) -> str:
         """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
@@ -648,23 +633,6 @@ class Explorer:
         self._home = self._home or self.arm.state().position
         return self._home
 
-    def check(self) -> None:
-        """See whether the arm answers, without keeping control of it.
-
-        Raises
-        ------
-        DeviceError
-            If it does not, or cannot move.
-        """
-        if isinstance(self.arm, Checkable):
-            self.arm.check()
-            return
-        try:
-            self.arm.connect()
-            self.arm.state()
-        finally:
-            self.arm.close()
-
     def release(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go; until `connect`, requests are refused.
 
@@ -691,9 +659,7 @@ class Explorer:
     def arm_counts(self) -> Mapping[str, int]:
         """Return what the arm counts by itself, nothing if it counts nothing or cannot be reached."""
         with contextlib.suppress(DeviceError):
-            # Up to Python 3.11 also this check reads the property, which an arm that is not connected refuses.
-            if isinstance(self.arm, Counting):
-                return self.arm.counts
+            return self.arm.counts
         return {}
 
     def fault(self) -> str:
@@ -703,10 +669,6 @@ class Explorer:
         except DeviceError as error:
             return str(error)
         return arm_fault(state, self._clock(), self.limits) or state.unsafe
-
-    def warning(self) -> str:
-        """Return in a sentence what is not as it should be although the arm moves, '' if nothing."""
-        return self.arm.warning() if isinstance(self.arm, Warns) else ''
 
     @property
     def current(self) -> Exploration | None:
@@ -759,7 +721,7 @@ class Explorer:
         with self._lock:
             self._check_idle()
             self._lift_first = True
-            if isinstance(self.arm, Recoverable) and self.fault():
+            if self.fault():
                 with contextlib.suppress(DeviceError):  # connecting again tells it too
                     self.arm.recover()
             if self.fault():
@@ -823,8 +785,6 @@ class Explorer:
         """
         with self._lock:
             self._check_idle()
-            if not isinstance(self.arm, Rebootable):
-                raise MotionRefused('this arm has no motors that could be rebooted; use recover')
             return self.arm.reboot()
 
     def touch_surface(self) -> str:
@@ -843,7 +803,8 @@ class Explorer:
         """
         with self._lock:
             self._check_idle()
-            arm = self._surface_bound()
+            arm = self.arm
+            self._check_surface()
             if self.fault():
                 self.connect()
             state, frame = self.arm.state(), SurfaceFrame(arm.surface_pose)
@@ -871,7 +832,7 @@ class Explorer:
     def _check_touch(self, force_n: float) -> None:
         """Refuse a touch that the force does not prove."""
         least_n = self.touch.contact_force_n
-        if not self._believes_its_force():
+        if not self.arm.zeroed:
             raise MotionRefused(
                 'the touch was not taken: the force sensor is not zeroed, so it proves no contact; lift the finger by '
                 '10 mm, let it rest in the air for a second, and touch again'
@@ -891,13 +852,12 @@ class Explorer:
             If the arm has no base frame.
         """
         with self._lock:
-            self._surface_bound()
+            self._check_surface()
             return self._touches.forget()
 
-    def _surface_bound(self) -> SurfaceBound:
-        if not isinstance(self.arm, SurfaceBound):
+    def _check_surface(self) -> None:
+        if not self.arm.base_frame_id:
             raise MotionRefused('this arm has no base frame in which a surface could be placed')
-        return self.arm
 
     def close(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go."""
@@ -920,7 +880,7 @@ class Explorer:
         home = self._ready()
         motion = plan(request, home, self.touch, self.limits)
         if self._lift_first:
-            motion = LiftFirst(motion, self.touch, self.limits, self._believes_its_force)
+            motion = LiftFirst(motion, self.touch, self.limits, lambda: self.arm.zeroed)
         return Exploration(
             exploration_id,
             request,
@@ -931,9 +891,6 @@ class Explorer:
             on_state=self._on_state,
             signal_fault=self._signal_fault,
         )
-
-    def _believes_its_force(self) -> bool:
-        return self.arm.zeroed if isinstance(self.arm, Zeroing) else True
 
     def _check_idle(self) -> None:
         if self._released:

@@ -17,6 +17,7 @@ from texture_exploration.safety import SafetyLimits, stated
 from texture_exploration.stages import (
     STEADY_S,
     AccelerateStage,
+    Along,
     ApproachStage,
     BrakeStage,
     ContactWatch,
@@ -65,24 +66,24 @@ def plan_surface_slide(
         Go there, touch, press, speed up, slide, brake and lift.
     """
     speed, force = request.speed_m_s, request.force_n
-    contact = ContactWatch(force, touch)
-    slide = SlideStage(follower, speed, force, touch, limits, contact=contact)
+    along = Along(follower, speed, force, touch, limits, ContactWatch(force, touch))
+    slide = SlideStage(along)
 
     def come_down() -> list[Stage]:
         return [
             ApproachStage(force, touch, limits),
             SettleForceStage(force, touch, limits),
-            AccelerateStage(follower, speed, force, touch, limits, contact=contact),
+            AccelerateStage(along),
         ]
 
     def seek() -> list[Stage]:
-        return [Halt(follower, speed, touch, limits), *come_down()]
+        return [Halt(along), *come_down()]
 
     stages = [
         GoHomeStage(home, touch, limits),
         *come_down(),
         slide,
-        BrakeStage(follower, speed, force, touch, limits, contact=contact),
+        BrakeStage(along),
         LiftStage(home, force, touch, limits),
     ]
     return StagedMotion(stages, slide, seek if touch.seek_lost_contact else None)

@@ -415,34 +415,10 @@ class Motion(Protocol):
         """What happened, in one sentence."""
 
 
-class Planner(Protocol):
-    """Plans a motion: checks a request against the limits and fills in the defaults."""
-
-    def __call__(
-        self, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits, /
-    ) -> Motion:
-        """Return a motion, ready for its first step.
-
-        Parameters
-        ----------
-        request
-            What the operator asks for; 0 takes the default of a number.
-        home
-            Place where the slide begins and to which height it lifts, m, in the frame of the surface.
-        touch
-            How the finger approaches, presses and lifts.
-        limits
-            Allowed speeds, forces and workspace.
-
-        Returns
-        -------
-        Motion
-
-        Raises
-        ------
-        MotionRefused
-            If a number is out of its range, does not belong to this motion, or the path leaves the workspace.
-        """
+# Plans a motion from a request, whose numbers of 0 take the default; the place where the slide begins and to which
+# height it lifts, m, in the frame of the surface; how the finger touches; and what is allowed. MotionRefused if a
+# number is out of its range or does not belong to this motion, or the path leaves the workspace.
+Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
 
 
 # --------------------
@@ -897,74 +873,66 @@ class SettleForceStage(Stage):
         return ArmCommand(force_n=self._first_n + (self._force_n - self._first_n) * rise)
 
 
+@dataclass(frozen=True)
+class Along:
+    """What the stages along a path share: who steers, how fast, how hard, and who watches the contact."""
+
+    follower: Follower
+    speed_m_s: float
+    force_n: float
+    touch: TouchParams
+    limits: SafetyLimits
+    contact: ContactWatch
+
+    @property
+    def ramp_s(self) -> float:
+        """How long it takes to gain or lose the speed."""
+        return self.touch.ramp_s(self.speed_m_s)
+
+
 class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
 
-    def __init__(
-        self,
-        follower: Follower,
-        speed_m_s: float,
-        force_n: float,
-        touch: TouchParams,
-        limits: SafetyLimits,
-        *,
-        contact: ContactWatch,
-    ) -> None:
-        self._ramp_s = touch.ramp_s(speed_m_s)
-        super().__init__(
-            Phase.CONTACT,
-            self._ramp_s + limits.contact_timeout_s,
-            f'the finger to slide at {speed_m_s:g} m/s with {force_n:g} N',
-        )
-        self._follower = follower
-        self._speed_m_s = speed_m_s
-        self._force_n = force_n
-        self._touch = touch
-        self._contact = contact
+    def __init__(self, along: Along) -> None:
+        goal = f'the finger to slide at {along.speed_m_s:g} m/s with {along.force_n:g} N'
+        super().__init__(Phase.CONTACT, along.ramp_s + along.limits.contact_timeout_s, goal)
+        self._along = along
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """The force has settled: the finger touches."""
         super().begin(time_ns, arm)
-        self._contact.restart()
+        self._along.contact.restart()
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp, then wait for the arm to follow."""
-        self._follower.update(time_ns, arm)
-        self._contact.update(arm)
+        self._along.follower.update(time_ns, arm)
+        self._along.contact.update(arm)
         elapsed_s = self.elapsed_s(time_ns)
-        if elapsed_s >= self._ramp_s + STEADY_S and self._reached(arm):
+        if elapsed_s >= self._along.ramp_s + STEADY_S and self._reached(arm):
             return None
-        speed = self._speed_m_s * smooth(elapsed_s / self._ramp_s)
-        return ArmCommand(self._follower.velocity(speed), force_n=self._force_n)
+        speed = self._along.speed_m_s * smooth(elapsed_s / self._along.ramp_s)
+        return ArmCommand(self._along.follower.velocity(speed), force_n=self._along.force_n)
 
     def _reached(self, arm: ArmState) -> bool:
         speed = math.hypot(*arm.velocity[:2])
-        fast = abs(speed - self._speed_m_s) <= self._touch.speed_tolerance * self._speed_m_s
+        fast = abs(speed - self._along.speed_m_s) <= self._along.touch.speed_tolerance * self._along.speed_m_s
         # Sliding makes the force fluctuate: twice the tolerance of the finger at rest.
-        return fast and abs(arm.force_n - self._force_n) <= 2 * self._touch.force_tolerance * self._force_n
+        return (
+            fast
+            and abs(arm.force_n - self._along.force_n) <= 2 * self._along.touch.force_tolerance * self._along.force_n
+        )
 
 
 class SlideStage(Stage):
     """Keep speed and force for the length of the path."""
 
-    def __init__(
-        self,
-        follower: Follower,
-        speed_m_s: float,
-        force_n: float,
-        touch: TouchParams,
-        limits: SafetyLimits,
-        *,
-        contact: ContactWatch,
-    ) -> None:
-        planned_s = follower.length_m / speed_m_s
-        super().__init__(Phase.SLIDE, planned_s + limits.slide_overtime_s, 'the slide to end')
-        self._follower = follower
-        self._speed_m_s = speed_m_s
-        self.force_n = force_n
-        self._contact = contact
-        self._stall = StallWatch(touch)
-        self._watch = SlideWatch(speed_m_s, force_n, touch)
+    def __init__(self, along: Along) -> None:
+        planned_s = along.follower.length_m / along.speed_m_s
+        super().__init__(Phase.SLIDE, planned_s + along.limits.slide_overtime_s, 'the slide to end')
+        self._along = along
+        self.force_n = along.force_n
+        self._stall = StallWatch(along.touch)
+        self._watch = SlideWatch(along.speed_m_s, along.force_n, along.touch)
         self._start_m: float | None = None
         self._steady_until_ns = 0
         self._finish = False
@@ -973,7 +941,7 @@ class SlideStage(Stage):
     @property
     def direction_rad(self) -> float:
         """Present direction of travel."""
-        return self._follower.direction_rad
+        return self._along.follower.direction_rad
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """The slide counts from here, also if it goes on later after the contact was lost."""
@@ -981,8 +949,8 @@ class SlideStage(Stage):
         self._stall.restart()
         self._watch.restart()
         if self._start_m is None:
-            self._start_m = self._follower.travelled_m
-            self._follower.begin_slide()
+            self._start_m = self._along.follower.travelled_m
+            self._along.follower.begin_slide()
 
     def finish(self) -> None:
         """End as soon as the guaranteed time is over."""
@@ -996,10 +964,10 @@ class SlideStage(Stage):
         MotionAborted
             At the end, if the slide was not what was asked for.
         """
-        self._follower.update(time_ns, arm)
+        self._along.follower.update(time_ns, arm)
         self.steady_s = 0.0
-        self._contact.update(arm)
-        steady_s = self._follower.steady_m / self._speed_m_s
+        self._along.contact.update(arm)
+        steady_s = self._along.follower.steady_m / self._along.speed_m_s
         as_asked = self._watch.update(arm, constant=steady_s > 0.0)
         left_s = self._left_s(time_ns, arm)
         # Anything shorter than a microsecond is rounding, not sliding.
@@ -1007,20 +975,20 @@ class SlideStage(Stage):
             if flaw := self._watch.flaw():
                 raise MotionAborted(flaw)
             return None
-        if self._contact.touching and as_asked:
+        if self._along.contact.touching and as_asked:
             self.steady_s = min(STEADY_HORIZON_S, left_s, steady_s)
             self._steady_until_ns = max(self._steady_until_ns, time_ns + int(self.steady_s * 1e9))
-        velocity = self._follower.velocity(self._speed_m_s)
+        velocity = self._along.follower.velocity(self._along.speed_m_s)
         self._stall.update(arm, velocity)
         return ArmCommand(velocity, force_n=self.force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
         assert self._start_m is not None
         age_s = max(0.0, (time_ns - arm.time_ns) * 1e-9)
-        slid_m = self._follower.travelled_m - self._start_m + self._speed_m_s * age_s
-        length_m = self._follower.length_m
+        slid_m = self._along.follower.travelled_m - self._start_m + self._along.speed_m_s * age_s
+        length_m = self._along.follower.length_m
         self.progress = min(1.0, slid_m / length_m)
-        by_length = (length_m - slid_m) / self._speed_m_s
+        by_length = (length_m - slid_m) / self._along.speed_m_s
         return min(by_length, (self._steady_until_ns - time_ns) * 1e-9) if self._finish else by_length
 
 
@@ -1031,65 +999,54 @@ class BrakeStage(Stage):
     that was lost in the slide and does not come back aborts.
     """
 
-    def __init__(
-        self,
-        follower: Follower,
-        speed_m_s: float,
-        force_n: float,
-        touch: TouchParams,
-        limits: SafetyLimits,
-        *,
-        contact: ContactWatch,
-    ) -> None:
-        super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to come to rest')
-        self._follower = follower
-        self._speed_m_s = speed_m_s
-        self._force_n = force_n
-        self._ramp_s = touch.ramp_s(speed_m_s)
-        self._contact = contact
+    def __init__(self, along: Along) -> None:
+        super().__init__(Phase.LIFT, along.limits.lift_timeout_s, 'the finger to come to rest')
+        self._along = along
         self._whole = False  # the slide ended with contact
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Note whether the slide ended with contact."""
         super().begin(time_ns, arm)
-        self._whole = self._contact.touching
+        self._whole = self._along.contact.touching
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp down."""
-        self._follower.update(time_ns, arm)
+        self._along.follower.update(time_ns, arm)
         touching = self._touches(arm)
-        share = self.elapsed_s(time_ns) / self._ramp_s
+        share = self.elapsed_s(time_ns) / self._along.ramp_s
         if share >= 1.0:
             if not self._whole:
-                self._contact.refuse()
+                self._along.contact.refuse()
             return None
-        velocity = self._follower.velocity(self._speed_m_s * smooth(1.0 - share))
-        return ArmCommand(velocity, force_n=self._force_n if touching else None)
+        velocity = self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share))
+        return ArmCommand(velocity, force_n=self._along.force_n if touching else None)
 
     def _touches(self, arm: ArmState) -> bool:
         if not self._whole:
-            self._contact.update(arm)
-            self._whole = self._contact.touching
+            self._along.contact.update(arm)
+            self._whole = self._along.contact.touching
             return True  # may come back: keep pressing
         with suppress(ContactLost):
-            self._contact.update(arm)
-        return self._contact.touching
+            self._along.contact.update(arm)
+        return self._along.contact.touching
 
 
 class Halt(Stage):
     """Lose speed along the path at a constant height, after the contact was lost."""
 
-    def __init__(self, follower: Follower, speed_m_s: float, touch: TouchParams, limits: SafetyLimits) -> None:
-        super().__init__(Phase.APPROACH, limits.lift_timeout_s, 'the finger to come to rest')
-        self._follower = follower
-        self._speed_m_s = speed_m_s
-        self._ramp_s = touch.ramp_s(speed_m_s)
+    def __init__(self, along: Along) -> None:
+        super().__init__(Phase.APPROACH, along.limits.lift_timeout_s, 'the finger to come to rest')
+        self._along = along
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp down."""
-        self._follower.update(time_ns, arm)
-        share = self.elapsed_s(time_ns) / self._ramp_s
-        return None if share >= 1.0 else ArmCommand(self._follower.velocity(self._speed_m_s * smooth(1.0 - share)))
+        self._along.follower.update(time_ns, arm)
+        share = self.elapsed_s(time_ns) / self._along.ramp_s
+        return (
+            None
+            if share >= 1.0
+            else ArmCommand(self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share)))
+        )
 
 
 class LiftStage(Stage):

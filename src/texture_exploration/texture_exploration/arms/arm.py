@@ -8,12 +8,12 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, TypeVar
 
 import numpy as np
 
 from texture_core.config import param
-from texture_core.errors import CommandRefused
+from texture_core.errors import CommandRefused, DeviceError
 from texture_core.types import Array, rotation_matrix
 from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
 
@@ -70,121 +70,105 @@ class ArmCommand:
     force_n: float | None = None
 
 
-class Arm(Protocol):
-    """An arm under hybrid control: velocity along the surface, velocity or force along its normal.
-
-    A command holds until the next one, but at most for a fraction of a second: an arm without commands stops by itself.
-    Any method but `close` raises DeviceError if the arm cannot be reached.
-    """
-
-    def connect(self) -> None:
-        """Reach the arm and clear its faults; may be called again after `close`."""
-
-    def close(self) -> None:
-        """Stop, and let the arm go; never raises, may be called twice."""
-
-    def state(self) -> ArmState:
-        """Return the newest measured state at once; its age tells whether the arm still answers."""
-
-    def command(self, command: ArmCommand) -> None:
-        """Take over a command at once; it does not wait for the arm to follow."""
-
-    def stop(self) -> None:
-        """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
-
-
 class ForceReading(enum.Enum):
-    """What the measured force of an arm does by itself; decides what counts as a frozen reading.
-
-    An arm says it by an attribute `force_reading`; one that has none counts as `CONTROLLED`, which asks least.
-    """
+    """What the measured force of an arm does by itself; decides what counts as a frozen reading."""
 
     NOISY = enum.auto()  # never twice the same to the last bit: a force sensor finer than its noise
     MEASURED = enum.auto()  # may stay the same, but not while the finger moves along the normal in contact
     CONTROLLED = enum.auto()  # the arm may keep it the same while it follows a surface: motor currents, own force mode
 
 
-@runtime_checkable
-class Recoverable(Protocol):
-    """An arm that knows how to come free from a fault without being connected again."""
+class Arm:
+    """An arm under hybrid control: velocity along the surface, velocity or force along its normal; a base of all arms.
 
-    def recover(self) -> None:
-        """Clear the fault; DeviceError if that is not possible. Whoever calls it sees that the arm may move."""
+    A command holds until the next one, but at most for a fraction of a second: an arm without commands stops by itself.
+    Any method but `close` raises DeviceError if the arm cannot be reached. What an arm can do beyond moving, it
+    overrides.
 
+    Attributes
+    ----------
+    Params : type
+        Its dataclass of parameters.
+    force_reading : ForceReading
+        What its measured force does by itself; this one asks least.
+    reboots : bool
+        Whether it has motors that latch an error until they are rebooted.
+    """
 
-@runtime_checkable
-class Checkable(Protocol):
-    """An arm that can be asked whether it is there without taking control of it."""
+    Params: type[Any]
+    force_reading = ForceReading.CONTROLLED
+    reboots = False
+
+    def __init__(self, params: Any) -> None:
+        """Take the parameters; nothing is reached yet."""
+
+    def connect(self) -> None:
+        """Reach the arm and clear its faults; may be called again after `close`."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Stop, and let the arm go; never raises, may be called twice."""
+        raise NotImplementedError
+
+    def state(self) -> ArmState:
+        """Return the newest measured state at once; its age tells whether the arm still answers."""
+        raise NotImplementedError
+
+    def command(self, command: ArmCommand) -> None:
+        """Take over a command at once; it does not wait for the arm to follow."""
+        raise NotImplementedError
+
+    def stop(self) -> None:
+        """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
+        raise NotImplementedError
 
     def check(self) -> None:
-        """Return if it answers and could move; raise DeviceError, with what stands in the way, if not."""
+        """Return if the arm answers and could move, without keeping control; DeviceError says why not."""
+        try:
+            self.connect()
+            self.state()
+        finally:
+            self.close()
 
-
-@runtime_checkable
-class Rebootable(Protocol):
-    """An arm of motors that latch an error until they are rebooted."""
+    def recover(self) -> None:
+        """Come free from a fault without being connected again; whoever calls it sees that the arm may move."""
+        raise DeviceError('this arm comes free from a fault only by being connected again')
 
     def reboot(self) -> str:
-        """Let go, reboot what reports an error, stay unconnected; return what was done, or raise DeviceError."""
-
-
-@runtime_checkable
-class Warns(Protocol):
-    """An arm that tells what is not as it should be although it moves."""
+        """Let go, reboot the motors that report an error, stay unconnected; return what was done."""
+        raise DeviceError('this arm has no motors that could be rebooted; use recover')
 
     def warning(self) -> str:
-        """Return it in a sentence, '' if there is nothing."""
-
-
-@runtime_checkable
-class Doubting(Protocol):
-    """An arm that tells why a motion must end although it obeys: then the finger can still be lifted."""
+        """Return in a sentence what is not as it should be although the arm moves, '' if nothing."""
+        return ''
 
     def doubt(self) -> str:
-        """Return it in a sentence, '' if there is no reason."""
-
-
-@runtime_checkable
-class Zeroing(Protocol):
-    """An arm that zeroes its force sensor itself: at rest in free air, which a rise must have shown it."""
+        """Return in a sentence why a motion must end although the arm obeys and can still lift, '' if none."""
+        return ''
 
     @property
     def zeroed(self) -> bool:
-        """Whether it did since it was connected, or recovered; before, its force is no measure of contact."""
+        """Whether the force is a measure of contact: not before an arm that zeroes its sensor itself has done so."""
+        return True
 
-
-@runtime_checkable
-class SurfaceBound(Protocol):
-    """An arm with a base frame, in which the surface has a pose."""
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals that the operator should know, by name; DeviceError if the arm is not connected."""
+        return {}
 
     @property
     def base_frame_id(self) -> str:
-        """Name of the base frame on tf."""
+        """Name of the base frame on tf, in which the surface has a pose; '' if the arm has none."""
+        return ''
 
     @property
     def surface_pose(self) -> tuple[float, ...]:
         """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
+        raise NotImplementedError
 
     def move_surface(self, pose: Sequence[float]) -> None:
         """Let go, and take over another pose of the surface, (6,); it holds from the next connection on."""
-
-
-@runtime_checkable
-class Counting(Protocol):
-    """An arm that counts what its operator should know."""
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals by name; DeviceError if it is not connected."""
-
-
-class ArmClass(Protocol):
-    """A class of arms: its parameter dataclass, and how to make one from it."""
-
-    Params: type[Any]
-
-    def __call__(self, params: Any) -> Arm:
-        """Return an arm that is not yet connected."""
+        raise NotImplementedError
 
 
 # --------------------

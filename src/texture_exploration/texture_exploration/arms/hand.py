@@ -7,10 +7,10 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol
 
 from texture_core.config import find_file, load_yaml, unknown_name
-from texture_core.errors import InvalidParameter, TextureError
+from texture_core.errors import DeviceError, InvalidParameter, TextureError
 from texture_exploration.arms.arm import ArmCommand, CommandLimits, Vector
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
 
@@ -149,13 +149,8 @@ class Hand(Protocol):
     def warning(self) -> str:
         """Return in a sentence what is not as it should be although the hand moves, '' if nothing."""
 
-
-@runtime_checkable
-class RebootableHand(Protocol):
-    """A hand whose motors latch errors until they are rebooted."""
-
     def reboot(self) -> str:
-        """Let go, reboot what reports an error, stay unconnected; return in words what was done."""
+        """Let go, reboot what reports an error, stay unconnected; return in words what was done, or DeviceError."""
 
 
 # --------------------
@@ -460,6 +455,16 @@ class SimulatedHand:
     def warning(self) -> str:
         """Nothing ever is amiss that `state` does not tell."""
         return ''
+
+    def reboot(self) -> str:
+        """Refuse.
+
+        Raises
+        ------
+        DeviceError
+            Always.
+        """
+        raise DeviceError('a simulated hand has no motors that could be rebooted')
 
     def _send(self, fingers: Sequence[str], command: ArmCommand) -> None:
         for name in fingers:

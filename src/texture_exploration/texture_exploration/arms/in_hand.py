@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from texture_core.config import find, param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
-from texture_exploration.arms.arm import ArmCommand, ArmState, CommandLimits, Vector
+from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, CommandLimits, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
-from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, RebootableHand, SimulatedHand
+from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
 
 HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_SHARE = 0.5  # one that presses less has lost it
@@ -65,7 +65,7 @@ HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
 }
 
 
-class InHandArm:
+class InHandArm(Arm):
     """A Dynamixel hand: hold from `connect` on, move the sliding fingers alike; see `texture_exploration.arms.arm.Arm`.
 
     The state is the mean of the sliding fingers. A holding finger that presses with less than half of the wanted force
@@ -73,6 +73,7 @@ class InHandArm:
     """
 
     Params = InHandParams
+    reboots = True
 
     def __init__(self, params: InHandParams = InHandParams(), hand: Hand | None = None) -> None:
         self._params = params
@@ -152,8 +153,6 @@ class InHandArm:
         DeviceError
             If the hand has no motors that can be rebooted.
         """
-        if not isinstance(self.hand, RebootableHand):
-            raise DeviceError(f"the hand '{self._params.hand}' has no motors that could be rebooted")
         self.close()
         return self.hand.reboot()
 

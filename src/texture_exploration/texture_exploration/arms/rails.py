@@ -17,7 +17,7 @@ import serial
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
-from texture_exploration.arms.arm import ArmCommand, ArmState, CommandLimits, Vector
+from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, CommandLimits, Vector
 
 # --------------------
 # Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of our own.
@@ -99,7 +99,7 @@ class RailsParams(CommandLimits):
     )
 
 
-class RailsArm:
+class RailsArm(Arm):
     """Two rails and a pressing motor behind a microcontroller; see `texture_exploration.arms.arm.Arm`."""
 
     Params = RailsParams

@@ -18,6 +18,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.types import Array, quaternion_matrix
 from texture_exploration.arms.arm import (
+    Arm,
     ArmCommand,
     ArmState,
     CommandedVelocity,
@@ -566,7 +567,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
     return topics
 
 
-class RosControllersArm:
+class RosControllersArm(Arm):
     """An arm that ROS drives by a Cartesian velocity controller; see `texture_exploration.arms.arm.Arm`.
 
     Zero velocity is commanded on every way out: a stop, a fault, a command that is too old, `close`, and by a process

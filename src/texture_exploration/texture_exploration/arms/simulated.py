@@ -14,7 +14,15 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
-from texture_exploration.arms.arm import ArmCommand, ArmState, CommandLimits, ForceReading, Vector, VelocityForceControl
+from texture_exploration.arms.arm import (
+    Arm,
+    ArmCommand,
+    ArmState,
+    CommandLimits,
+    ForceReading,
+    Vector,
+    VelocityForceControl,
+)
 from texture_exploration.force_control import ForceLoopParams
 
 # --------------------
@@ -190,7 +198,7 @@ class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams, CommandLimits)
     )
 
 
-class SimulatedArm:
+class SimulatedArm(Arm):
     """A finger that follows velocities exactly and, if it has a force mode, approaches a wanted force exponentially.
 
     Without a force mode velocities come into effect after `loop_delay_s`.

@@ -21,6 +21,7 @@ from dataclasses import astuple, dataclass
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import (
+    Arm,
     ArmCommand,
     ArmState,
     CommandLimits,
@@ -739,7 +740,7 @@ UNSTEADY = (
 )
 
 
-class UrArm:
+class UrArm(Arm):
     """A Universal Robots e-Series through ur-rtde. Nothing here waits for the controller longer than it says.
 
     Parameters

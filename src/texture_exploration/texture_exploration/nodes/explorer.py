@@ -41,7 +41,6 @@ from texture_core.ros import (
     to_stamp,
 )
 from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate, quaternion
-from texture_exploration.arms.arm import Rebootable, SurfaceBound
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.explorer import (
     STILL_MOVING,
@@ -218,9 +217,9 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
         self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
         self.create_service(Trigger, 'lift', self._on_lift, callback_group=group)
-        if isinstance(self._explorer.arm, Rebootable):
+        if self._explorer.arm.reboots:
             self.create_service(Trigger, 'reboot', self._on_reboot, callback_group=group)
-        if isinstance(self._explorer.arm, SurfaceBound):
+        if self._explorer.arm.base_frame_id:
             self.create_service(Trigger, 'touch_surface', self._on_touch_surface, callback_group=group)
             self.create_service(Trigger, 'forget_touches', self._on_forget_touches, callback_group=group)
         ActionServer(
@@ -247,7 +246,7 @@ class ExplorerNode(PatientLifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """See whether the arm answers, without control of it."""
         # The activation, which follows at once, sees that too.
-        if not self._autostart and not self._tried(self._explorer.check):
+        if not self._autostart and not self._tried(self._explorer.arm.check):
             return TransitionCallbackReturn.FAILURE
         return super().on_configure(state)
 
@@ -471,7 +470,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _broadcast_surface(self) -> None:
         arm = self._explorer.arm
-        if isinstance(arm, SurfaceBound):
+        if arm.base_frame_id:
             self._frames.surface(arm.base_frame_id, arm.surface_pose)
 
     def _publish(self, state: ExplorationState) -> None:
@@ -509,7 +508,7 @@ class ExplorerNode(PatientLifecycleNode):
             return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
         if fault:
             return 'ERROR', fault, numbers
-        warning = self._explorer.warning() or self._not_lifted()
+        warning = self._explorer.arm.warning() or self._not_lifted()
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
 
 
