@@ -135,11 +135,14 @@ class ForceLag:
         if self._samples and time_s <= self._samples[-1][0]:
             return False
         self._samples.append((time_s, height_m, force_n))
-        if len(self._samples) == 1 and math.isnan(self._begin_s):
-            self._begin_s = time_s
-        if len(self._samples) < 2 * BLOCK:
-            return False
         samples = list(self._samples)
+        if math.isnan(self._begin_s):
+            self._begin_s = time_s
+        if len(samples) >= BLOCK and len({force_n for _, _, force_n in samples[-BLOCK:]}) == 1:
+            self.value_s = 0.0
+            return True  # without any noise: constant or frozen, which a movement shows
+        if len(samples) < 2 * BLOCK:
+            return False
         took_s, went_m, rose_n = (
             (sum(row[of] for row in samples[BLOCK:]) - sum(row[of] for row in samples[:BLOCK])) / BLOCK
             for of in range(3)
