@@ -325,6 +325,26 @@ def _vector(values: Array) -> Vector:
     return x, y, z
 
 
+class SurfaceArm(Arm):
+    """An arm with a base frame; its parameters are `SurfacePoseParams`."""
+
+    def __init__(self, params: Any) -> None:
+        self._params = params
+        self._frame = SurfaceFrame(params.surface_pose)
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame."""
+        pose: tuple[float, ...] = self._params.surface_pose
+        return pose
+
+    def move_surface(self, pose: Sequence[float]) -> None:
+        """Let go, and take over another pose of the surface; it holds from the next connection on."""
+        self.close()
+        self._params = self._params.at_surface(pose)
+        self._frame = SurfaceFrame(self._params.surface_pose)
+
+
 # --------------------
 # Tangential force of a sliding finger, from the force vector of a wrist sensor.
 
@@ -502,6 +522,33 @@ class DelayedVelocity:
 
 # --------------------
 # Find out whether the finger is in free air, from the force while it rises.
+
+UNSTEADY = (
+    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
+    "the finger, and raise 'zero_steady_n' above the noise of the sensor"
+)
+
+
+@dataclass(frozen=True)
+class ZeroingParams:
+    """When a finger counts as in free air; a base of the parameters of each arm that zeroes its force sensor there."""
+
+    zero_rise_m: float = param(
+        0.003,
+        'Sets the rise, at constant force, after which the force is zeroed; a larger rise zeroes it less often.',
+        unit='m',
+        low=0.001,
+        high=0.05,
+    )
+    zero_steady_n: float = param(
+        0.5,
+        'Sets the largest change of the smoothed force that counts as constant; it must exceed the noise of the '
+        'sensor.',
+        unit='N',
+        low=0.05,
+        high=5.0,
+    )
+
 
 SMOOTHING_S = 0.02  # time constant over which the force is averaged: noise is no contact
 

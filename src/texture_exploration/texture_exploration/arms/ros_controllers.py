@@ -18,16 +18,18 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.types import Array, quaternion_matrix
 from texture_exploration.arms.arm import (
-    Arm,
+    UNSTEADY,
     ArmCommand,
     ArmState,
     CommandedVelocity,
     CommandLimits,
     ForceReading,
     ForceZero,
+    SurfaceArm,
     SurfaceFrame,
     SurfacePoseParams,
     Vector,
+    ZeroingParams,
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
@@ -38,7 +40,7 @@ from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, Listening
 
 
 @dataclass(frozen=True)
-class RosControllersParams(ForceLoopParams, SurfacePoseParams, CommandLimits):
+class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, CommandLimits):
     """Topics, frames and rates of the controllers, the tool, the surface, and the supervision."""
 
     twist_topic: str = param(
@@ -162,21 +164,6 @@ class RosControllersParams(ForceLoopParams, SurfacePoseParams, CommandLimits):
         unit='s',
         low=0.0,
         high=0.1,
-    )
-    zero_rise_m: float = param(
-        0.003,
-        'Sets the rise, at constant force, after which the force is zeroed; a larger rise zeroes it less often.',
-        unit='m',
-        low=0.001,
-        high=0.05,
-    )
-    zero_steady_n: float = param(
-        0.5,
-        'Sets the largest change of the smoothed force that counts as constant; it must exceed the noise of the '
-        'sensor.',
-        unit='N',
-        low=0.05,
-        high=5.0,
     )
     connect_timeout_s: float = param(
         5.0,
@@ -543,10 +530,6 @@ RISE_M_S = 0.02
 MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
 POLL_S = 0.005
 NOT_CONNECTED = 'the arm is not connected; connect it first'
-UNSTEADY = (
-    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
-    "the finger, and raise 'zero_steady_n' above the noise of the sensor"
-)
 
 
 def open_topics(params: RosControllersParams) -> ControllerTopics:
@@ -567,7 +550,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
     return topics
 
 
-class RosControllersArm(Arm):
+class RosControllersArm(SurfaceArm):
     """An arm that ROS drives by a Cartesian velocity controller; see `texture_exploration.arms.arm.Arm`.
 
     Zero velocity is commanded on every way out: a stop, a fault, a command that is too old, `close`, and by a process
@@ -591,6 +574,7 @@ class RosControllersArm(Arm):
     """
 
     Params = RosControllersParams
+    _params: RosControllersParams
 
     def __init__(
         self,
@@ -599,12 +583,11 @@ class RosControllersArm(Arm):
         open_topics: Callable[[RosControllersParams], ControllerTopics] = open_topics,
         own_thread: bool = True,
     ) -> None:
-        self._params = params
+        super().__init__(params)
         self._clock = clock
         self._open_topics = open_topics
         self._own_thread = own_thread
         self.force_reading = ForceReading.MEASURED if params.force_is_quantised else ForceReading.NOISY
-        self._frame = SurfaceFrame(params.surface_pose)
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
@@ -727,17 +710,6 @@ class RosControllersArm(Arm):
     def base_frame_id(self) -> str:
         """Name of the base frame on tf."""
         return self._params.base_frame_id
-
-    @property
-    def surface_pose(self) -> tuple[float, ...]:
-        """Pose of the surface in the base frame."""
-        return self._params.surface_pose
-
-    def move_surface(self, pose: Sequence[float]) -> None:
-        """Let go, and take over another pose of the surface; it holds from the next connection on."""
-        self.close()
-        self._params = self._params.at_surface(pose)
-        self._frame = SurfaceFrame(self._params.surface_pose)
 
     @property
     def zeroed(self) -> bool:

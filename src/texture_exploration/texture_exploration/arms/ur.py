@@ -14,21 +14,22 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import astuple, dataclass
 
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import (
-    Arm,
+    UNSTEADY,
     ArmCommand,
     ArmState,
     CommandLimits,
     ForceReading,
-    SurfaceFrame,
+    SurfaceArm,
     SurfacePoseParams,
     Vector,
+    ZeroingParams,
     tangential_force_n,
 )
 
@@ -197,7 +198,7 @@ def failure_message(text: str) -> bytes:
 
 
 @dataclass(frozen=True)
-class UrArmParams(SurfacePoseParams, CommandLimits):
+class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
     ip: str = param('127.0.0.2', 'Sets the IP address of the controller; the default is that of the emulated one.')
@@ -249,21 +250,6 @@ class UrArmParams(SurfacePoseParams, CommandLimits):
         'sensor; the watchdog waits as long.',
         unit='s',
         low=0.2,
-        high=5.0,
-    )
-    zero_rise_m: float = param(
-        0.003,
-        'Sets the rise, at constant force, after which the force sensor is zeroed; a larger rise zeroes it less often.',
-        unit='m',
-        low=0.001,
-        high=0.05,
-    )
-    zero_steady_n: float = param(
-        0.5,
-        'Sets the largest change of the smoothed force that counts as constant; it must exceed the noise of'
-        ' the sensor.',
-        unit='N',
-        low=0.05,
         high=5.0,
     )
     unlock_protective_stop: bool = param(
@@ -734,13 +720,9 @@ STANDSTILL = ArmCommand()
 RECOVERY_S = 6.0
 POLL_S = 0.01
 WATCHDOG_S = 0.5  # beside its period, until it has ended a program
-UNSTEADY = (
-    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
-    "the finger, and raise 'zero_steady_n' above the noise of the sensor"
-)
 
 
-class UrArm(Arm):
+class UrArm(SurfaceArm):
     """A Universal Robots e-Series through ur-rtde. Nothing here waits for the controller longer than it says.
 
     Parameters
@@ -751,10 +733,10 @@ class UrArm(Arm):
 
     Params = UrArmParams
     force_reading = ForceReading.NOISY  # in double precision
+    _params: UrArmParams
 
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:
-        self._params = params
-        self._frame = SurfaceFrame(params.surface_pose)
+        super().__init__(params)
         self._link: WorkerLink | None = None
         self._series = 0  # of the controller that was connected last
         self._paused = False  # a stop by the safety system may have left our program paused
@@ -883,17 +865,6 @@ class UrArm(Arm):
     def base_frame_id(self) -> str:
         """Name of the base frame on tf."""
         return BASE_FRAME_ID
-
-    @property
-    def surface_pose(self) -> tuple[float, ...]:
-        """Pose of the surface in the base frame."""
-        return self._params.surface_pose
-
-    def move_surface(self, pose: Sequence[float]) -> None:
-        """Let go, and take over another pose of the surface; it holds from the next connection on."""
-        self.close()
-        self._params = self._params.at_surface(pose)
-        self._frame = SurfaceFrame(self._params.surface_pose)
 
     @property
     def worker_pid(self) -> int:
