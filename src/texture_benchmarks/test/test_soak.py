@@ -202,6 +202,8 @@ def test_a_hazard_that_breaks_a_limit_is_named(changed, asked, tmp_path) -> None
     found = HazardRecord('guard killed', True, 'success', 'the motion ended as asked', 12.0, 0.05, 0.0)
     records = [found, found._replace(**changed)]
     assert [result.asked for result in check_hazards(records) if not result.holds] == asked
-    assert (
-        json.loads(write_hazards(records, tmp_path).read_text())['numbers']['hazards']['guard killed']['peak_n'] == 12
+    numbers = json.loads(write_hazards(records, tmp_path, 0, 60.0).read_text())['numbers']
+    assert (numbers['injections'], numbers['hazards']['guard killed']['peak_n']) == (
+        sum(item.hazard != 'none' for item in records),
+        12,
     )

@@ -609,12 +609,12 @@ def check_hazards(records: Sequence[HazardRecord]) -> list[Requirement]:
     ]
 
 
-def write_hazards(records: Sequence[HazardRecord], out: Path) -> Path:
-    """Write hazards.json into a folder; return its path."""
+def write_hazards(records: Sequence[HazardRecord], out: Path, seed: int, duration_s: float) -> Path:
+    """Write hazards.json and hazards.png into a folder; return the path of the figures."""
     numbers = {
         name: {
             'explorations': len(own),
-            'successes': sum(item.ending == SUCCESS for item in own),
+            'endings': dict(Counter(item.ending for item in own)),
             'peak_n': max(item.peak_n for item in own),
             'above_ms': 1e3 * max(item.above_s for item in own),
             'left_n': max(item.left_n for item in own),
@@ -623,10 +623,23 @@ def write_hazards(records: Sequence[HazardRecord], out: Path) -> Path:
         for name in dict.fromkeys(item.hazard for item in records)
         if (own := [item for item in records if item.hazard == name])
     }
+    with chart(out / 'hazards.png', (8.0, 4.0)) as figure:
+        axes = figure.subplots()
+        axes.barh(list(numbers), [one['peak_n'] for one in numbers.values()], color=COLOURS[0])
+        axes.axvline(FORCE_LIMIT_N, color='black', linewidth=0.8)
+        axes.set(xlabel='highest true force in any direction (N); line: limit', xlim=(0, None))
     return BenchmarkResult(
         name='hazards',
         measured='true force on the finger in any direction, its time above the limit, and what is left at the end',
         data='emulated arm behind ROS controllers; faults injected in the slide or before the arm is connected',
         split='none: one run',
-        numbers={'requirements': [found._asdict() for found in check_hazards(records)], 'hazards': numbers},
+        numbers={
+            'seed': seed,
+            'duration_s': duration_s,
+            'explorations': len(records),
+            'injections': sum(item.hazard != NO_HAZARD for item in records),
+            'requirements': [found._asdict() for found in check_hazards(records)],
+            'hazards': numbers,
+        },
+        charts=(out / 'hazards.png',),
     ).write(out)

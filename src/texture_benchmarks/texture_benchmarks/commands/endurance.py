@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 
 from texture_benchmarks.ros.soak import SoakPlan, endure, endure_hazards
@@ -32,8 +33,10 @@ def run(options: argparse.Namespace) -> int:
         raise InvalidData(f"'{options.out}' cannot be used: {error.strerror}; name another with --out") from error
     plan = SoakPlan(options.duration, options.quiet, options.seed, options.model)
     if options.hazards:
+        begin_s = time.monotonic()
         records = endure_hazards(plan, lambda line: print(line, flush=True))
-        results, report = check_hazards(records), write_hazards(records, options.out)
+        report = write_hazards(records, options.out, plan.seed, time.monotonic() - begin_s)
+        results = check_hazards(records)
     else:
         record = endure(plan, options.out / 'nodes.log', lambda line: print(line, flush=True))
         results, report = check_requirements(record), write(record, options.out)
