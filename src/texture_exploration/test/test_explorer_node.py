@@ -127,6 +127,11 @@ def world(make_world):
     return make_world()
 
 
+def test_a_finger_that_may_be_pressed_is_lifted_at_the_start_if_that_is_asked_for(make_world):
+    world = make_world(lift_at_start=True)
+    assert world.explorer._explorer.arm.state().position[2] > 0.006  # from 0.002 by the clearance
+
+
 def test_a_service_call_explores_and_reports(world):
     response = world.result(world.call(**QUICK, surface='cork'))
     assert (response.success, response.message) == (True, 'the motion ended as asked')

@@ -76,6 +76,9 @@ def test_a_mistake_in_a_preset_is_reported_with_its_place():
         read_preset({**slide, 'sped_m_s': 1.0}, 'mine')
     with pytest.raises(InvalidParameter, match="'force_n' is 'hard'; a number is needed"):
         read_preset({**slide, 'force_n': 'hard'}, 'mine')
+    for number in (10**400, math.inf, math.nan):
+        with pytest.raises(InvalidParameter, match=r"'force_n' is .*; at most 1e\+06 is allowed"):
+            read_preset({**slide, 'force_n': number}, 'mine')
     with pytest.raises(InvalidParameter, match='a list of numbers is needed'):
         read_preset({**slide, 'vary': {'force_n': 2.0}}, 'mine')
     with pytest.raises(InvalidParameter, match="'slide_s' needs 'speed_m_s'"):

@@ -749,7 +749,7 @@ LIES = {
     'a surface upside down under a finger that presses': (
         {'start_height_m': -0.0001},
         {'surface_rx_rad': math.pi},
-        12.0,
+        10.0,
         'while the finger rose',
     ),
 }

@@ -25,6 +25,7 @@ from texture_exploration.motions import MOTIONS
 KEYS = ('paper', 'motion', 'repeats', 'vary')
 NUMBERS = tuple(name for name, kind in typing.get_type_hints(ExplorationRequest).items() if kind is float)
 MOST = 10_000  # combinations, and repeats of them
+LARGEST = 1e6  # number of a request; a larger one may not even be a float
 SHORTHANDS = ('direction_deg', 'slide_s')
 
 
@@ -108,6 +109,8 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InvalidParameter(f"{where}: '{key}' is {safe_repr(value)}; a number is needed")
+        if not abs(value) <= LARGEST:  # so is NaN
+            raise InvalidParameter(f"{where}: '{key}' is {safe_repr(value)}; at most {LARGEST:g} is allowed")
     values: dict[str, Any] = {key: float(value) for key, value in numbers.items() if key not in SHORTHANDS}
     if 'direction_deg' in numbers:
         values['direction_rad'] = math.radians(numbers['direction_deg'])
