@@ -17,6 +17,7 @@ from texture_exploration.force_control import (
     LagEstimate,
     SlopeObserver,
     StiffnessEstimate,
+    fitted_lag_s,
     spectral_radius,
 )
 from texture_exploration.stages import TouchParams
@@ -167,3 +168,15 @@ def test_a_late_arm_with_a_noisy_force_overshoots_by_a_fifth_at_most(make_table,
     table.pace = pace
     table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.01))
     assert 0.9 < max(forces) < 1.2
+
+
+@pytest.mark.parametrize('lag_s', [0.0, 0.03, 0.1])
+def test_the_lag_of_a_force_behind_its_height_is_that_of_a_spring_that_stops(lag_s):
+    """Down at 1 mm/s until 0.2 s, on 2 kN/m with 10 mN of noise."""
+    times_s = np.arange(0.0, 0.4, PERIOD_S)
+    heights_m = np.maximum(-0.0002, -0.001 * times_s)
+    forces_n = -2000.0 * np.interp(times_s - lag_s, times_s, heights_m)
+    forces_n += 0.01 * np.random.default_rng(1).standard_normal(len(times_s))
+    late = times_s > 0.1
+    found_s = fitted_lag_s(np.stack([times_s, heights_m], axis=1), np.stack([times_s, forces_n], axis=1)[late], 0.01)
+    assert found_s == pytest.approx(lag_s, abs=0.008)

@@ -548,6 +548,18 @@ def test_a_late_force_whose_stamps_are_new_is_told_by_the_first_touch(late_s, st
     assert max(map(max, forces.values())) < 5.0
 
 
+@pytest.mark.parametrize('stiffness_n_m', [2000.0, 5000.0])
+@pytest.mark.parametrize('late_s', [0.03, 0.05])
+def test_a_force_that_is_a_little_late_by_new_stamps_is_pressed_by_as_late_as_it_is(late_s, stiffness_n_m):
+    robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, stiffness_n_m=stiffness_n_m), touching_n=0.12)
+    robot.stamps_are_honest = False
+    robot.driven.connect()
+    robot.hold_up_force(late_s)
+    outcome, forces = robot.explore(replace(PRESS, force_n=5.0), TouchParams())
+    assert outcome.success, outcome.message
+    assert max(map(max, forces.values())) < 6.0
+
+
 class BusyRobot(Robot):
     """Now and then either end gets no computing time: nothing new comes, or steps are made up for in a row."""
 

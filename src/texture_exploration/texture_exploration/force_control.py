@@ -38,6 +38,8 @@ LAG_SLOWEST_M_S = 1e-5
 BLOCK = 5  # samples of which the mean is compared with that of the ones before
 STOPPED = 0.03  # share of the first speed below which a finger stands
 RISING = 4.0  # times its noise that a mean must rise to count
+LAGS_S = np.arange(0.0, 0.2, 0.002)  # that are tried; a longer one shows by a force that never stops to rise
+SURE = 12.0  # variances of the noise by which a lag must explain the force better than none
 
 
 class LagEstimate:
@@ -99,6 +101,26 @@ class LagEstimate:
         self._asked_m_s = asked_m_s if abs(asked_m_s) >= LAG_SLOWEST_M_S else 0.0
         self._constant_s = 0.0
         self._lags_s = []
+
+
+def fitted_lag_s(track: Array, samples: Array, noise_n: float) -> float:
+    """Return how much later than the height the force is, 0 if none explains it surely better: F(t) = a − k·z(t − lag).
+
+    Parameters
+    ----------
+    track : (n, 2)
+        Times and heights of the finger, s and m, from before the contact on.
+    samples : (m, 2)
+        Times and forces in contact, s and N.
+    noise_n
+        Standard deviation of the force, N.
+    """
+    heights = np.interp(samples[:, :1] - LAGS_S, track[:, 0], track[:, 1])
+    heights, forces = heights - heights.mean(axis=0), samples[:, 1] - samples[:, 1].mean()
+    shared, spread = forces @ heights, (heights**2).sum(axis=0)
+    explained = np.where((shared < 0.0) & (spread > 0.0), shared**2 / np.maximum(spread, 1e-30), 0.0)
+    best = int(explained.argmax())
+    return float(LAGS_S[best]) if explained[best] - explained[0] > SURE * noise_n**2 else 0.0
 
 
 class ForceLag:
@@ -472,6 +494,7 @@ LATE_IMPACT = (
     3.0  # so many times 'max_impact_n' may be met by an arm that is later than declared: coming down takes long
 )
 INTEGRAL_LAGS = 20.0  # the integral part takes at least so many lags: a faster one adds to the overshoot
+TRACK = 400  # heights that are remembered: 1.6 s at 250 Hz
 FORCE_LAG_S = 0.03  # a force that is later than 'loop_delay_s' by more than this is not pressed by
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
 
@@ -696,6 +719,8 @@ class ForceLoop:
         self._forces: list[float] = []
         self._noise_n = math.inf
         self._newest_ns = -1
+        self._track: deque[tuple[float, float]] = deque(maxlen=TRACK)  # newest times and heights, s and m
+        self._touched: list[tuple[float, float]] = []  # times and forces while it listens, s and N
         self._touch: ForceLag | None = None  # while the finger stands after the first touch, to hear the force
         self._heard = False
         self.force_lag_s = 0.0
@@ -710,6 +735,7 @@ class ForceLoop:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
         if contact.time_ns > self._newest_ns:
             self._newest_ns = contact.time_ns
+            self._track.append((contact.time_ns * 1e-9, contact.height_m))
             self._note_noise(contact.force_n)
         if contact.force_n < self._params.touching_n:
             self.stiffness.restart()
@@ -719,8 +745,16 @@ class ForceLoop:
             self._surface_m = contact.height_m
         if speed_m_s > SLOWEST_M_S:
             self.stiffness.fixed = True
-        self.stiffness.update(contact.height_m, contact.force_n)
+        # The force is that of where the finger was; with the newest height a late one looks soft as it is pressed.
+        self.stiffness.update(self._height_m(contact), contact.force_n)
         self._choose_gain()
+
+    def _height_m(self, contact: ContactState) -> float:
+        """Return where the finger was when the force was what it is now told to be."""
+        if not (self._heard and self.force_lag_s):
+            return contact.height_m
+        times_s, heights_m = zip(*self._track, strict=True)
+        return float(np.interp(contact.time_ns * 1e-9 - self.force_lag_s, times_s, heights_m))
 
     @property
     def noise_n(self) -> float:
@@ -776,7 +810,7 @@ class ForceLoop:
         if not math.isnan(estimated_n_m) and (settled or self._observer.running):
             feed_forward_m_s = self._observer.update(
                 contact.travelled_m,
-                height_m + force_n / estimated_n_m,
+                self._height_m(contact) + force_n / estimated_n_m,
                 speed_m_s,
                 max(self.noise_n, NOISE_SHARE * self._params.touching_n) / estimated_n_m,
                 self.noise_n / (BEARABLE * wanted_n),
@@ -798,11 +832,17 @@ class ForceLoop:
 
     def _listen(self, contact: ContactState) -> None:
         """Stand until the force does, and take over how late it is, before anything is pressed."""
-        self._touch = self._touch or ForceLag(self.noise_n)
+        if self._touch is None:
+            self._touch, self._touched = ForceLag(self.noise_n), []
+        self._touched.append((contact.time_ns * 1e-9, contact.force_n))
         if not self._touch.update(contact.time_ns, contact.height_m, contact.force_n):
             return
         self._heard = True
-        self.force_lag_s = self._touch.value_s
+        fitted_s = fitted_lag_s(np.array(self._track), np.array(self._touched), self.noise_n)
+        self.force_lag_s = max(self._touch.value_s, fitted_s)
+        if self.force_lag_s:  # what was seen so far was seen too late
+            self.stiffness.restart()
+            self.stiffness.value_n_m = math.nan
         self._adapt_to_lag()
         self._choose_gain()
 
