@@ -541,6 +541,7 @@ HAZARDS: Mapping[str, ArmHazard] = {
     'second commander': ArmHazard(commander=True, hold_s=1.0),
 }
 NO_HAZARD = 'none'
+ATTEMPTS = 3
 HARMLESS: Mapping[str, Any] = {
     'wall_m': 2.0,
     'invert_twist': False,
@@ -584,6 +585,7 @@ class HazardRecord(NamedTuple):
 def check_hazards(records: Sequence[HazardRecord]) -> list[Requirement]:
     """Return what is required of the explorations with hazards, and what was seen."""
     calm = [item for item in records if item.hazard == NO_HAZARD]
+    blocked = sum(all(item.ending != SUCCESS for item in calm[i : i + ATTEMPTS]) for i in range(len(calm)))
     missing = [item.hazard for item in records if not item.happened]
     nameless = [item.hazard for item in records if item.ending != SUCCESS and not item.message]
     longest = max(records, key=lambda item: item.above_s)
@@ -592,9 +594,9 @@ def check_hazards(records: Sequence[HazardRecord]) -> list[Requirement]:
         Requirement('every hazard comes', f'not: {", ".join(missing) or "none"}', not missing),
         Requirement('every exploration succeeds or is aborted by name', f'{len(nameless)} without', not nameless),
         Requirement(
-            'explorations after a hazard succeed',
-            f'{sum(item.ending == SUCCESS for item in calm)} of {len(calm)}',
-            all(item.ending == SUCCESS for item in calm),
+            f'after a hazard one of {ATTEMPTS} explorations succeeds',
+            f'{sum(item.ending == SUCCESS for item in calm)} of {len(calm)} succeeded',
+            not blocked,
         ),
         Requirement(
             f'no force above {FORCE_LIMIT_N:g} N for more than {ABOVE_S:g} s in any direction',
