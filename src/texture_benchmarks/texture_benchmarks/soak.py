@@ -627,7 +627,8 @@ def write_hazards(records: Sequence[HazardRecord], out: Path, seed: int, duratio
     }
     with chart(out / 'hazards.png', (8.0, 4.0)) as figure:
         axes = figure.subplots()
-        axes.barh(list(numbers), [one['peak_n'] for one in numbers.values()], color=COLOURS[0])
+        peaks_n = [max(item.peak_n for item in records if item.hazard == name) for name in numbers]
+        axes.barh(list(numbers), peaks_n, color=COLOURS[0])
         axes.axvline(FORCE_LIMIT_N, color='black', linewidth=0.8)
         axes.set(xlabel='highest true force in any direction (N); line: limit', xlim=(0, None))
     return BenchmarkResult(
