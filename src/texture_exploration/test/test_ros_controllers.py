@@ -354,9 +354,32 @@ def test_a_controller_that_listens_without_moving_the_arm_is_named_and_recovers(
     robot = Robot(TwistControllerParams(active=False))
     robot.driven.connect()
     robot.pass_time(0.5, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert 'mm commanded' in robot.driven.state().fault
-    assert 'is not active' in robot.driven.state().fault
+    assert 'mm commanded' in robot.driven.state().unsafe
+    assert 'is not active' in robot.driven.state().unsafe
     assert robot.is_commanded_to_rest
+    robot.pass_time(0.5, ArmCommand(normal_m_s=0.02))  # nor does it follow a lift
+    assert 'mm commanded' in robot.driven.state().fault
+    assert robot.is_commanded_to_rest
+
+
+@pytest.mark.parametrize('held_up_s', [0.5, 60.0])
+def test_an_arm_that_is_held_up_in_the_slide_lifts_the_finger_if_it_can(noisy, held_up_s):
+    """As by a controller that gets no computing time: it stands, and may obey again."""
+    until_ns, follow = [], noisy.arm.command
+
+    def stand(now_ns, velocity_m_s):
+        follow(now_ns, velocity_m_s if now_ns > until_ns[0] else np.zeros(3))
+
+    def hold_up():
+        if not until_ns:
+            until_ns.append(noisy.now_ns + round(held_up_s * 1e9))
+            noisy.arm.command = stand
+
+    patient = TouchParams(stall_s=5.0, lost_contact_s=5.0)
+    outcome, _ = noisy.explore(replace(PRESS, speed_m_s=0.05), patient, on_slide=hold_up)
+    assert 'mm commanded' in outcome.message
+    assert outcome.lifted is (held_up_s < 1.0)
+    assert (noisy.arm.finger().force_n == 0.0) is outcome.lifted
 
 
 def test_a_finger_that_stalls_in_mid_slide_aborts_within_half_a_second(monkeypatch):

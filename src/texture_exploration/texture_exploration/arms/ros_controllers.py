@@ -257,6 +257,7 @@ class ControllerTopics(Protocol):
 FOLLOW_NS = 300_000_000  # an arm with lag needs time to set off
 LONGEST_NS = 3_000_000_000  # what is slower than `follow_m` in this time is no motion: a force being held
 FOLLOWED_SHARE = 0.1  # a controller may limit speed and acceleration to its own
+STOOD_SHARE = 0.3  # an arm that went less in any direction stood still, and may be told to lift
 
 
 class FollowWatch:
@@ -269,10 +270,16 @@ class FollowWatch:
     ----------
     follow_m
         Commanded distance after which it counts, m.
+
+    Attributes
+    ----------
+    stood : bool
+        Whether an arm that did not follow stood still, and did not go another way.
     """
 
     def __init__(self, follow_m: float) -> None:
         self._follow_m = follow_m
+        self.stood = True
         self._begin: tuple[int, Array] | None = None
         self._asked_m: Array = np.zeros(3)
 
@@ -309,6 +316,7 @@ class FollowWatch:
             if now_ns - begin_ns > LONGEST_NS:
                 self.restart()
             return ''
+        self.stood = float(np.linalg.norm(place - start)) <= STOOD_SHARE * asked_m
         gone_m = float((place - start) @ self._asked_m) / asked_m
         took_s = (now_ns - begin_ns) * 1e-9
         self.restart()
@@ -847,7 +855,13 @@ class RosControllersArm(SurfaceArm):
             self._follow.restart()
             return ''
         late = self._follow.update(now_ns, self._tool.state('').position, self._commanded, held_s)
-        return late and f"{late}: the controller on '{topic}' is not active or holds back, or something is in the way"
+        if not late:
+            return ''
+        reason = f"{late}: the controller on '{topic}' is not active or holds back, or something is in the way"
+        if self._unsafe or not self._follow.stood:  # nor did it follow the lift, or where it goes nobody knows
+            return reason
+        self._unsafe = reason  # it may only have been held up: a lift is tried
+        return ''
 
     def _fault(self, now_ns: int) -> str:
         tool = self._tool
