@@ -163,7 +163,7 @@ class SoundCardSettings:
     )
     channels: int = param(1, 'Sets the number of channels that are read, from the first on.', low=1, high=8)
     decimation: int = param(
-        12,
+        3,  # 16 kHz: docs/sensors.md has what it gains over 4 and 8 kHz
         'Sets by what factor the rate is lowered behind a low-pass; a larger factor costs less computing time and '
         'keeps a smaller band, up to 0.34 of the lower rate.',
         low=1,

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from texture_core.config import folder
+from texture_core.types import FeatureVector
 from texture_estimation.decisions import FLOOR_WINDOWS, ONE_PLACE, fit_confidence_floor
 from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.evidence_rules import SoftVote, running_means
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant, linear_discriminant
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import held_out_parts, in_places, train
-from texture_features.examples import SlideConditions
+from texture_features.examples import LabelledFeatures, SlideConditions
 
 RELEASED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 CONTENT = {
@@ -158,13 +160,78 @@ def test_what_turns_with_the_force_is_judged_by_what_was_trained_near_it():
     assert (Discriminant.predictor(alone.parameters)(values).argmax(axis=1) == codes).mean() < 0.6
 
 
-def test_a_window_far_from_all_trained_forces_says_little():
+def test_a_window_far_from_all_trained_forces_counts_little():
     values, codes, groups = of_forces(np.random.default_rng(0))
     learner = ForceDiscriminant().of_examples(('signal/mean/pac', 'signal/force'), ('cork', 'felt'))
     predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
-    within, above = predictor(np.array([3.0, 4.0])), predictor(np.array([3.0, 40.0]))
-    assert np.ptp(within) > 1.0
-    assert np.ptp(above) < 1e-6 * np.ptp(within)
+    within, above = predictor.trust(np.array([[3.0, 1.0], [3.0, 40.0]]))
+    assert within > 0.5
+    assert above < 1e-6
+    assert np.argmax(predictor(np.array([-3.0, 40.0]))) == np.argmax(predictor(np.array([-3.0, 4.0])))  # the nearest
+
+
+def force_examples():
+    values, codes, groups = of_forces(np.random.default_rng(0))
+    return LabelledFeatures(
+        values=values,
+        labels=np.array(['cork', 'felt'])[codes],
+        groups=np.array([f'slide/{number}' for number in groups]),
+        names=('signal/mean/pac', 'signal/force'),
+        feature_set='abcd1234 signal=1000Hz*1',
+        window_s=0.5,
+        hop_s=0.25,
+    )
+
+
+def probabilities_after(model, forces):
+    evidence = EvidenceAccumulator(model)
+    found = []
+    for number, force in enumerate(forces):
+        values = np.array([3.0 if force < 2.0 else -3.0, force])
+        window = FeatureVector(
+            250_000_000 * number,
+            'a',
+            0.5,
+            0.25,
+            ('signal/mean/pac', 'signal/force'),
+            values,
+            feature_set=model.feature_set,
+        )
+        found.append(evidence.update(window).probabilities[0])
+    return found
+
+
+def test_evidence_from_far_outside_the_trained_forces_neither_adds_nor_dilutes():
+    examples = force_examples()
+    model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
+    model = replace(model, tempering_exponent=0.0)  # so that length alone adds nothing
+    near = probabilities_after(model, [1.0, 1.0, 1.0])
+    further = probabilities_after(model, [1.0, 1.0, 1.0, 40.0, 40.0])
+    assert near[-1] > 0.8  # 16 slides show no more than 0.83
+    assert further[-1] == pytest.approx(near[-1], abs=1e-6)
+    assert probabilities_after(model, [40.0, 40.0, 40.0])[-1] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_held_out_slides_are_followed_as_the_classifier_follows_them():
+    examples = force_examples()
+    rule = SoftVote(late_weight=0.25)
+    evidence, trusted = np.log([[0.9, 0.1], [0.2, 0.8], [0.6, 0.4]]), np.array([0.25, 0.5, 0.5])
+    means = running_means(rule, evidence, np.array([1.0, 1.5, 2.0]), trusted)
+    assert means[0] == pytest.approx(0.25 * evidence[0])  # a quarter of a window is trusted
+    assert means[1] == pytest.approx(0.5 * (0.25 * evidence[0] + 0.5 * evidence[1]) / 0.75)
+    model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
+    forces = [1.0, 4.5, 40.0, 1.0]
+    values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])
+    effective = 1.0 + 0.5 * np.arange(4)
+    followed = running_means(
+        model.recipe.evidence,
+        model.predict_log_proba(values),
+        effective,
+        np.array([model.trust(row) for row in values]),
+    )
+    expected = np.exp(model.recipe.evidence.log_posterior(followed, effective[:, None], model.tempering_exponent))
+    bound = model.error_bound
+    assert probabilities_after(model, forces) == pytest.approx([bound.limited(row)[0] for row in expected])
 
 
 def test_the_force_is_no_part_of_the_discriminants_and_without_it_there_is_one():

@@ -130,6 +130,7 @@ class EvidenceAccumulator:
         self._exploration_id = exploration_id
         self._over = False
         self._windows = self._evidence_ns = self._window_ns = self._end_ns = 0
+        self._trusted_ns = 0.0
         self._message = '' if self.model else NO_MODEL
         self._evidence = GroupedEvidence(
             self.model.n_trained if self.model else 0, self.model.recipe.evidence.group if self.model else 0
@@ -170,7 +171,9 @@ class EvidenceAccumulator:
         new_ns = max(0, end - max(vector.start_ns, self._end_ns))
         self._evidence_ns += new_ns
         effective_windows = self._evidence_ns / self._window_ns
-        weight = model.recipe.evidence.window_weight(effective_windows)
+        trusted = model.trust(vector.values)
+        self._trusted_ns += trusted * new_ns
+        weight = model.recipe.evidence.window_weight(effective_windows) * trusted
         self._evidence.add(window_evidence, new_ns / NANOSECONDS, weight)
         self._end_ns = max(end, self._end_ns)
         if self._moments is not None:
@@ -192,7 +195,8 @@ class EvidenceAccumulator:
             )
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
-        mean = self._evidence.mean
+        # As long as the windows that the classifier trusts do not add up to one, their mean counts less.
+        mean = self._evidence.mean * min(1.0, self._trusted_ns / self._window_ns)
         deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
         probabilities = self._with_added(
             model, model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent), effective_windows

@@ -280,7 +280,7 @@ class _Sum:
     time_s: float = 0.0
 
 
-def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array) -> Array:
+def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array, trusted: Array | float = 1.0) -> Array:
     """Return the weighted mean evidence of a slide after each window, where all windows decide together.
 
     Parameters
@@ -291,6 +291,9 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array)
         Of each window.
     effective_windows : (n_windows,)
         Effective window count including each window.
+    trusted : (n_windows,) or a number
+        How much the classifier trusts each window; weighs it, too. As long as the trusted ones do not add up to one
+        window, their mean counts less in proportion.
 
     Returns
     -------
@@ -302,8 +305,11 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array)
     >>> running_means(SoftVote(), np.array([[0.0], [1.0]]), np.array([1.0, 2.0])).tolist()
     [[0.0], [0.5]]
     """
-    weights = rule.window_weights(effective_windows)[:, None]
+    weights = (trusted * rule.window_weights(effective_windows))[:, None]
     means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
+    if np.ndim(trusted):
+        added = np.cumsum(trusted * np.diff(effective_windows, prepend=0.0))
+        means *= np.minimum(added, 1.0)[:, None]
     return means
 
 

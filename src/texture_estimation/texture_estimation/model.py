@@ -212,6 +212,12 @@ class TextureModel:
             return self.predictor.scores(activations), activations
         return self.predictor(X), self.activations(X)
 
+    @cached_property
+    def trust(self) -> Callable[[Array], float]:
+        """How much a window of these features, (n_features,), counts in its slide."""
+        of: Callable[[Array], float] | None = getattr(self.predictor, 'trust', None)
+        return of or (lambda _: 1.0)
+
     def predict_log_proba(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features).
 

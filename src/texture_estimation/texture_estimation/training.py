@@ -43,6 +43,7 @@ from texture_estimation.learners.learner import (
     extras_of,
     hidden_layer,
     of_examples,
+    trust,
 )
 from texture_estimation.learners.mlp import AugmentedExamples
 from texture_estimation.model import TextureModel
@@ -91,7 +92,9 @@ def fit_learner(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups
     fitted = fit(*_with_resized(examples, codes, groups, rows), **extras)
     if fitted.held_out is None:
         return fitted
-    return replace(fitted, held_out=fitted.held_out[np.cumsum(times) - times])
+    first = np.cumsum(times) - times
+    trusted = None if fitted.trusted is None else fitted.trusted[first]
+    return replace(fitted, held_out=fitted.held_out[first], trusted=trusted)
 
 
 def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows: Codes) -> tuple[Array, Codes, Codes]:
@@ -363,15 +366,16 @@ def fit_novelty(
         )
         for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
             values = slide.values
+            trusted: Array | float = 1.0
             if predictor is not None:
-                log_probabilities = predictor(values)
+                log_probabilities, trusted = predictor(values), trust(predictor, values)
             elif not slide.disturbance:
                 log_probabilities = fitted.held_out[groups == slide.group]
             else:
                 continue
             evidence = rule.window_evidence(log_probabilities)
             effective_windows = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
-            means = running_means(rule, evidence, effective_windows)
+            means = running_means(rule, evidence, effective_windows, trusted)
             followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
             traces.append(_with_scores(followed, values, evidence, predictor, distances))
     final = learner.predictor(fitted.parameters)
@@ -548,15 +552,19 @@ def held_out_slides(
     slides = []
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
-        follow = _follow_group if rule.group else _follow
-        slides.append(HeldOutSlide(int(codes[rows[0]]), *follow(rule, window_evidence_rows[rows], overlap)))
+        if rule.group:
+            followed = _follow_group(rule, window_evidence_rows[rows], overlap)
+        else:
+            trusted = 1.0 if fitted.trusted is None else fitted.trusted[rows]
+            followed = _follow(rule, window_evidence_rows[rows], overlap, trusted)
+        slides.append(HeldOutSlide(int(codes[rows[0]]), *followed))
     return slides
 
 
-def _follow(rule: EvidenceRule, evidence: Array, overlap: float) -> tuple[Array, Array]:
+def _follow(rule: EvidenceRule, evidence: Array, overlap: float, trusted: Array | float) -> tuple[Array, Array]:
     """Return mean log-evidence and effective window count after each window of a slide."""
     effective_window_counts = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
-    return running_means(rule, evidence, effective_window_counts), effective_window_counts
+    return running_means(rule, evidence, effective_window_counts, trusted), effective_window_counts
 
 
 def _follow_group(rule: EvidenceRule, evidence: Array, overlap: float) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, FoldFit, Predictor, assign_folds
+from texture_estimation.learners.learner import Codes, Fitted, FoldFit, Predictor, assign_folds, trust
 from texture_estimation.numerics import log_loss, log_softmax
 
 # --------------------
@@ -191,19 +191,24 @@ class Discriminant:
                 self._fit(X, y, groups, n_labels, 1.0), None, 'not calibrated, as a label has a single window'
             )
         folds_of, note = split
-        scores = np.empty((len(y), n_labels))
+        scores, trusted = np.empty((len(y), n_labels)), np.empty(len(y))
         for part in np.unique(folds_of):
             held = folds_of == part
-            scores[held] = self.predictor(self._fit(X[~held], y[~held], groups[~held], n_labels, 1.0))(X[held])
+            predictor = self.predictor(self._fit(X[~held], y[~held], groups[~held], n_labels, 1.0))
+            scores[held], trusted[held] = predictor(X[held]), trust(predictor, X[held])
         best = minimize_scalar(
-            lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), y), bounds=(-2.0, 8.0), method='bounded'
+            lambda log_t: log_loss(trusted[:, None] * log_softmax(scores / math.exp(log_t)), y),
+            bounds=(-2.0, 8.0),
+            method='bounded',
         )
         temperature = math.exp(best.x)
         folds = [
             FoldFit(np.unique(groups[held]), self._fit(X[~held], y[~held], groups[~held], n_labels, temperature))
             for held in (folds_of == part for part in np.unique(folds_of))
         ]
-        return Fitted(self._fit(X, y, groups, n_labels, temperature), log_softmax(scores / temperature), note, folds)
+        return Fitted(
+            self._fit(X, y, groups, n_labels, temperature), log_softmax(scores / temperature), note, folds, trusted
+        )
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
@@ -225,6 +230,7 @@ FORCE = 'force'  # ends the name of the feature
 UNBOUND = -1
 STRETCHES = 6  # of a slide
 ELSEWHERE = 0.02  # of the weight of a window at the middle of a range, for those far from it: no class is without any
+FURTHEST = 30.0  # times the reach: a slide made wholly outside still has a label
 OUTERMOST = 0.05  # of the windows lie below the trained range, and as many above it
 
 
@@ -250,8 +256,9 @@ class ForceDiscriminantPredictor:
     >>> layers = np.array([[[1.0, -1.0], [0.0, 0.0]], [[-1.0, 1.0], [0.0, 0.0]]])  # what 1 N and 10 N say
     >>> log_forces = np.log([1.0, 10.0])
     >>> predictor = ForceDiscriminantPredictor(layers, np.zeros((2, 2)), log_forces, log_forces, 0.1, column=1)
-    >>> predictor(np.array([[2.0, 1.0], [2.0, 9.0], [2.0, 100.0]])).round(6).tolist()
-    [[2.0, -2.0], [-2.0, 2.0], [-0.0, 0.0]]
+    >>> windows = np.array([[2.0, 1.0], [2.0, 9.0], [2.0, 20.0]])
+    >>> predictor(windows).tolist(), predictor.trust(windows).round(3).tolist()
+    ([[2.0, -2.0], [-2.0, 2.0], [-2.0, 2.0]], [1.0, 1.0, 0.001])
     """
 
     weights: Array
@@ -269,9 +276,14 @@ class ForceDiscriminantPredictor:
         for number in np.unique(near).tolist():
             rows = near == number
             scores[rows] = X[rows] @ self.weights[number] + self.offsets[number]
-        beyond = np.maximum(np.maximum(self.trained[0] - force, force - self.trained[1]), 0.0)
-        scores *= np.exp(-beyond / self.reach)[..., None]
         return scores
+
+    def trust(self, X: Array) -> Array:
+        """Return how much each window counts, (...) of (..., n_features): less outside the trained forces."""
+        force = _log_force(X, self.column)
+        beyond = np.maximum(np.maximum(self.trained[0] - force, force - self.trained[1]), 0.0)
+        share: Array = np.exp(-np.minimum(beyond / self.reach, FURTHEST))
+        return share
 
 
 def _log_force(X: Array, column: int) -> Array:

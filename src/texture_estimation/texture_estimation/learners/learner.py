@@ -63,6 +63,15 @@ def hidden_layer(predictor: Predictor | HiddenPredictor) -> Callable[[Array], Ar
     return found
 
 
+def trust(predictor: Predictor, X: Array) -> Array:
+    """Return how much each window counts in its slide, (...) of (..., n_features), above 0; 1 if it does not say.
+
+    A predictor that was trained under some conditions has a method of this name.
+    """
+    of: Callable[[Array], Array] | None = getattr(predictor, 'trust', None)
+    return of(X) if of else np.ones(X.shape[:-1])
+
+
 @dataclass(frozen=True, eq=False)
 class FoldFit:
     """What a learner has fitted without some slides.
@@ -100,6 +109,8 @@ class Fitted:
         How the probabilities were calibrated, in words for the model's card.
     folds
         What the learner has fitted without each part of the slides; () if it does not say.
+    trusted : (n,) or None
+        How much each example counts in its slide, by the learner that has not seen it; all the same if None.
 
     Examples
     --------
@@ -112,6 +123,7 @@ class Fitted:
     held_out: Array | None
     note: str
     folds: Sequence[FoldFit] = ()
+    trusted: Array | None = None
 
 
 class Learner(Protocol):
