@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_bringup.demo import _growing, _Recorded
+from texture_bringup.demo import Recorded
 from texture_core.types import FeatureVector, TextureEstimate
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
@@ -26,14 +26,13 @@ def test_the_log_odds_of_one_window_are_those_of_the_model_and_further_windows_a
         Recipe.from_mapping(RECIPE, 'tiny'), LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.5)
     )
     window = np.array([0.9])
-    found = _Recorded()
+    found = Recorded()
     found.windows['e'] += [
         FeatureVector(start_ns, 'e', 0.5, 0.5, ('mean',), window, feature_set='a1') for start_ns in (0, 500_000_000)
     ]
     found.estimates['e'] = TextureEstimate(0, 'e', 'wool', True, 0.7, ('cork', 'wool'), (0.3, 0.7))
-    growing = _growing(model, found, 'e')
+    seconds, log_odds = found.log_odds('e', model)
     cork, wool = model.predict_log_proba(window[None])[0]
-    assert growing.seconds.tolist() == [0.5, 1.0]
-    np.testing.assert_allclose(growing.log_odds[0], [wool - cork, 0.0])
-    assert growing.log_odds[1, 0] > growing.log_odds[0, 0] > 0
-    assert (growing.label, growing.confidence) == ('wool', 0.7)
+    assert seconds.tolist() == [0.5, 1.0]
+    np.testing.assert_allclose(log_odds[0], [wool - cork, 0.0])
+    assert log_odds[1, 0] > log_odds[0, 0] > 0

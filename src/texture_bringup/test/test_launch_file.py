@@ -5,12 +5,11 @@ import pytest
 
 from texture_bringup.launcher import (
     NodeDescription,
+    all_arguments,
     command,
-    declared_arguments,
     expand,
     joined_namespace,
     parameter_value,
-    parse,
     read,
 )
 from texture_core.errors import InvalidLaunch, UnknownName
@@ -162,10 +161,10 @@ def test_broken_xml_and_another_root_are_named(tmp_path) -> None:
 def test_declared_arguments_are_listed_with_their_description(tmp_path) -> None:
     file = tmp_path / 'x.launch.xml'
     file.write_text('<launch><arg name="a" default="1" description="first"/><arg name="b"/></launch>')
-    assert [(a.name, a.default, a.description) for a in declared_arguments(file)] == [
-        ('a', '1', 'first'),
-        ('b', None, ''),
-    ]
+    assert {name: (item.get('default'), item.get('description')) for name, item in all_arguments(file, {}).items()} == {
+        'a': ('1', 'first'),
+        'b': (None, None),
+    }
 
 
 @pytest.mark.parametrize(
@@ -262,10 +261,10 @@ def shown(name, arguments):
     ],
 )
 def test_calls_are_expanded_innermost_first_and_all_else_stays(text, expanded) -> None:
-    assert expand(parse(text), shown) == expanded
+    assert expand(text, shown) == expanded
 
 
 @pytest.mark.parametrize('text', ['$(var x', '$()', '$(var  x)', '$(var "x)', '$(5)'])
 def test_a_call_that_is_not_well_formed_is_refused_with_the_form(text) -> None:
     with pytest.raises(InvalidLaunch, match='write'):
-        parse(text)
+        expand(text, shown)

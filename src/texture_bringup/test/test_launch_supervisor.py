@@ -23,7 +23,7 @@ class Launched:
 
     def __init__(self, file: Path, prefix: Path, options: tuple[str, ...] = ()) -> None:
         environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
-        command = [sys.executable, '-m', 'texture_bringup.commands.launch', *options, str(file)]
+        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', *options, str(file)]
         self.process = subprocess.Popen(
             command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The `texture` command: everything a user does with the suite, one sub-command each.
 
-A package brings its sub-commands as modules of its folder `commands`: the shared `setup.py` declares each as an entry
-point of the group `texture.commands`, and each object of a module for which the manifest lists several. A package of
+A package brings its sub-commands in its folder `commands`: the shared `setup.py` declares each module as an entry point
+of the group `texture.commands`, and each `Command` of a module for which the manifest lists several. A package of
 somebody else may declare some in the same way.
 """
 
@@ -18,47 +18,40 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
-from typing import Protocol, cast
+from typing import cast
 
-from texture_core.cli import run_program
+from texture_core.cli import Command, run_program
 from texture_core.config import find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
-
-
-class Module(Protocol):
-    """What a module of a sub-command holds, or an object in one."""
-
-    def configure(self, parser: argparse.ArgumentParser) -> None:
-        """Add the arguments of the sub-command."""
-
-    def run(self, options: argparse.Namespace) -> int:
-        """Do it, and return the exit code."""
 
 
 @cache
 def installed() -> Mapping[str, EntryPoint]:
     """Return the sub-commands of all installed packages, by name in the order of the alphabet.
 
-    The name of a module holds no hyphen, so the module `touch_surface` is the sub-command `touch-surface`.
+    A name in Python holds no hyphen and is no keyword: `touch_surface` is `touch-surface`, and `import_` is `import`.
     """
     found = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
-    return {entry.name.replace('_', '-'): entry for entry in found}
+    return {entry.name.rstrip('_').replace('_', '-'): entry for entry in found}
 
 
 def summary(command: EntryPoint) -> str:
-    """Return what a sub-command does: the first line of its module, which is read and not imported.
+    """Return what a sub-command does: the first line of its module, or the first text of the `Command` in it.
 
-    All of them together import numpy, scikit-learn and matplotlib, which would take seconds. A module with several has
-    an object for each, which knows it.
+    The module is read and not imported: all of them together import numpy, scikit-learn and matplotlib, which would
+    take seconds.
     """
-    if command.attr:
-        return str(command.load().summary)
     spec = importlib.util.find_spec(command.module)
     loader = cast(importlib.abc.InspectLoader | None, spec.loader if spec else None)
     source = loader.get_source(command.module) if loader else None
-    line = (ast.get_docstring(ast.parse(source or '')) or '').split('\n', 1)[0]
-    return line.partition(': ')[2].removesuffix('.')
+    tree = ast.parse(source or '')
+    if not command.attr:
+        return (ast.get_docstring(tree) or '').split('\n', 1)[0].partition(': ')[2].removesuffix('.')
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == command.attr:
+            return str(ast.literal_eval(cast(ast.Call, node.value).args[0]))
+    return ''
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,7 +79,7 @@ def _dispatch(given: Sequence[str]) -> int:
         return 0
     name, *rest = given
     command = find(installed(), name, 'sub-command of texture')
-    module = cast(Module, command.load())
+    module = cast(Command, command.load())
     parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
     module.configure(parser)
     return module.run(parser.parse_args(rest))
@@ -102,7 +95,7 @@ def _complete() -> None:
     for name, command in installed().items():
         own = parsers.add_parser(name)
         if name in words[1:2]:
-            cast(Module, command.load()).configure(own)
+            cast(Command, command.load()).configure(own)
     argcomplete.autocomplete(parser)
 
 

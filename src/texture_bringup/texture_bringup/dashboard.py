@@ -19,7 +19,7 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -209,15 +209,14 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
 
 def offered(limits: SafetyLimits) -> dict[str, list[dict[str, Any]]]:
     """Return the numbers of each motion: name, default, lowest, highest and unit."""
+    ranges = {name: (getattr(limits, low), getattr(limits, high), unit) for name, (low, high, unit) in RANGES.items()}
     return {
-        motion: [{'name': name, 'default': value, **_range(limits, name)} for name, value in defaults.items()]
+        motion: [
+            {'name': name, 'default': value, **dict(zip(('low', 'high', 'unit'), ranges[name], strict=True))}
+            for name, value in defaults.items()
+        ]
         for motion, defaults in DEFAULTS.items()
     }
-
-
-def _range(limits: SafetyLimits, name: str) -> dict[str, Any]:
-    low, high, unit = RANGES[name]
-    return {'low': getattr(limits, low), 'high': getattr(limits, high), 'unit': unit}
 
 
 # --------------------
@@ -230,21 +229,12 @@ ENDED_COLOURS = {'OK': 'grey', 'WARN': 'yellow', 'ERROR': 'red'}
 COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
 
 
-@dataclass(frozen=True)
-class NodeStatus:
-    """What a node said last, when (monotonic clock, s), and whether it ended with that."""
-
-    level: str
-    message: str
-    time_s: float
-    ended: bool = False
-
-
 class NodeStatuses:
     """Keep what each node said last."""
 
     def __init__(self) -> None:
-        self._lights: dict[str, NodeStatus] = {}
+        # Level, message, time (of a clock that only rises, s), and whether the node has ended with that.
+        self._lights: dict[str, tuple[str, str, float, bool]] = {}
 
     def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
         """Take note of a report; when there are too many names, the one silent for longest is forgotten.
@@ -263,25 +253,25 @@ class NodeStatuses:
             Whether the node has ended.
         """
         self._lights.pop(name, None)
-        self._lights[name[:MAX_CHARACTERS]] = NodeStatus(level, message[:MAX_CHARACTERS], time_s, ended)
+        self._lights[name[:MAX_CHARACTERS]] = level, message[:MAX_CHARACTERS], time_s, ended
         if len(self._lights) > MAX_LIGHTS:
             del self._lights[next(iter(self._lights))]
 
-    def newest(self, name: str) -> NodeStatus | None:
-        """Return what a node said last; None if it never did."""
-        return self._lights.get(name)
+    def newest(self, name: str) -> tuple[str, str] | None:
+        """Return level and message of what a node said last; None if it never did."""
+        return self._lights[name][:2] if name in self._lights else None
 
     def shown(self, time_s: float) -> list[dict[str, str]]:
         """Return name, colour and sentence of each light, by name."""
-        return [{'name': name, **_look(light, time_s - light.time_s)} for name, light in sorted(self._lights.items())]
-
-
-def _look(light: NodeStatus, age_s: float) -> dict[str, str]:
-    if light.ended:
-        return {'colour': ENDED_COLOURS.get(light.level, 'red'), 'message': f'ended: {light.message}'}
-    if age_s > SILENT_S:
-        return {'colour': 'red', 'message': f'silent for {age_s:.0f} s; it said last: {light.message}'}
-    return {'colour': COLOURS.get(light.level, 'red'), 'message': light.message}
+        found = []
+        for name, (level, message, said_s, ended) in sorted(self._lights.items()):
+            colour, text = COLOURS.get(level, 'red'), message
+            if ended:
+                colour, text = ENDED_COLOURS.get(level, 'red'), f'ended: {message}'
+            elif time_s - said_s > SILENT_S:
+                colour, text = 'red', f'silent for {time_s - said_s:.0f} s; it said last: {message}'
+            found.append({'name': name, 'colour': colour, 'message': text})
+        return found
 
 
 # --------------------
@@ -363,8 +353,7 @@ class Ring:
 
     def __init__(self, length_s: float) -> None:
         self._length_s = length_s
-        self._samples: NDArray[np.float64] = np.zeros(0)
-        self._at = 0
+        self._samples: NDArray[np.float64] = np.zeros(0)  # of the whole length, NaN where none came yet
         self._next: int | None = None
         self.rate_hz = 0.0
         self.sensor = ''
@@ -382,7 +371,7 @@ class Ring:
         fresh = signal.samples[:, 0].astype(np.float64)
         if gap:
             fresh = np.concatenate([np.full(min(gap, len(self._samples)), np.nan), fresh])
-        self._append(fresh[-len(self._samples) :])
+        self._samples = np.concatenate([self._samples, fresh])[-len(self._samples) :]
 
     def newest(self, length_s: float) -> NDArray[np.float64]:
         """Return the newest samples, (n_samples,), oldest first; NaN where none came yet.
@@ -398,19 +387,14 @@ class Ring:
             In the unit of the signal.
         """
         count = min(len(self._samples), round(length_s * self.rate_hz))
-        return np.roll(self._samples, -self._at)[len(self._samples) - count :]
+        return self._samples[len(self._samples) - count :]
 
     def _begin(self, signal: TactileSignal) -> None:
         size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MAX_SAMPLES))
         self._samples = np.full(size, np.nan)
-        self._at, self._next = 0, None
+        self._next = None
         self.rate_hz, self.sensor = signal.sampling_rate_hz, signal.sensor
         self.channel, self.unit = signal.channels[0], signal.common_unit
-
-    def _append(self, fresh: NDArray[np.float64]) -> None:
-        places = (self._at + np.arange(len(fresh))) % len(self._samples)
-        self._samples[places] = fresh
-        self._at = (self._at + len(fresh)) % len(self._samples)
 
 
 def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -480,82 +464,93 @@ Answer = Mapping[str, Any]
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
-class Commands(Protocol):
-    """What the page can ask for; a TextureError is shown to the user."""
-
-    async def explore(self, asked: Mapping[str, Any]) -> Answer:
-        """Explore until it is over."""
-
-    async def stop(self, asked: Mapping[str, Any]) -> Answer:
-        """Stop what moves."""
-
-    async def add(self, asked: Mapping[str, Any]) -> Answer:
-        """Add an exploration, or undo it."""
-
-    async def record(self, asked: Mapping[str, Any]) -> Answer:
-        """Begin or end a recording."""
-
-    async def offered(self) -> Answer:
-        """Return the motions with their numbers."""
-
-    def replay(self, exploration_id: str) -> str | None:
-        """Return the kept frames of an exploration as JSON; None if it is not kept."""
-
-
 class Viewers:
     """The newest frame for everybody who looks; who is slow misses frames and keeps nobody waiting."""
 
     def __init__(self) -> None:
         self._frame = ''
-        self.number = 0
+        self._number = 0
         self._news = asyncio.Event()
         self.sockets: set[web.WebSocketResponse] = set()
 
     def show(self, frame: str) -> None:
         """Replace the frame; called in the loop of the server."""
-        self._frame, self.number = frame, self.number + 1
+        self._frame, self._number = frame, self._number + 1
         self._news.set()
         self._news = asyncio.Event()
 
-    async def send_to(self, socket: web.WebSocketResponse, sent: int) -> None:
+    async def watch(self, request: web.Request) -> web.StreamResponse:
+        """Send frames to who asked, until that page closes."""
+        if len(self.sockets) >= MAX_VIEWERS:
+            return _said(503, f'{MAX_VIEWERS} pages are open already; close one')
+        before = self._number  # old by now, as no frames are made while nobody looks
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MAX_MESSAGE_BYTES, timeout=SERVER_CLOSING_S)
+        await socket.prepare(request)
+        self.sockets.add(socket)
+        sending = asyncio.create_task(self._send_to(socket, before))
+        try:
+            async for _ in socket:  # a page says nothing; this notices when it goes
+                pass
+        finally:
+            self.sockets.discard(socket)
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+        return socket
+
+    async def _send_to(self, socket: web.WebSocketResponse, sent: int) -> None:
         """Send the newest frame after number `sent`, again and again, until the socket closes."""
         while not socket.closed:
-            if sent == self.number:
+            if sent == self._number:
                 await self._news.wait()
-            sent = self.number
+            sent = self._number
             await socket.send_str(self._frame)
 
 
 VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
 
 
-def make_app(commands: Commands, access: Access, page: Path) -> web.Application:
-    """Return the application; `page` is the folder of the static files.
+def make_app(commands: Any, access: Access, page: Path) -> web.Application:
+    """Return the application, which is not started yet.
 
     Parameters
     ----------
     commands
-        Carries out what the page asks for.
+        Carries out what the page asks for, as `nodes.dashboard.DashboardNode` does: coroutines `explore`, `stop`, `add`
+        and `record` of what is asked, a coroutine `offered`, and `replay`. A TextureError is shown to the user.
     access
         Who may ask for what.
     page
         Folder of the static files.
-
-    Returns
-    -------
-    web.Application
-        Not started yet.
     """
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
     viewers = app[VIEWERS] = Viewers()
-    app.router.add_get('/ws', _watch(viewers))
-    app.router.add_get('/api/motions', _motions(commands))
-    app.router.add_get('/api/past/{id}', _past(commands))
+
+    async def motions(_request: web.Request) -> web.StreamResponse:
+        return web.json_response(await commands.offered())
+
+    async def past(request: web.Request) -> web.StreamResponse:
+        replay = commands.replay(request.match_info['id'])
+        if replay is None:
+            return _said(404, 'this exploration is no longer kept')
+        return web.Response(text=replay, content_type='application/json')
+
+    async def static(request: web.Request) -> web.StreamResponse:
+        file, kind = PAGE[request.path]
+        text = (page / file).read_text(encoding='utf-8')
+        return web.Response(text=text, content_type=kind, charset='utf-8')
+
+    async def close(_app: web.Application) -> None:
+        for viewer in tuple(viewers.sockets):
+            await viewer.close(code=WSCloseCode.GOING_AWAY)
+
+    app.router.add_get('/ws', viewers.watch)
+    app.router.add_get('/api/motions', motions)
+    app.router.add_get('/api/past/{id}', past)
     for name in ('explore', 'stop', 'add', 'record'):
         app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
-    for path, (file, kind) in PAGE.items():
-        app.router.add_get(path, _static(page / file, kind))
-    app.on_shutdown.append(_close_sockets)
+    for path in PAGE:
+        app.router.add_get(path, static)
+    app.on_shutdown.append(close)
     return app
 
 
@@ -578,10 +573,6 @@ def _guard(access: Access) -> Any:
     return guard
 
 
-def _token_of(request: web.Request) -> str:
-    return request.cookies.get(COOKIE, '') or request.headers.get('Authorization', '').removeprefix('Bearer ')
-
-
 def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
     """Return why a request is refused, or the answer that turns a token in the address into a cookie."""
     if not access.is_our_host(request.headers.get('Host', '')):
@@ -594,30 +585,10 @@ def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
         answer = web.Response(status=303, headers={'Location': '/'})
         answer.set_cookie(COOKIE, given, httponly=True, samesite='Strict')
         return answer
-    if not access.knows(_token_of(request)):
+    carried = request.cookies.get(COOKIE, '') or request.headers.get('Authorization', '').removeprefix('Bearer ')
+    if not access.knows(carried):
         return _said(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
     return None
-
-
-def _watch(viewers: Viewers) -> Handler:
-    async def watch(request: web.Request) -> web.StreamResponse:
-        if len(viewers.sockets) >= MAX_VIEWERS:
-            return _said(503, f'{MAX_VIEWERS} pages are open already; close one')
-        before = viewers.number  # old by now, as no frames are made while nobody looks
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MAX_MESSAGE_BYTES, timeout=SERVER_CLOSING_S)
-        await socket.prepare(request)
-        viewers.sockets.add(socket)
-        sending = asyncio.create_task(viewers.send_to(socket, before))
-        try:
-            async for _ in socket:  # a page says nothing; this notices when it goes
-                pass
-        finally:
-            viewers.sockets.discard(socket)
-            sending.cancel()
-            await asyncio.gather(sending, return_exceptions=True)
-        return socket
-
-    return watch
 
 
 def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handler:
@@ -639,37 +610,8 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
     return act
 
 
-def _motions(commands: Commands) -> Handler:
-    async def motions(_request: web.Request) -> web.StreamResponse:
-        return web.json_response(await commands.offered())
-
-    return motions
-
-
-def _past(commands: Commands) -> Handler:
-    async def past(request: web.Request) -> web.StreamResponse:
-        replay = commands.replay(request.match_info['id'])
-        if replay is None:
-            return _said(404, 'this exploration is no longer kept')
-        return web.Response(text=replay, content_type='application/json')
-
-    return past
-
-
-def _static(file: Path, kind: str) -> Handler:
-    async def static(_request: web.Request) -> web.StreamResponse:
-        return web.Response(text=file.read_text(encoding='utf-8'), content_type=kind, charset='utf-8')
-
-    return static
-
-
 def _said(status: int, message: str) -> web.Response:
     return web.json_response({'success': False, 'message': message}, status=status)
-
-
-async def _close_sockets(app: web.Application) -> None:
-    for viewer in tuple(app[VIEWERS].sockets):
-        await viewer.close(code=WSCloseCode.GOING_AWAY)
 
 
 # --------------------
@@ -890,7 +832,8 @@ class Feed:
         status = self.node_statuses.newest(name)
         if status is None:
             return f'no {what} yet, and no {name} reports on /diagnostics'
-        return f'no {what} yet' + ('' if status.level == 'OK' else f': {status.message}')
+        level, message = status
+        return f'no {what} yet' + ('' if level == 'OK' else f': {message}')
 
     def _shown_state(self) -> dict[str, Any]:
         return {name: _plain(value) for name, value in asdict(self._state).items()}

@@ -27,13 +27,11 @@ from texture_core.config import write_json
 from texture_core.errors import InvalidData, LaunchFailed, MotionAborted
 from texture_core.types import (
     NANOSECONDS,
-    AnyArray,
     Array,
     ExplorationRequest,
     ExplorationState,
     FeatureVector,
     Phase,
-    Samples,
     TactileSignal,
     TextureEstimate,
 )
@@ -346,7 +344,7 @@ class DemoRig:
 
 
 # --------------------
-# One slide in one picture: signal, spectrum, evidence, and how often such decisions are right.
+# The picture of the demonstration: one recognised slide from touch to decision.
 
 SHOWN_LABELS = 3
 SHOWN_S = 0.5
@@ -354,128 +352,58 @@ CHART_MARGIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class GrowingEvidence:
-    """How the evidence for one label grows while the finger slides.
+class Recorded:
+    """What a bag holds: slide states, windows and the newest estimate of each exploration, all vibration batches."""
 
-    Parameters
-    ----------
-    label
-        The label at the end.
-    seconds : (n_windows,)
-        Sliding time used at the end of each window, s.
-    labels
-        All labels of the model.
-    log_odds : (n_windows, n_labels)
-        Natural logarithm of how much more probable `label` is than each label; 0 for itself.
-    confidence
-        Of the label at the end, as it was reported.
-    """
+    states: defaultdict[str, list[ExplorationState]] = field(default_factory=lambda: defaultdict(list))
+    windows: defaultdict[str, list[FeatureVector]] = field(default_factory=lambda: defaultdict(list))
+    estimates: dict[str, TextureEstimate] = field(default_factory=dict)
+    batches: list[TactileSignal] = field(default_factory=list)
 
-    label: str
-    seconds: Array
-    labels: Sequence[str]
-    log_odds: Array
-    confidence: float
+    @classmethod
+    def of(cls, bag: Path) -> Recorded:
+        """Read a bag."""
+        found = cls()
+        for _, _, value in read_bag(bag, ('exploration', 'signal', 'features', 'texture')):
+            if isinstance(value, TactileSignal):
+                found.batches.append(value)
+            elif isinstance(value, FeatureVector) and not value.last:
+                found.windows[value.exploration_id].append(value)
+            elif isinstance(value, TextureEstimate) and value.probabilities:
+                found.estimates[value.exploration_id] = value
+            elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
+                found.states[value.exploration_id].append(value)
+        return found
 
+    def samples(self, name: str) -> Array:
+        """Return the samples of an exploration while the finger slid, (n_samples,)."""
+        start_ns, end_ns = self.states[name][0].stamp_ns, self.states[name][-1].stamp_ns
+        inside = [batch for batch in self.batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
+        samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
+        return samples
 
-@dataclass(frozen=True, eq=False)
-class SlideOverview:
-    """One slide from the first sample to the decision, and how often such decisions are right.
+    def log_odds(self, name: str, model: TextureModel) -> tuple[Array, Array]:
+        """Return the evidence of an exploration after each of its windows, as the classifier has it.
 
-    Parameters
-    ----------
-    source
-        Where the signal comes from, in words, such as 'simulated TSF-85'.
-    surface
-        What the finger slid over.
-    samples : (n_samples,)
-        One channel of the slide.
-    rate_hz, unit
-        Of the samples.
-    evidence
-        After each window.
-    labels, table
-        Confusion of test windows, as `metrics.confusion` counts it.
-    others
-        Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
-    note
-        Lines below the panels; '' for none.
-    """
-
-    source: str
-    surface: str
-    samples: Array
-    rate_hz: float
-    unit: str
-    evidence: GrowingEvidence
-    labels: Sequence[str]
-    table: AnyArray
-    others: Mapping[str, Array] = field(default_factory=dict)
-    note: str = ''
+        Returns
+        -------
+        (n_windows,)
+            Sliding time used, s.
+        (n_windows, n_labels)
+            Natural logarithm of how much more probable the label at the end is than each; 0 for itself.
+        """
+        windows, rule = self.windows[name], model.recipe.evidence
+        scores = rule.window_evidence(model.predict_log_proba(np.array([window.values for window in windows])))
+        length_s = windows[0].window_s
+        seconds = length_s + np.array([window.start_ns - windows[0].start_ns for window in windows]) / NANOSECONDS
+        effective = seconds / length_s
+        means = running_means(rule, scores, effective)
+        posterior = rule.log_posterior(means, effective[:, None], model.tempering_exponent)
+        best = model.labels.index(self.estimates[name].label)
+        return seconds, posterior[:, [best]] - posterior
 
 
-def picture(overview: SlideOverview, path: str | Path) -> Path:
-    """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
-    with chart(path, (11.0, 8.0), f'How a slide over {overview.surface} is recognised ({overview.source})') as figure:
-        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
-        _signal(signal, overview)
-        _spectrum(spectrum, overview)
-        _evidence(evidence, overview)
-        draw_confusion(table, overview.labels, overview.table)
-        table.set_title('4. Single windows of all test slides')
-        if overview.note:
-            figure.supxlabel(overview.note, fontsize='medium')
-    return Path(path)
-
-
-def _signal(axes: Any, overview: SlideOverview) -> None:
-    shown = overview.samples[: round(SHOWN_S * overview.rate_hz)]
-    axes.plot(np.arange(len(shown)) / overview.rate_hz, shown, color=COLOURS[0], linewidth=0.8)
-    axes.set(xlabel='time since the slide began (s)', ylabel=f'signal ({overview.unit or "no unit"})')
-    axes.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
-
-
-def _spectrum(axes: Any, overview: SlideOverview) -> None:
-    slides = {overview.surface: overview.samples, **overview.others}
-    for (name, slide), colour in zip(slides.items(), COLOURS, strict=False):
-        samples: Samples = np.asarray(slide, dtype=float)
-        n_segment = min(len(samples), round(overview.rate_hz / 2))
-        hertz, power = welch(samples, fs=overview.rate_hz, nperseg=n_segment)
-        own = name == overview.surface
-        axes.semilogy(hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=name, zorder=2 + own)
-    unit = f'{overview.unit}²/Hz' if overview.unit else '1/Hz'
-    axes.set(xlabel='frequency (Hz)', ylabel=f'power density ({unit})')
-    axes.set_title('2. Its spectrum is the mark of the surface')
-    if overview.others:
-        axes.legend(loc='upper right')
-
-
-def _evidence(axes: Any, overview: SlideOverview) -> None:
-    evidence = overview.evidence
-    others = [column for column in np.argsort(evidence.log_odds[-1]) if evidence.labels[column] != evidence.label]
-    for column, style in zip(others[:SHOWN_LABELS], line_styles(), strict=False):
-        axes.plot(evidence.seconds, evidence.log_odds[:, column], marker='.', label=evidence.labels[column], **style)
-    axes.axhline(0, color='grey', linewidth=0.8)
-    axes.set(xlabel='sliding time used (s)', ylabel=f'log odds of {evidence.label}', ylim=_with_zero(evidence.log_odds))
-    axes.set_xlim(left=0)
-    axes.set_title(f'3. Each window adds evidence; reported confidence {evidence.confidence:.2f}')
-    axes.legend(loc='lower right', title='compared with')
-
-
-def _with_zero(values: Array) -> tuple[float, float]:
-    """Return limits that hold all values and 0, with a margin."""
-    low, high = min(0.0, float(values.min())), max(1.0, float(values.max()))
-    margin = CHART_MARGIN * (high - low)
-    return low - margin, high + margin
-
-
-# --------------------
-# The picture of the demonstration: one recognised slide from touch to decision.
-
-SOURCE = 'simulated Robotiq TSF-85'
-
-
-def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> Path:
+def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> None:
     """Draw an exploration of a surface, and the confusion of all explorations in the bag.
 
     Parameters
@@ -492,131 +420,71 @@ def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport,
         File that is written.
     note
         Lines below the panels.
-
-    Returns
-    -------
-    Path
-        Of the file.
     """
-    found = _gather(bag)
-    evidence = {name: _growing(model, found, name) for name in found.estimates}
-    candidates = [name for name in evidence if found.states[name][0].surface == surface]
-    name = min(candidates, key=lambda each: np.sort(evidence[each].log_odds[0])[1])
-    samples, rate_hz, unit = _sliding_part(found.states[name], found.batches)
-    others = {
-        found.states[each][0].surface: _sliding_part(found.states[each], found.batches)[0] for each in found.estimates
-    }
-    del others[surface]
-    overview = SlideOverview(
-        SOURCE, surface, samples, rate_hz, unit, evidence[name], report.labels, report.confusion, others, note
-    )
-    return picture(overview, path)
+    found = Recorded.of(bag)
+    surfaces = {name: found.states[name][0].surface for name in found.estimates}
+    odds = {name: found.log_odds(name, model) for name in surfaces if surfaces[name] == surface}
+    name = min(odds, key=lambda each: np.sort(odds[each][1][0])[1])
+    slides = {label: found.samples(each) for each, label in {**surfaces, name: surface}.items()}
+    slides[surface] = found.samples(name)
+    rate_hz, unit = found.batches[0].sampling_rate_hz, found.batches[0].common_unit
+    with chart(path, (11.0, 8.0), f'How a slide over {surface} is recognised (simulated Robotiq TSF-85)') as figure:
+        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
+        shown = slides[surface][: round(SHOWN_S * rate_hz)]
+        signal.plot(np.arange(len(shown)) / rate_hz, shown, color=COLOURS[0], linewidth=0.8)
+        signal.set(xlabel='time since the slide began (s)', ylabel=f'signal ({unit or "no unit"})')
+        signal.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
+        ordered = sorted(slides.items(), key=lambda item: item[0] != surface)  # that of the slide has the first colour
+        for (label, samples), colour in zip(ordered, COLOURS, strict=False):
+            hertz, power = welch(samples, fs=rate_hz, nperseg=min(len(samples), round(rate_hz / 2)))
+            own = label == surface
+            spectrum.semilogy(
+                hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=label, zorder=2 + own
+            )
+        spectrum.set(xlabel='frequency (Hz)', ylabel=f'power density ({f"{unit}²" if unit else "1"}/Hz)')
+        spectrum.set_title('2. Its spectrum is the mark of the surface')
+        spectrum.legend(loc='upper right')
+        _draw_evidence(evidence, model.labels, found.estimates[name], *odds[name])
+        draw_confusion(table, report.labels, report.confusion)
+        table.set_title('4. Single windows of all test slides')
+        if note:
+            figure.supxlabel(note, fontsize='medium')
 
 
-@dataclass(frozen=True, eq=False)
-class _Recorded:
-    """What a bag holds: slide states, windows and the newest estimate of each exploration, all vibration batches."""
-
-    states: defaultdict[str, list[ExplorationState]] = field(default_factory=lambda: defaultdict(list))
-    windows: defaultdict[str, list[FeatureVector]] = field(default_factory=lambda: defaultdict(list))
-    estimates: dict[str, TextureEstimate] = field(default_factory=dict)
-    batches: list[TactileSignal] = field(default_factory=list)
-
-
-def _growing(model: TextureModel, found: _Recorded, name: str) -> GrowingEvidence:
-    """Return the evidence of one exploration after each of its windows, as the classifier has it."""
-    windows, final, rule = found.windows[name], found.estimates[name], model.recipe.evidence
-    scores = rule.window_evidence(model.predict_log_proba(np.array([window.values for window in windows])))
-    length_s = windows[0].window_s
-    seconds = length_s + np.array([window.start_ns - windows[0].start_ns for window in windows]) / NANOSECONDS
-    effective = seconds / length_s
-    means = running_means(rule, scores, effective)
-    posterior = rule.log_posterior(means, effective[:, None], model.tempering_exponent)
-    best = model.labels.index(final.label)
-    return GrowingEvidence(final.label, seconds, model.labels, posterior[:, [best]] - posterior, final.confidence)
-
-
-def _gather(bag: Path) -> _Recorded:
-    """Return what the bag holds."""
-    found = _Recorded()
-    for _, _, value in read_bag(bag, ('exploration', 'signal', 'features', 'texture')):
-        if isinstance(value, TactileSignal):
-            found.batches.append(value)
-        elif isinstance(value, FeatureVector) and not value.last:
-            found.windows[value.exploration_id].append(value)
-        elif isinstance(value, TextureEstimate) and value.probabilities:
-            found.estimates[value.exploration_id] = value
-        elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
-            found.states[value.exploration_id].append(value)
-    return found
-
-
-def _sliding_part(states: Sequence[ExplorationState], batches: Sequence[TactileSignal]) -> tuple[Array, float, str]:
-    """Return the samples while the finger slid, (n_samples,), with their rate and unit."""
-    start_ns, end_ns = states[0].stamp_ns, states[-1].stamp_ns
-    inside = [batch for batch in batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
-    samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
-    return samples, inside[0].sampling_rate_hz, inside[0].common_unit
+def _draw_evidence(
+    axes: Any, labels: Sequence[str], estimate: TextureEstimate, seconds: Array, log_odds: Array
+) -> None:
+    others = [column for column in np.argsort(log_odds[-1]) if labels[column] != estimate.label]
+    for column, style in zip(others[:SHOWN_LABELS], line_styles(), strict=False):
+        axes.plot(seconds, log_odds[:, column], marker='.', label=labels[column], **style)
+    axes.axhline(0, color='grey', linewidth=0.8)
+    low, high = min(0.0, float(log_odds.min())), max(1.0, float(log_odds.max()))
+    margin = CHART_MARGIN * (high - low)
+    axes.set(xlabel='sliding time used (s)', ylabel=f'log odds of {estimate.label}')
+    axes.set(ylim=(low - margin, high + margin))
+    axes.set_xlim(left=0)
+    axes.set_title(f'3. Each window adds evidence; reported confidence {estimate.confidence:.2f}')
+    axes.legend(loc='lower right', title='compared with')
 
 
 # --------------------
 # The demonstration from beginning to end.
 
 
-@dataclass(frozen=True)
-class Places:
-    """What the demonstration leaves behind, in one folder."""
+LEARNING_BAG, RECOGNITION_BAG, MODEL = 'learning_bag', 'recognition_bag', 'model'  # in the folder of the results
+PICTURE, FIGURES, LOG = 'demo.png', 'evaluation.json', 'nodes.log'
 
-    folder: Path
 
-    @property
-    def learning_bag(self) -> Path:
-        """Recording of the training slides."""
-        return self.folder / 'learning_bag'
-
-    @property
-    def recognition_bag(self) -> Path:
-        """Recording of the slides recognised, with the estimates made then."""
-        return self.folder / 'recognition_bag'
-
-    @property
-    def model(self) -> Path:
-        """The trained model, without its endings."""
-        return self.folder / 'model'
-
-    @property
-    def picture(self) -> Path:
-        """The picture."""
-        return self.folder / 'demo.png'
-
-    @property
-    def figures(self) -> Path:
-        """What `texture evaluate --json` writes."""
-        return self.folder / 'evaluation.json'
-
-    @property
-    def log(self) -> Path:
-        """What the nodes said."""
-        return self.folder / 'nodes.log'
-
-    def clear(self) -> None:
-        """Make the folder; remove what an earlier demonstration has left there, and nothing else.
-
-        Raises
-        ------
-        InvalidData
-            If the folder cannot be written.
-        """
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            for bag in (self.learning_bag, self.recognition_bag):
-                shutil.rmtree(bag, ignore_errors=True)
-            for file in (self.picture, self.figures, self.log):
-                file.unlink(missing_ok=True)
-            for ending in ('.skops', '.json'):
-                self.model.with_suffix(ending).unlink(missing_ok=True)
-        except OSError as error:
-            raise InvalidData(f"'{self.folder}' cannot be used: {error.strerror}; name another with --out") from error
+def _clear(folder: Path) -> None:
+    """Make the folder; remove what an earlier demonstration has left there, and nothing else."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for bag in (LEARNING_BAG, RECOGNITION_BAG):
+            shutil.rmtree(folder / bag, ignore_errors=True)
+        for file in (PICTURE, FIGURES, LOG, f'{MODEL}.skops', f'{MODEL}.json'):
+            (folder / file).unlink(missing_ok=True)
+    except OSError as error:
+        raise InvalidData(f"'{folder}' cannot be used: {error.strerror}; name another with --out") from error
 
 
 def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
@@ -639,27 +507,26 @@ def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: Pro
     -------
     bool
     """
-    places = Places(out)
-    places.clear()
+    _clear(out)
     progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
     with (
         tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
-        DemoRig(Path(folder), places.log, recipe, seed) as rig,
+        DemoRig(Path(folder), out / LOG, recipe, seed) as rig,
     ):
         progress.line('5 nodes run, and the sensor delivers 1000 samples a second')
-        _learn(rig, places, plan, progress)
-        _train(places, recipe, progress)
-        rig.use_model(places.model.resolve())
+        _learn(rig, out, plan, progress)
+        _train(out, recipe, progress)
+        rig.use_model((out / MODEL).resolve())
         progress.line('the running classifier has taken the model over')
-        rows = _recognise(rig, places, plan, progress)
+        rows = _recognise(rig, out, plan, progress)
         untrained = _explore_untrained(rig, plan, progress)
-    report = _report(rows, untrained, places, plan, progress)
+    report = _report(rows, untrained, out, plan, progress)
     return all(row.right for row in rows) and len(report.known) == len(rows) and is_refused(untrained)
 
 
-def _learn(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> None:
+def _learn(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> None:
     progress.section(f'Learning: {plan.learning_slides} slides over each of {len(plan.surfaces)} simulated surfaces')
-    with rig.recording(places.learning_bag):
+    with rig.recording(out / LEARNING_BAG):
         for surface in plan.surfaces:
             progress.part(f'{surface:<18}', first=True)
             for number, _ in enumerate(rig.explore(surface, plan.requests(surface, plan.learning_slides)), start=1):
@@ -667,17 +534,17 @@ def _learn(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) 
             progress.part(' recorded', last=True)
 
 
-def _train(places: Places, recipe: str, progress: ProgressLog) -> None:
+def _train(out: Path, recipe: str, progress: ProgressLog) -> None:
     progress.section('Training on that recording (the same as `texture train`)')
-    model = train_from_bags(recipe, [places.learning_bag], out=places.model)
-    for line in training.summary(model, places.model):
+    model = train_from_bags(recipe, [out / LEARNING_BAG], out=out / MODEL)
+    for line in training.summary(model, out / MODEL):
         progress.line(line)
 
 
-def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> list[RecognisedSlide]:
+def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> list[RecognisedSlide]:
     progress.section('Recognising: new slides at other places; each may end as soon as the classifier is certain')
     rows = []
-    with rig.recording(places.recognition_bag):
+    with rig.recording(out / RECOGNITION_BAG):
         for surface in plan.surfaces:
             progress.part(f'{surface:<18}', first=True)
             measured = rig.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
@@ -699,24 +566,24 @@ def _explore_untrained(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> T
 
 
 def _report(
-    rows: list[RecognisedSlide], untrained: TextureEstimate, places: Places, plan: DemoPlan, progress: ProgressLog
+    rows: list[RecognisedSlide], untrained: TextureEstimate, out: Path, plan: DemoPlan, progress: ProgressLog
 ) -> EvaluationReport:
     progress.section('Result')
-    latencies: Mapping[str, float] = latencies_s(places.recognition_bag)
+    latencies: Mapping[str, float] = latencies_s(out / RECOGNITION_BAG)
     for line in table(rows, latencies):
         progress.line(line)
     right = sum(row.right for row in rows)
     progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
     progress.line('latency: from the last sample of a window to its estimate at another process')
-    model = load_model(places.model)
-    report = evaluate(model, [places.recognition_bag])
+    model = load_model(out / MODEL)
+    report = evaluate(model, [out / RECOGNITION_BAG])
     figures = {**report.as_json(), 'untrained_speed': untrained_figures(untrained, plan.untrained_speed_m_s)}
-    write_json(figures, places.figures)
+    write_json(figures, out / FIGURES)
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
     refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
     note = '\n'.join(filter(None, [model.error_bound.reason, refusal]))
-    draw(places.recognition_bag, plan.shown, model, report, places.picture, note=note)
-    progress.section(f'Done. Look at {places.picture}')
-    progress.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
+    draw(out / RECOGNITION_BAG, plan.shown, model, report, out / PICTURE, note=note)
+    progress.section(f'Done. Look at {out / PICTURE}')
+    progress.line(f'recordings, model, figures and the log of the nodes are in {out}/')
     return report

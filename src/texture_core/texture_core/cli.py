@@ -7,11 +7,43 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from texture_core.errors import TextureError
 
+
+@dataclass(frozen=True)
+class Command:
+    """A sub-command of `texture` that shares its module with others; package.xml lists it by its name there.
+
+    Parameters
+    ----------
+    summary
+        What it does, for the help; a literal text, because the help reads it without importing the module.
+    configure
+        Adds the arguments of the sub-command to a parser.
+    run
+        Does it, and returns the exit code.
+
+    Examples
+    --------
+    >>> Command('say hello', add_namespace, lambda options: print('hello') or 0).run(argparse.Namespace())
+    hello
+    0
+    """
+
+    summary: str
+    configure: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
 # --------------------
 # Options that several sub-commands share.
+
+
+def add_namespace(parser: argparse.ArgumentParser) -> None:
+    """Add `--namespace`."""
+    parser.add_argument('--namespace', default='', help='namespace of the nodes')
 
 
 def add_slides(parser: argparse.ArgumentParser) -> None:

@@ -1200,7 +1200,14 @@ def _placed(inputs: dict[str, Any], topic: str, section: Any) -> str:
 # --------------------
 # Spread work over the cores of this machine, or over a Dask cluster.
 
-ANSWER_S, WORKERS_S = 20, 30  # for a scheduler to answer, and for its workers to come
+ANSWER_S, WORKERS_S = 4, 4  # for a scheduler to answer, and for its first worker to come
+# What scheduler and workers must have as this process has it: both unpack what is computed, and a scheduler that cannot
+# says so in its own log alone, while everybody waits.
+ON_CLUSTER = ('texture_core', 'texture_features', 'texture_estimation', 'texture_recordings', 'texture_evaluation')
+CLUSTER_ADVICE = (
+    'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
+    'suite'
+)
 LOCAL, MAX_LOCAL_WORKERS = 'local:', 64
 
 
@@ -1236,7 +1243,7 @@ def dask_backend(address: str) -> Iterator[None]:
     Raises
     ------
     InvalidParameter
-        If no scheduler answers there.
+        If no scheduler answers there, it has no worker, or one of them lacks the suite or has another version.
     """
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
 
@@ -1256,8 +1263,27 @@ def dask_backend(address: str) -> Iterator[None]:
     except (OSError, ValueError, TimeoutError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise InvalidParameter(
-            f"no Dask scheduler answers at '{address}' ({reason}); "
-            "start one with 'dask scheduler', or leave '--dask' out to use this machine's cores"
+            f"no Dask scheduler answers at '{address}' ({reason}); {CLUSTER_ADVICE}, "
+            "or leave '--dask' out to use this machine's cores"
         ) from error
-    with client, client.as_current(), parallel_config(backend='dask', wait_for_workers_timeout=WORKERS_S):
-        yield
+    with client:
+        _check_cluster(client, address)
+        with client.as_current(), parallel_config(backend='dask'):
+            yield
+
+
+def _check_cluster(client: Any, address: str) -> None:
+    """Raise InvalidParameter if a cluster has no worker, or not everywhere what this process has."""
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_S)
+    except TimeoutError as error:
+        raise InvalidParameter(f"the Dask scheduler at '{address}' has no worker; {CLUSTER_ADVICE}") from error
+    versions = client.get_versions(packages=ON_CLUSTER)
+    own = versions['client']['packages']
+    places = {f"the Dask scheduler at '{address}'": versions['scheduler']}
+    places |= {f"the Dask worker '{worker}'": found for worker, found in versions['workers'].items()}
+    for place, found in places.items():
+        for name in ON_CLUSTER:
+            has = found['packages'].get(name)
+            if own[name] and has != own[name]:
+                raise InvalidParameter(f'{place} has {has or "no"} {name}, {own[name]} is needed; {CLUSTER_ADVICE}')

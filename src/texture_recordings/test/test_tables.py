@@ -10,7 +10,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.types import NANOSECONDS
-from texture_recordings.commands.import_ import source_folder
+from texture_recordings.commands.convert import source_folder
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.tables import (
     MAPPED,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture explore`: slide the finger over the surface and say what it is."""
+"""The sub-commands of `texture` that slide the finger: `explore` once, `identify` until the texture is certain."""
 
 from __future__ import annotations
 
@@ -9,10 +9,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+import numpy as np
+
 from texture_bringup.operator import ExplorationResult, Operator
+from texture_core.cli import Command, add_namespace
 from texture_core.config import find
-from texture_core.errors import MotionRefused
-from texture_core.types import ExplorationRequest, ExplorationState, RoughnessEstimate, TextureEstimate
+from texture_core.errors import InvalidParameter, MotionRefused
+from texture_core.types import (
+    Array,
+    ExplorationRequest,
+    ExplorationState,
+    RoughnessEstimate,
+    SlideMotion,
+    TextureEstimate,
+)
+from texture_estimation.model import TextureModel, load_model
+from texture_estimation.next_motion import NextTouchModel, slide_values
 from texture_exploration.motions import MOTIONS
 
 # Option, field of the request, unit or '', meaning.
@@ -29,8 +41,7 @@ BAR = 24
 TIMEOUT_S = 300.0
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the sub-command."""
+def _configure_explore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('motion', help=f'how to move: {", ".join(MOTIONS)}')
     for option, _, unit, meaning in NUMBERS:
         shown = f'{meaning}, {unit}' if unit else meaning
@@ -52,10 +63,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help='longest duration of one exploration, s; then the finger is lifted and the exploration aborted '
         '(default: %(default)g)',
     )
-    parser.add_argument('--namespace', default='', help='namespace of the nodes')
+    add_namespace(parser)
 
 
-def run(options: argparse.Namespace) -> int:
+def _explore(options: argparse.Namespace) -> int:
     """Explore once in each direction; return 1 as soon as one was ended early by a fault or a stop."""
     requests = requests_of(options)
     with Operator(options.namespace) as operator:
@@ -85,13 +96,7 @@ def progress_line() -> Iterator[None]:
 
 
 def tell(explored: ExplorationResult) -> bool:
-    """Print how an exploration ended; return whether it succeeded.
-
-    Raises
-    ------
-    MotionRefused
-        If the explorer refused it.
-    """
+    """Print how an exploration ended; return whether it succeeded."""
     if not explored.exploration_id:
         raise MotionRefused(explored.message)
     print(f'{explored.exploration_id}: {explored.message}')
@@ -101,16 +106,8 @@ def tell(explored: ExplorationResult) -> bool:
 
 
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
-    """Return the requests that the options stand for, one for each direction.
-
-    Raises
-    ------
-    UnknownName
-        If there is no such motion: said before an explorer is waited for.
-    InvalidData
-        If the surface is no label, or the timeout no number of seconds.
-    """
-    find(MOTIONS, options.motion, 'motion')
+    """Return the requests that the options stand for, one for each direction."""
+    find(MOTIONS, options.motion, 'motion')  # said before an explorer is waited for
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     request = ExplorationRequest(
         options.motion,
@@ -151,3 +148,85 @@ def roughness_text(estimate: RoughnessEstimate) -> str:
     if not estimate.valid:
         return estimate.message or 'none'
     return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'
+
+
+# --------------------
+# Identify.
+
+SHOWN = 3  # textures, of those that are possible
+
+
+def _configure_identify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('model', help='trained on slides of several kinds over every texture')
+    parser.add_argument('--sure', type=float, default=0.95, metavar='P', help='end at this probability; default: 0.95')
+    parser.add_argument('--slides', type=int, default=6, metavar='N', help='at most so many; default: 6')
+    parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
+    add_namespace(parser)
+
+
+def _identify(options: argparse.Namespace) -> int:
+    """Slide until the texture is certain; return 1 as soon as a slide was ended early by a fault or a stop."""
+    if options.slides < 1 or not 0.0 < options.sure <= 1.0:
+        raise InvalidParameter(
+            f'--slides is {options.slides} and --sure {options.sure:g}; 1 or more and a probability are needed'
+        )
+    model = load_model(options.model)
+    known = next_touch_model_of(model)
+    belief, number = known.uniform_log_prior, 0
+    with Operator(options.namespace) as operator:
+        operator.wait_for_explorer(deadline_s=10.0)
+        while number < options.slides and np.exp(belief.max()) < options.sure:
+            number += 1
+            motion, information = known.best_motion(belief, list(known.gaussians))
+            print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
+            with progress_line():
+                explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
+            if not explored.success:
+                return int(not tell(explored))
+            belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
+            print(f'  {belief_text(known, belief)}')
+    best = int(belief.argmax())
+    print(f'texture: {known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides')
+    return 0
+
+
+def next_touch_model_of(model: TextureModel) -> NextTouchModel:
+    """Return what the textures look like under each motion."""
+    if model.next_touch_model is None:
+        raise InvalidParameter(
+            f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
+            'of each kind, in several directions or at several speeds or forces'
+        )
+    return model.next_touch_model
+
+
+def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
+    """Return the request for a motion."""
+    return ExplorationRequest(
+        motion.motion,
+        speed_m_s=motion.speed_m_s,
+        force_n=motion.force_n,
+        distance_m=motion.speed_m_s * motion.duration_s,
+        direction_rad=motion.direction_rad,
+        surface=surface,
+    )
+
+
+def motion_text(motion: SlideMotion) -> str:
+    """Return a motion in words."""
+    return (
+        f'{motion.motion}, direction {motion.direction_rad:g} rad, {motion.speed_m_s:g} m/s, {motion.force_n:g} N, '
+        f'{motion.duration_s:g} s'
+    )
+
+
+def belief_text(known: NextTouchModel, belief: Array) -> str:
+    """Return the most probable textures in words; `belief`, (n_textures,), holds log-probabilities."""
+    first = np.argsort(-belief, kind='stable')[:SHOWN]
+    return ', '.join(f'{known.textures[k]} {np.exp(belief[k]):.2f}' for k in first)
+
+
+explore = Command('slide the finger over the surface and print what it is', _configure_explore, _explore)
+identify = Command(
+    'repeat the slide with the largest information gain until the texture is certain', _configure_identify, _identify
+)

@@ -1,72 +1,109 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that send one request without values, an `std_srvs/Trigger`, and print the answer.
-
-The manifest lists them, and the entry point of each is the object of its name.
-"""
+"""The sub-commands of `texture` that ask a running node for one thing and print its answer."""
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+
+from texture_bringup.launcher import given_arguments
+from texture_bringup.operator import Operator
+from texture_core.cli import Command, add_namespace
+from texture_core.errors import InvalidParameter
+
+# --------------------
+# Services without values, each an `std_srvs/Trigger`.
 
 EXPLORER_MISSING = 'start an explorer, such as the emulator with `texture launch emulator`, or give its --namespace'
 TOUCHES_MISSING = "the launch files 'ur' and 'ros_controllers' offer it; start one of them, or give its --namespace"
 
 
-@dataclass(frozen=True)
-class ServiceCommand:
-    """A sub-command that calls a service.
+def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Command:
+    """Return the sub-command that calls a service; `advice` says what to do when no node offers it."""
 
-    Attributes
-    ----------
-    service
-        Name of the service.
-    summary
-        What it does, for the help.
-    advice
-        What to do when no node offers it.
-    """
-
-    service: str
-    summary: str
-    advice: str = EXPLORER_MISSING
-
-    def configure(self, parser: argparse.ArgumentParser) -> None:
-        """Add the arguments of the sub-command."""
-        parser.add_argument('--namespace', default='', help='namespace of the nodes')
-
-    def run(self, options: argparse.Namespace) -> int:
-        """Call the service and print its answer; return 0 if it succeeded, else 1.
-
-        Raises
-        ------
-        LaunchFailed
-            If no node offers the service, or none answers in time.
-        """
-        from texture_bringup.operator import Operator  # noqa: PLC0415  # the help reads this module without ROS
-
+    def run(options: argparse.Namespace) -> int:
         with Operator(options.namespace) as operator:
-            success, message = operator.call(self.service, self.advice)
+            success, message = operator.call(service, advice)
         print(message)
         return 0 if success else 1
 
+    return Command(summary, add_namespace, run)
 
-stop = ServiceCommand(
-    'stop',
+
+stop = trigger(
     'end the exploration and lift the finger, from any phase',
+    'stop',
     'no explorer runs there; if the robot moves, use its own stop, and look whether the finger touches',
 )
-recover = ServiceCommand('recover', 'free the arm from a fault')
-lift = ServiceCommand('lift', 'lift a finger that was left pressed on the surface')
-reboot = ServiceCommand(
-    'reboot',
+recover = trigger('free the arm from a fault', 'recover')
+lift = trigger('lift a finger that was left pressed on the surface', 'lift')
+reboot = trigger(
     'reboot the motors of a hand',
+    'reboot',
     "only the launch file 'hand' offers it; start that, or give its --namespace",
 )
-touch_surface = ServiceCommand('touch_surface', 'take one of the touches that find the surface', TOUCHES_MISSING)
-forget_touches = ServiceCommand('forget_touches', 'begin the touches that find the surface again', TOUCHES_MISSING)
-tare = ServiceCommand(
-    'tare',
+touch_surface = trigger('take one of the touches that find the surface', 'touch_surface', TOUCHES_MISSING)
+forget_touches = trigger('begin the touches that find the surface again', 'forget_touches', TOUCHES_MISSING)
+tare = trigger(
     'tare a sensor that nothing touches',
+    'tare',
     'start a sensor, such as the emulated one with `texture launch emulator`, or give its --namespace',
 )
+
+# --------------------
+# Textures that a running classifier learns and forgets.
+
+
+def _configure_add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('label', nargs='?', default='', help='label of the texture; a new label adds a class')
+    parser.add_argument(
+        'exploration', nargs='?', default='', help='id of the exploration to add; default: the last one'
+    )
+    parser.add_argument('--undo', action='store_true', help='remove the slide that was added last')
+    add_namespace(parser)
+
+
+def _add(options: argparse.Namespace) -> int:
+    if options.undo == bool(options.label):
+        raise InvalidParameter('give the label of the texture to add, or --undo alone')
+    with Operator(options.namespace) as operator:
+        if options.undo:
+            print(operator.remove_last_added())
+            return 0
+        examples, message = operator.add(options.label, options.exploration)
+    print(f"{message}; '{options.label.strip()}' has {examples} windows now")
+    return 0
+
+
+def _configure_remove(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('label', help='label of the texture; one of the training stays as it was trained')
+    add_namespace(parser)
+
+
+def _remove(options: argparse.Namespace) -> int:
+    with Operator(options.namespace) as operator:
+        print(operator.remove(options.label))
+    return 0
+
+
+add = Command('add the slide that was explored last to a texture; or undo it', _configure_add, _add)
+remove = Command('remove a texture that was added since the training', _configure_remove, _remove)
+
+# --------------------
+# Parameters.
+
+
+def _configure_set(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('node', help='name of the node, such as emulator')
+    parser.add_argument('values', nargs='+', metavar='NAME:=VALUE', help='parameters and their values')
+    add_namespace(parser)
+
+
+def _set(options: argparse.Namespace) -> int:
+    values = given_arguments(options.values)
+    with Operator(options.namespace) as operator:
+        operator.set_from_texts(options.node, values)
+    print(f'{options.node}: ' + ', '.join(f'{name} is {text}' for name, text in values.items()))
+    return 0
+
+
+set_ = Command('set parameters of a running node, such as the surface of the emulator', _configure_set, _set)

@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture import`: turn other people's recordings into labelled bags."""
+"""The sub-commands of `texture` that make bags of other recordings: `import` and `segment`."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from texture_core.cli import add_channels, add_seed, add_slides
-from texture_core.config import find
+from texture_core.cli import Command, add_channels, add_seed, add_slides
+from texture_core.config import find, from_mapping, parameters_of
 from texture_core.errors import InvalidParameter
+from texture_features.segmentation import SegmentationParams
 from texture_recordings.public_sets import IMPORTS
+from texture_recordings.segment import segment_bags
 from texture_recordings.tables import MAPPED, import_tables, load_mapping
 
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the sub-command."""
+def _configure_import(parser: argparse.ArgumentParser) -> None:
     parser.usage = f'{USAGE} [options]'
     parser.add_argument('data_set', help=f'one of {", ".join(IMPORTS)}; or {" or ".join(MAPPED)}, with a mapping')
     parser.add_argument(
@@ -28,14 +29,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_seed(parser)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Import, and name the bags.
-
-    Raises
-    ------
-    InvalidParameter
-        If a place is missing or one too many.
-    """
+def _import(options: argparse.Namespace) -> int:
+    """Import, and name the bags."""
     mapped = options.data_set in MAPPED
     if len(options.places) != 2 + mapped:
         raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
@@ -68,3 +63,27 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
     for line in report.lines():
         print(line)
     return report.bags
+
+
+def _configure_segment(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('bags', nargs='+', help='bags, or folders of bags')
+    parser.add_argument('--out', required=True, metavar='DIR', help='folder for the copies with the states found')
+    parser.add_argument('--surface', default='', metavar='NAME', help='label of all slides; else as the bag says')
+    parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
+    for item in parameters_of(SegmentationParams):
+        option = f'--{item.name.replace("_", "-")}'
+        known = {'choices': item.choices} if item.choices else {'metavar': 'X'}
+        parser.add_argument(option, type=item.type, default=item.default, help=item.description, **known)
+
+
+def _segment(options: argparse.Namespace) -> int:
+    """Write the copies, and name them with the number of their slides."""
+    values = {item.name: getattr(options, item.name) for item in parameters_of(SegmentationParams)}
+    params = from_mapping(SegmentationParams, values)
+    for path, slides in segment_bags(options.bags, options.out, params, options.surface, options.namespace).items():
+        print(f'{path}: {slides} slides')
+    return 0
+
+
+import_ = Command("turn other people's recordings into labelled bags", _configure_import, _import)
+segment = Command('find the slides in bags that do not tell them', _configure_segment, _segment)

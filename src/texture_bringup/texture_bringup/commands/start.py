@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sub-commands of `texture` that start nodes: those of a launch file, the dashboard, the demonstration."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from pathlib import Path
+
+from texture_bringup.launcher import (
+    Supervisor,
+    all_arguments,
+    end_with,
+    find_launch_file,
+    given_arguments,
+    read,
+)
+from texture_core.cli import Command, add_channels, add_namespace, add_seed
+
+# Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
+
+
+def _configure_launch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as emulator")
+    parser.add_argument('arguments', nargs='*', default=[], metavar='NAME:=VALUE', help='arguments of the launch file')
+    parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
+    parser.add_argument(
+        '--together',
+        action='store_true',
+        help='stop all nodes when one dies; otherwise it is started again if it may be',
+    )
+    parser.add_argument('--show-args', action='store_true', help='show the arguments of the launch file')
+
+
+def _launch(options: argparse.Namespace) -> int:
+    """Run the nodes until they end or Ctrl-C; return 1 if one died, else 0."""
+    if options.parent is not None:
+        end_with(options.parent, signal.SIGINT)
+    path = find_launch_file(options.file)
+    if options.show_args:
+        print(arguments_text(path))
+        return 0
+    nodes = read(path, given_arguments(options.arguments), os.environ)
+    return Supervisor(nodes, _say, together=options.together).run()
+
+
+def arguments_text(path: Path) -> str:
+    """Return the arguments of a launch file and of those it includes with their defaults, one a line."""
+    items = all_arguments(path, os.environ)
+    given = [f'{name}:={item.get("default", "(required)")}' for name, item in items.items()]
+    width = max(map(len, given), default=0)
+    rows = zip(given, items.values(), strict=True)
+    return '\n'.join(f'{text:<{width}}  {item.get("description", "")}'.rstrip() for text, item in rows)
+
+
+def _say(line: str) -> None:
+    try:
+        print(line, flush=True)
+    except BrokenPipeError:
+        # Who read along has gone: nothing more can be shown, and the nodes are stopped in good order.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _configure_dashboard(parser: argparse.ArgumentParser) -> None:
+    from texture_bringup.dashboard import TOKEN_VARIABLE  # noqa: PLC0415 – see above
+    from texture_bringup.nodes.dashboard import DashboardParams  # noqa: PLC0415
+
+    default = DashboardParams()
+    parser.add_argument(
+        '--host',
+        default=default.host,
+        help=f'address to listen on (default {default.host}); beyond loopback the page needs the token that is '
+        f'printed, or the one in {TOKEN_VARIABLE}',
+    )
+    parser.add_argument(
+        '--port', type=int, default=default.port, help=f'port (default {default.port}); 0: any that is free'
+    )
+    parser.add_argument('--recordings', default=default.recordings, help='folder for new bags')
+    add_namespace(parser)
+
+
+def _dashboard(options: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    from texture_bringup.nodes.dashboard import DashboardNode  # noqa: PLC0415 – see above
+    from texture_core.ros import run_node  # noqa: PLC0415
+
+    parameters = {'host': options.host, 'port': options.port, 'recordings': options.recordings}
+    run_node(DashboardNode, parameters, options.namespace)
+    return 0
+
+
+def _configure_demo(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('--out', type=Path, default=Path('texture-demo'), metavar='DIR', help='folder for the results')
+    add_channels(parser)
+    add_seed(parser)
+
+
+def _demo(options: argparse.Namespace) -> int:
+    """Run the demonstration; return 1 if a slide was mistaken."""
+    from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate  # noqa: PLC0415 – see above
+    from texture_evaluation.commands.train import WITH_SLOW_CHANNELS  # noqa: PLC0415
+
+    recipe = WITH_SLOW_CHANNELS['default'] if options.channels == 'all' else 'default'
+    with ProgressLog() as progress:
+        progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
+        all_right = demonstrate(options.out, recipe, options.seed, DemoPlan(), progress)
+        if not all_right:
+            progress.line('Not every slide was recognised.')
+    return 0 if all_right else 1
+
+
+launch = Command('start the nodes of a launch file', _configure_launch, _launch)
+dashboard = Command(
+    'show a web page of the live estimates, with buttons to explore and stop', _configure_dashboard, _dashboard
+)
+demo = Command('the whole thing on an emulator: explore, learn, recognise, report', _configure_demo, _demo)

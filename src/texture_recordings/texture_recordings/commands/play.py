@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sub-commands of `texture` that are nodes: `record` the running system, `replay` a bag to it."""
+
+from __future__ import annotations
+
+import argparse
+
+from texture_core.cli import Command, add_namespace
+from texture_core.config import check_option
+from texture_core.ros import run_node
+from texture_recordings.nodes.record import RecordNode
+from texture_recordings.nodes.replay import ReplayNode, ReplayParams
+
+
+def _configure_record(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('out', help='folder of the new bag; nothing may exist there')
+    add_namespace(parser)
+
+
+def _record(options: argparse.Namespace) -> int:
+    run_node(RecordNode, {'out': options.out}, options.namespace)
+    return 0
+
+
+def _configure_replay(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('bag', help='the bag, or a folder of bags')
+    parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded')
+    parser.add_argument('--slides', default='', help="which slides of each surface, such as '1-30'; all if not given")
+    add_namespace(parser)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    check_option(ReplayParams, 'rate', options.rate)
+    parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides}
+    run_node(ReplayNode, parameters, options.namespace)
+    return 0
+
+
+record = Command('record the running system into a bag', _configure_record, _record)
+replay = Command('play a bag to the running system', _configure_replay, _replay)
