@@ -207,7 +207,7 @@ def end_with(parent: int, number: signal.Signals) -> None:
         os._exit(1)
 
 
-class NodeProcess:
+class RunningNode:
     """A running node, and the lines that it writes.
 
     Start it from the main thread of a program without other threads: the kernel ends it with the thread that did.
@@ -345,7 +345,7 @@ class Supervisor:
         self._together = together
         self._commands: dict[int, list[str]] = {}  # by the id of the node
         self._due: list[tuple[float, NodeDescription, bool]] = []  # when to start which node, and whether it had died
-        self._running: list[NodeProcess] = []
+        self._running: list[RunningNode] = []
         self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
         self._signals_sent = 0
@@ -401,7 +401,7 @@ class Supervisor:
         if again and not any(environment.get(name) for name in PROFILES):
             # In the place of a dead node, with which the others still count, Fast DDS is to be discovered soon.
             environment[PROFILES[0]] = str(config.folder('texture_bringup', 'config/fastdds') / 'restart.xml')
-        process = NodeProcess(node, self._commands[id(node)], environment, self._say)
+        process = RunningNode(node, self._commands[id(node)], environment, self._say)
         for stream in process.streams:
             self._selector.register(stream, selectors.EVENT_READ, process)
         self._running.append(process)
@@ -416,7 +416,7 @@ class Supervisor:
             for process in self._running:
                 process.send(number)
 
-    def _end(self, process: NodeProcess, code: int) -> None:
+    def _end(self, process: RunningNode, code: int) -> None:
         self._forget(process)
         node, stopping = process.node, self._stopping_since_s is not None
         # What was started wrongly would only end again.
@@ -430,7 +430,7 @@ class Supervisor:
             self._say(f'[launch] {node.label} is needed by the others, which are stopped now')
             self.stop()
 
-    def _forget(self, process: NodeProcess) -> None:
+    def _forget(self, process: RunningNode) -> None:
         self._running.remove(process)
         for stream in process.streams:
             if stream.fileno() in self._selector.get_map():
