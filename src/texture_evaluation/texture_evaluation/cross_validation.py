@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from joblib import Parallel, delayed
+from joblib import hash as hash_of
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
@@ -724,6 +725,7 @@ def cross_validate(
     *,
     groups: str | AnyArray = 'slide',
     features: FoldFeatures | None = None,
+    source: Callable[[], SlideDataset] | None = None,
 ) -> CrossValidation:
     """Train a recipe on some slides and test it on others, for each split of the slides.
 
@@ -746,6 +748,9 @@ def cross_validate(
         What must not be on both sides: 'slide', a condition of the data set, such as 'speed', or an array (n_slides,).
     features
         Those of the recipe, if they were computed already.
+    source
+        Reads the same slides, such as a `functools.partial` of `SlideDataset.from_bags` with paths that all computers
+        share. Each worker process then computes the features itself, once, instead of being sent them with each fold.
 
     Returns
     -------
@@ -769,25 +774,43 @@ def cross_validate(
     columns = slide_groups(dataset, groups)
     splits = split_slides(dataset, splitter, columns)
     refuse_untrained(dataset.labels, splits)
-    features = features or FoldFeatures.of(recipe, dataset)
     names = dataset.names
-    folds = Parallel(n_jobs=n_jobs)(
-        delayed(_fold)(
-            recipe,
-            features.trained.of_slides(names[train_rows]),
-            features.tested.of_slides(names[test_rows]),
-            tuple(names[train_rows].tolist()),
-            _fold_name(number, columns, test_rows),
-        )
+    named = [
+        (names[train_rows], names[test_rows], _fold_name(number, columns, test_rows))
         for number, (train_rows, test_rows) in enumerate(splits, 1)
-    )
-    usable = set(features.tested.groups.tolist())
+    ]
+    if source is None:
+        features = features or FoldFeatures.of(recipe, dataset)
+        tasks = [
+            delayed(_fold)(recipe, features.trained.of_slides(train), features.tested.of_slides(test), train, name)
+            for train, test, name in named
+        ]
+    else:
+        key = str(hash_of((source, recipe)))
+        tasks = [delayed(_fold_there)(key, source, recipe, one) for one in named]
+    folds, usable = zip(*Parallel(n_jobs=n_jobs)(tasks), strict=True)
+    found = set().union(*usable) if features is None else set(features.tested.groups.tolist())
     return CrossValidation(
         recipe.name,
         tuple(np.unique(dataset.labels).tolist()),
-        tuple(folds),
-        tuple(name for name in names.tolist() if name not in usable),
+        folds,
+        tuple(name for name in names.tolist() if name not in found),
     )
+
+
+_KEPT: dict[str, FoldFeatures] = {}  # in a worker: of the slides and the recipe that were computed last
+
+
+def _fold_there(
+    key: str, source: Callable[[], SlideDataset], recipe: Recipe, fold: tuple[AnyArray, AnyArray, str]
+) -> tuple[FoldResult, set[str]]:
+    """Return a fold, computed where the slides are read, and the names of all slides that have windows."""
+    features = _KEPT.get(key) or FoldFeatures.of(recipe, source())
+    _KEPT.clear()
+    _KEPT[key] = features
+    train, test, name = fold
+    result, _ = _fold(recipe, features.trained.of_slides(train), features.tested.of_slides(test), train, name)
+    return result, set(features.tested.groups.tolist())
 
 
 def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str, SlideResult]:
@@ -811,12 +834,14 @@ def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> st
 
 
 def _fold(
-    recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: tuple[str, ...], name: str
-) -> FoldResult:
+    recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: AnyArray, name: str
+) -> tuple[FoldResult, set[str]]:
+    """Return what a fold gave, and the names of its test slides that have windows."""
     start = time.process_time()
     try:
         model = train(recipe, trained)
     except InvalidData as error:
         raise InvalidData(f"fold '{name}' cannot be trained: {error}; {SPLIT_ADVICE}") from error
     taken_s = time.process_time() - start
-    return FoldResult(name, trained_on, predict_slides(model, tested), model, taken_s)
+    names = tuple(trained_on.tolist())
+    return FoldResult(name, names, predict_slides(model, tested), model, taken_s), set(tested.groups.tolist())

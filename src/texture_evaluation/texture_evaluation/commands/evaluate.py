@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
     CrossValidation,
     PairedComparison,
+    Split,
     compare_all,
     comparison_chart,
     cross_validate,
@@ -75,10 +77,15 @@ def run_cross_validation(options: argparse.Namespace) -> int:
     _check_outputs(options, [*names, *bags])
     recipes = [with_channels(load_recipe(name), options.channels or 'all') for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
-    dataset = split.cut(SlideDataset.from_bags(bags, options.slides, topics=tuple(topics)))
+    source = partial(_read, [str(Path(bag).absolute()) for bag in bags], options.slides, tuple(topics), split)
+    dataset = source()
     with dask_backend(options.dask) if options.dask else nullcontext():
-        n_jobs = None if options.dask else options.jobs
-        results = [cross_validate(recipe, dataset, split.splitter, n_jobs, groups=split.groups) for recipe in recipes]
+        # The workers of a cluster read the bags themselves, which all its computers find at the same paths.
+        jobs, there = (None, source) if options.dask else (options.jobs, None)
+        results = [
+            cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups, source=there)
+            for recipe in recipes
+        ]
     for line in (line for result in results for line in table(result, split.name)):
         print(line)
     compared = compare_all(results)
@@ -91,6 +98,10 @@ def run_cross_validation(options: argparse.Namespace) -> int:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
         print(comparison_chart(results, title, options.chart))
     return 0
+
+
+def _read(bags: Sequence[str], slides: str, topics: Sequence[str], split: Split) -> SlideDataset:
+    return split.cut(SlideDataset.from_bags(bags, slides, topics=topics))
 
 
 def _check_outputs(options: argparse.Namespace, inputs: Sequence[str]) -> None:
