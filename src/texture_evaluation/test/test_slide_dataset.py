@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.evaluate import evaluate
@@ -16,7 +16,6 @@ from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.bags import BagWriter, read_bag
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.tables import import_tables, mapping_from
 from texture_simulation.offline import SlidePlan, write_simulated
 
 RATE_HZ = 1000.0
@@ -165,27 +164,6 @@ def test_augmented_features_hold_copies_of_every_slide_and_the_windows_stay_the_
     assert set(augmented.augmented.copies.groups.tolist()) == {'cork/1', 'cork/2', 'felt/1', 'felt/2'}
     assert augmented.augmented.gain_response[:32] == pytest.approx(np.full(32, 2.0))  # logarithms of powers
     assert plain.augmented is None
-
-
-def test_a_parquet_file_of_the_data_set_can_be_imported_again(tmp_path: Path) -> None:
-    given = from_arrays()
-    given.to_parquet(tmp_path / 'slides.parquet')
-    mapping = mapping_from({
-        'streams': {'signal': {'columns': ['c0', 'c1'], 'time': {'column': 'time_s'}}},
-        'label': {'column': 'surface'},
-        'slides': {'by': 'column', 'column': 'slide'},
-        'conditions': {'speed': {'column': 'speed_m_s'}, 'force': {'column': 'force_n'}},
-    })  # fmt: skip
-    report = import_tables(mapping, tmp_path / 'slides.parquet', tmp_path / 'bags')
-    read = SlideDataset.from_bags(report.bags).select()
-    assert sorted(read.names) == sorted(given.names)
-    samples = dict(zip(read.names, read.to_numpy()[0], strict=True))
-    for name, own in zip(given.names, arrays(), strict=True):
-        np.testing.assert_array_equal(samples[name], own)
-    speeds = dict(zip(read.names, read.condition('speed'), strict=True))
-    assert [speeds[name] for name in given.names] == given.condition('speed').tolist()
-    with pytest.raises(InvalidParameter, match='exists already'):
-        given.to_parquet(tmp_path / 'slides.parquet')
 
 
 def test_windows_over_distances_show_as_much_of_a_surface_at_every_speed() -> None:

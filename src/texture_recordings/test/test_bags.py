@@ -2,19 +2,17 @@
 import dataclasses
 import math
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.interfaces import QosDurability, QosReliability
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 
 from texture_core.errors import InvalidData
 from texture_core.types import ExplorationState, FeatureVector, Phase, RoughnessEstimate, TactileSignal, TextureEstimate
 from texture_recordings.bags import (
-    QOS,
     TYPES,
     BagWriter,
     SignalDecoder,
@@ -24,6 +22,7 @@ from texture_recordings.bags import (
     read_bag,
     read_raw,
     topics_in,
+    typestore,
 )
 
 STAMP_NS = 1_700_000_000_123_456_789
@@ -80,9 +79,16 @@ def test_the_fast_decoder_agrees_with_the_general_one_when_the_stream_changes() 
             np.testing.assert_array_equal(getattr(fast, field.name), getattr(general, field.name))
 
 
-def test_a_bag_played_by_ros_gives_late_listeners_the_newest_estimate_as_the_nodes_do() -> None:
-    assert QOS['texture'][0].durability is QosDurability.TRANSIENT_LOCAL
-    assert QOS['signal'][0].reliability is QosReliability.BEST_EFFORT
+def test_a_bag_played_by_ros_offers_every_topic_as_the_nodes_do(tmp_path: Path) -> None:
+    baseline = dataclasses.replace(signal(), stamp_ns=1)
+    with BagWriter(tmp_path / 'bag', '/left') as bag:
+        for topic, value in (*VALUES, ('signal_baseline', baseline)):
+            bag.write(topic, value, 1)
+    with Reader(tmp_path / 'bag') as reader:
+        offered = {c.topic.rpartition('/')[2]: c.ext.offered_qos_profiles[0] for c in reader.connections}
+    latched = {'texture', 'roughness', 'exploration', 'signal_baseline'}
+    assert {name for name, qos in offered.items() if qos.durability.name == 'TRANSIENT_LOCAL'} == latched
+    assert {name for name, qos in offered.items() if qos.reliability.name == 'BEST_EFFORT'} == {'signal'}
 
 
 def test_topics_are_chosen_by_the_last_part_of_their_name(tmp_path: Path) -> None:
@@ -241,12 +247,22 @@ def test_a_bag_of_a_named_pipe_or_a_device_is_refused_at_once(tmp_path: Path) ->
             list(read_bag(bag))
 
 
-def test_a_bag_compressed_as_a_whole_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    file = write(tmp_path / 'bag') / 'metadata.yaml'
-    changed = re.sub('compression_mode: .*', 'compression_mode: MESSAGE', file.read_text())
-    assert changed != file.read_text()
-    file.write_text(changed)
-    with pytest.raises(InvalidData, match='ros2 bag convert'):
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+@pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
+def test_a_bag_compressed_by_file_or_message_is_read_up_to_a_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: CompressionMode, storage: StoragePlugin
+) -> None:
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=storage)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    batch = TactileSignal(5, 's', ('a',), (), 1000.0, 0, np.zeros((10_000, 1), dtype=np.float32))
+    with writer:
+        connection = writer.add_connection('/signal', TYPES[TactileSignal], typestore=typestore())
+        writer.write(connection, 7, encode(batch))
+    [(topic, log_ns, read)] = read_bag(tmp_path / 'bag')
+    assert (topic, log_ns, read.samples.tolist()) == ('signal', 7, batch.samples.tolist())
+    monkeypatch.setattr('texture_recordings.bags.MAX_UNPACKED_BYTES', 10_000)
+    monkeypatch.setattr('texture_recordings.bags.MAX_MESSAGE_BYTES', 10_000)
+    with pytest.raises(InvalidData, match='unpacks to more than'):
         list(read_bag(tmp_path / 'bag'))
 
 

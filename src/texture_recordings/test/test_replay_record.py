@@ -7,12 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosbags.rosbag2 import Reader
+from std_msgs.msg import String
 from texture_msgs import msg
+from tf2_msgs.msg import TFMessage
 
-from texture_core.ros import SENSOR_QOS
+from texture_core.errors import InvalidData
+from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import ExplorationState, Phase, TactileSignal
-from texture_recordings.bags import BagWriter, read_bag
+from texture_recordings.bags import BagWriter, read_bag, read_foreign, typestore
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -86,6 +91,47 @@ def test_a_bag_is_not_replayed_where_another_node_publishes_the_same(tmp_path: P
     assert "another node publishes '/left/signal'" in replay.output
     assert f'`texture launch replay bag:={source} namespace:=replay`' in replay.output
     assert 'published' not in replay.output
+
+
+def test_streams_of_other_names_transforms_logs_and_parameters_are_recorded_and_with_all_everything(tmp_path) -> None:
+    wanted = {'/imu', '/signal_baseline', '/words', '/tf_static', '/rosout', '/parameter_events'}
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    batch = to_msg(TactileSignal(5, 's', ('a',), (), 1000.0, 0, np.zeros((10, 1), dtype=np.float32)))
+    out = tmp_path / 'bag'
+
+    def is_written() -> bool:
+        imu.publish(batch)
+        words.publish(String(data='cork'))
+        graph.peer.get_logger().info('still here')
+        try:
+            return wanted <= {message.topic for message in read_foreign(out, lambda _: True)}
+        except InvalidData:
+            return False  # nothing has come to the disk yet
+
+    with LocalGraph(100, deadline_s=60.0) as graph:
+        graph.peer.declare_parameter('rate', 2.5)
+        graph.peer.create_publisher(msg.TactileSignal, 'signal_baseline', STATE_QOS).publish(batch)
+        graph.peer.create_publisher(TFMessage, '/tf_static', latched).publish(TFMessage())
+        imu = graph.peer.create_publisher(msg.TactileSignal, 'imu', SENSOR_QOS)
+        words = graph.peer.create_publisher(String, 'words', 10)
+        with NodeProcess('texture_recordings', 'record', {'out': str(out), 'all': True}, domain_id=100) as record:
+            graph.until(is_written)
+            assert record.stop(signal.SIGINT) == 0, record.output
+    with Reader(out) as reader:
+        offered = {c.topic: c.ext.offered_qos_profiles[0].durability.name for c in reader.connections}
+        events = [
+            typestore().deserialize_cdr(data, c.msgtype)
+            for c, _, data in reader.messages()
+            if c.topic == '/parameter_events'
+        ]
+    assert {name for name, durability in offered.items() if durability == 'TRANSIENT_LOCAL'} >= {
+        '/signal_baseline',
+        '/tf_static',
+        '/exploration',
+    }
+    given = {p.name: p.value.double_value for event in events if event.node == '/peer' for p in event.new_parameters}
+    assert given['rate'] == 2.5
+    assert {topic for topic, _, _ in read_bag(out)} >= {'imu', 'signal_baseline'}
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from texture_core.config import FileRefused, folder, open_regular, parse_yaml, read_text
+from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text
 from texture_core.errors import InvalidData, MissingLibrary
 from texture_core.types import (
     NANOSECONDS,
@@ -52,9 +52,9 @@ try:
     from rosbags.typesys.store import Typestore
 
     if sys.version_info >= (3, 14):
-        from compression.zstd import ZstdError
+        from compression import zstd
     else:
-        from backports.zstd import ZstdError
+        from backports import zstd
 except ModuleNotFoundError as error:  # rosbags brings the others
     raise MissingLibrary('rosbags', 'bags', 'bags') from error
 
@@ -63,6 +63,8 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 # it ended behind its last whole chunk.
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
+MAX_UNPACKED_BYTES = 20_000 * MB  # of one file of a bag that is compressed as a whole
+MAX_MESSAGE_BYTES = 100 * MB
 CHUNK = 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
@@ -89,6 +91,8 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
         file = open_regular(self, None)
+        if self.suffix == '.zstd':
+            _check_unpacked(file)
         if self.suffix != '.mcap' or _has_end(file):
             return file
         end = _end_of_chunks(file)
@@ -129,6 +133,26 @@ class _Ended(io.RawIOBase):
     def close(self) -> None:
         self._file.close()
         super().close()
+
+
+def _check_unpacked(file: BinaryIO) -> None:
+    """Refuse a compressed file that unpacks to more than is read: rosbags unpacks it to the disk before it looks."""
+    unpacked = 0
+    with zstd.open(file, 'rb') as stream:
+        while part := stream.read(1 << 20):
+            unpacked += len(part)
+            if unpacked > MAX_UNPACKED_BYTES:
+                raise FileRefused(f'it unpacks to more than {MAX_UNPACKED_BYTES / MB:.0f} MB; record shorter bags')
+    file.seek(0)
+
+
+def _unpacked_message(data: bytes) -> bytes:
+    """Return a message that was compressed by itself, as `ros2 bag record --compression-mode message` does."""
+    unpacker = zstd.ZstdDecompressor()
+    message = unpacker.decompress(data, MAX_MESSAGE_BYTES)
+    if not unpacker.eof:
+        raise ReaderError(f'a message is cut off, or unpacks to more than {MAX_MESSAGE_BYTES / MB:.0f} MB')
+    return message
 
 
 def _has_end(file: BinaryIO) -> bool:
@@ -174,7 +198,7 @@ def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
         packed = CHUNK_HEAD.size + 4 + int.from_bytes(content[CHUNK_HEAD.size :][:4], 'little')
         kind = content[CHUNK_HEAD.size + 4 : packed].decode()
         storage_mcap.decompress(content[packed + 8 :], kind, size, checksum)
-    except (ReaderError, ValueError, struct.error, RuntimeError, ZstdError):
+    except (ReaderError, ValueError, struct.error, RuntimeError, zstd.ZstdError):
         return False
     return True
 
@@ -446,8 +470,8 @@ def _folder(topic: str) -> str:
 
 # What the reader raises, depending on which byte of a file is wrong.
 BROKEN = (
-    ReaderError, TypesysError, ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error, RuntimeError,
-    ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
+    ReaderError, TypesysError, zstd.ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error,
+    RuntimeError, ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
 )  # fmt: skip
 
 
@@ -675,10 +699,15 @@ def _read(
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)
+            packed = reader.compression_mode == 'message'
+            if packed:  # unpacked here, with a limit
+                storage: Any = reader.storage
+                storage.metadata = storage.metadata._replace(compression_mode=None)
             for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
                 missing -= 1
                 name = names.get(connection.topic, connection.topic)
-                yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
+                raw = _unpacked_message(data) if packed else data
+                yield name, RawMessage(connection.topic, connection.msgtype, log_ns, raw)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
     except BROKEN as error:
@@ -688,12 +717,10 @@ def _read(
 
 
 def _files(path: Path) -> list[Path]:
-    """Return the files of a bag; one of `BROKEN` is raised if it may as a whole unpack to anything."""
+    """Return the files of a bag."""
     if not path.is_dir():
         return [path]
     facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
-    if str(facts.get('compression_mode') or 'none').lower() != 'none':
-        raise ReaderError('it is compressed as a whole; let `ros2 bag convert` make it MCAP, which compresses inside')
     # As rosbags finds them: beside the metadata, wherever the entry says that they were.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
 
@@ -746,15 +773,28 @@ class Continuity:
 FOREVER = QosTime(2147483647, 4294967295)
 
 
-def _offered(quality: Quality) -> list[Qos]:
+def _offered(quality: Quality) -> Qos:
     reliability = QosReliability.RELIABLE if quality.reliable else QosReliability.BEST_EFFORT
     durability = QosDurability.TRANSIENT_LOCAL if quality.latched else QosDurability.VOLATILE
     keep, lively = QosHistory.KEEP_LAST, QosLiveliness.AUTOMATIC
-    return [Qos(keep, quality.depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
+    return Qos(keep, quality.depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)
 
 
-# For `ros2 bag play`; by the last part of the topic's name.
-QOS: Mapping[str, list[Qos]] = {topic: _offered(quality) for topic, quality in QUALITIES.items()}
+# Of topics that the suite does not publish, or not under a name of its own. Who joins late gets all that is latched.
+LATCHED = Quality(100, reliable=True, latched=True)
+COMMON: Mapping[str, Quality] = {
+    '/diagnostics': Quality(100, reliable=True, latched=False),
+    '/parameter_events': Quality(1000, reliable=True, latched=False),
+    '/rosout': Quality(1000, reliable=True, latched=True),
+    '/tf_static': LATCHED,
+}
+
+
+def quality_of(topic: str) -> Quality | None:
+    """Return the quality of service of a topic by its whole name; None if it is none that the suite knows."""
+    if topic.endswith('_baseline'):
+        return LATCHED
+    return COMMON.get(topic, QUALITIES.get(short_name(topic)))
 
 
 class BagWriter:
@@ -793,6 +833,7 @@ class BagWriter:
         self.path = Path(path)
         self._namespace = '/' + namespace.strip('/')
         self._connections: dict[tuple[str, str], Connection] = {}
+        self.qualities: dict[str, Quality] = {}  # of topics that `quality_of` does not know, as they were offered
         if self.path.exists():
             raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
         self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
@@ -854,7 +895,9 @@ class BagWriter:
 
     def _connect(self, topic: str, msgtype: str) -> Connection:
         name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
-        qos = QOS.get(short_name(name), [])
+        quality = quality_of(name) or self.qualities.get(name)
+        # For `ros2 bag play`, which offers what was offered when it was recorded.
+        qos = [_offered(quality)] if quality else []
         return self._writer.add_connection(name, msgtype, typestore=typestore(), offered_qos_profiles=qos)
 
     def __enter__(self) -> BagWriter:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from bisect import bisect_left
@@ -19,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import library, writing
-from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import (
     NANOSECONDS,
     TURNED_RAD,
@@ -272,62 +272,6 @@ def _covered(states: Sequence[ExplorationState]) -> tuple[int, int]:
 
 
 # --------------------
-# Write labelled slides as a Parquet file, a row for each sample.
-
-FACTS = ('slide', 'surface', 'number', 'session', 'speed_m_s', 'force_n', 'direction_rad', 'time_s')
-
-
-def write_parquet(slides: Sequence[SlideSamples], path: str | Path) -> None:
-    """Write the samples of slides, one group of rows for each slide.
-
-    Parameters
-    ----------
-    slides
-        With the same channels.
-    path
-        File to write; its columns are those of `FACTS`, then the channels.
-
-    Raises
-    ------
-    InvalidData
-        If the slides differ in channels, a channel is named as a column of `FACTS`, or pyarrow is not installed.
-    InvalidParameter
-        If the file exists or cannot be written.
-    """
-    arrow = library('pyarrow', 'Parquet files', 'parquet')
-    parquet = library('pyarrow.parquet', 'Parquet files', 'parquet')
-    channels = slides[0].channels
-    other = next((slide for slide in slides if slide.channels != channels), None)
-    if other or set(channels) & set(FACTS):
-        place = f"slide '{other.slide.name}' has {', '.join(other.channels)}" if other else ', '.join(FACTS)
-        raise InvalidData(f'the channels are {", ".join(channels)}, but {place}; export slides of one sensor')
-    if Path(path).exists():
-        raise InvalidParameter(f"'{path}' exists already; name another file or remove it")
-    first = arrow.table(_rows(arrow, slides[0]))
-    with writing(path), parquet.ParquetWriter(path, first.schema) as writer:
-        for slide in slides:
-            writer.write_table(arrow.table(_rows(arrow, slide)))
-
-
-def _rows(arrow: Any, samples: SlideSamples) -> dict[str, Any]:
-    count, slide = len(samples.samples), samples.slide
-    facts: dict[str, AnyArray] = {
-        'number': np.full(count, slide.number),
-        'speed_m_s': np.full(count, samples.speed_m_s),
-        'force_n': np.full(count, samples.force_n),
-        'direction_rad': np.full(count, samples.direction_rad),
-        'time_s': np.arange(count) / samples.rate_hz,
-    }
-    texts = {'slide': slide.name, 'surface': slide.surface, 'session': slide.session}
-    columns = {name: facts[name] if name in facts else _repeated(arrow, texts[name], count) for name in FACTS}
-    return {**columns, **dict(zip(samples.channels, samples.samples.astype(np.float32).T, strict=True))}
-
-
-def _repeated(arrow: Any, text: str, count: int) -> Any:
-    return arrow.DictionaryArray.from_arrays(np.zeros(count, dtype=np.int32), [text])
-
-
-# --------------------
 # The labelled explorations in bags, and which of them the user means by `--slides 1-30`.
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
@@ -385,7 +329,12 @@ def find_slides(
     """
     wanted = parse_selection(slides)
     paths = find_bags(bags)
-    labelled = [slide for path in paths for slide in _slides_of(path, namespace, topics)]
+    labelled = []
+    for path in paths:
+        own = _slides_of(path, namespace, topics)
+        if not own and len(paths) > 1:
+            logging.getLogger(__name__).warning("the bag '%s' has no labelled slide, so nothing is taken from it", path)
+        labelled += own
     if not labelled:
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
@@ -907,25 +856,6 @@ class SlideDataset:
             If a slide has no samples of the topic or lost some.
         """
         return [slide.samples for slide in self.samples(topic)], self.labels
-
-    def to_parquet(self, path: str | Path, topic: str = 'signal') -> None:
-        """Write the samples of one topic as a Parquet file, a row each, with slide, surface, time and conditions.
-
-        Parameters
-        ----------
-        path
-            File to write.
-        topic
-            Signal to write.
-
-        Raises
-        ------
-        InvalidData
-            If a slide has no samples of the topic or lost some, slides differ in channels, or pyarrow is missing.
-        InvalidParameter
-            If the file exists or cannot be written.
-        """
-        write_parquet(self.samples(topic), path)
 
 
 def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:

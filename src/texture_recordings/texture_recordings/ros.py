@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -60,6 +61,23 @@ class Topic(NamedTuple):
     def msgtype(self) -> str:
         """Name of the type as bags write it, 'texture_msgs/msg/TactileSignal'."""
         return f'{self.type.__module__.split(".")[0]}/msg/{self.type.__name__}'
+
+
+def message_class(msgtype: str) -> Any:
+    """Return the class of a type of messages, such as 'tf2_msgs/msg/TFMessage'.
+
+    Raises
+    ------
+    InvalidData
+        If its package is not installed.
+    """
+    package, _, name = msgtype.split('/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), name)
+    except (ImportError, AttributeError) as error:
+        raise InvalidData(
+            f"messages of the type '{msgtype}' are not installed; install the package {package}"
+        ) from error
 
 
 TOPICS: Mapping[str, Topic] = {

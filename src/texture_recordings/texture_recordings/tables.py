@@ -6,7 +6,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import fnmatch
-import importlib
 import io
 import json
 import math
@@ -24,13 +23,12 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import islice, pairwise
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,85 +71,53 @@ except ModuleNotFoundError as error:
 # What a mapping file (YAML) says: which columns are signals, and what labels, slides and conditions come from.
 
 FIELD = re.compile(r'\{(\w*)\}|\*')
-ANYTHING = ''
 
 
-@dataclass(frozen=True)
-class NameTemplate:
-    """A name with fields in braces; '*' and '{}' stand for any text that is not kept.
+@cache
+def template_pattern(template: str) -> tuple[re.Pattern[str], Sequence[str]]:
+    """Return what names of the form of a template match, and the name of each group, '' for what is not kept.
 
-    A field is one character or more, holds no '/', and ends where the text behind it in the template comes first. So
-    no name takes long to compare.
-
-    Parameters
-    ----------
-    text
-        The template; its parts between slashes are compared one by one.
+    A field in braces is one character or more, holds no '/', and ends where the text behind it comes first; '*' and
+    '{}' stand for any text that is not kept.
 
     Raises
     ------
     InvalidParameter
         If two fields follow each other without text between them, or a name occurs twice.
+    """
+    first, *literals = FIELD.sub('\0', template).split('\0')
+    if '' in literals[:-1]:
+        raise InvalidParameter(f"the template '{template}' has fields without text between; put text there")
+    names = [match[1] or '' for match in FIELD.finditer(template)]
+    if len(set(filter(None, names))) < len(list(filter(None, names))):
+        raise InvalidParameter(f"the template '{template}' has a field twice; give each a name of its own")
+    pattern = re.escape(first)
+    for number, (name, literal) in enumerate(zip(names, map(re.escape, literals), strict=True), 1):
+        text = '[^/]+' if name else '[^/]*'
+        # What a lookahead has found is not tried anew, so no name takes long to compare.
+        own = f'(?=({text}?){literal})\\{number}' if number < len(names) else f'({text})'
+        pattern += f'{own}{literal}'
+    return re.compile(pattern, re.DOTALL), names
+
+
+def template_fields(template: str, name: str) -> dict[str, str] | None:
+    """Return the fields of a name; None if it is not of the form of the template.
+
+    Parameters
+    ----------
+    template
+        Such as '{material}/{speed}mms_*.csv'; see `template_pattern`.
+    name
+        Path of a file, or name of an array.
 
     Examples
     --------
-    >>> NameTemplate('{material}/{speed}mms_*.csv').match('felt/20mms_first.csv')
+    >>> template_fields('{material}/{speed}mms_*.csv', 'felt/20mms_first.csv')
     {'material': 'felt', 'speed': '20'}
     """
-
-    text: str
-
-    def __post_init__(self) -> None:
-        names = [name for name in self.names if name]
-        if len(set(names)) < len(names):
-            raise InvalidParameter(f"the template '{self.text}' has a field twice; give each a name of its own")
-        for part in self.text.split('/'):
-            if '' in FIELD.sub('\0', part).split('\0')[1:-1]:
-                raise InvalidParameter(f"the template '{self.text}' has fields without text between; put text there")
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Names of the fields in their order, '' for those that are not kept."""
-        return [match[1] or ANYTHING for match in FIELD.finditer(self.text)]
-
-    @property
-    def depth(self) -> int:
-        """Number of parts between slashes."""
-        return self.text.count('/') + 1
-
-    def match(self, name: str) -> dict[str, str] | None:
-        """Return the fields of a name; None if it is not of this form."""
-        parts = name.split('/')
-        if len(parts) != self.depth:
-            return None
-        found: dict[str, str] = {}
-        for template, part in zip(self.text.split('/'), parts, strict=True):
-            fields = _fields(template, part)
-            if fields is None:
-                return None
-            found |= fields
-        return found
-
-
-def _fields(template: str, text: str) -> Mapping[str, str] | None:
-    names = [match[1] or ANYTHING for match in FIELD.finditer(template)]
-    first, *literals = FIELD.sub('\0', template).split('\0')
-    if not literals:
-        return {} if text == template else None
-    last = literals[-1]
-    at, end = len(first), len(text) - len(last)
-    if not text.startswith(first) or not text.endswith(last):
-        return None
-    found = {}
-    for name, literal in zip(names, [*literals[:-1], None], strict=True):
-        shortest = 1 if name else 0
-        stop = end if literal is None else text.find(literal, at + shortest, end)
-        if stop < at + shortest:
-            return None
-        if name:
-            found[name] = text[at:stop]
-        at = stop + len(literal or '')
-    return found
+    pattern, names = template_pattern(template)
+    match = pattern.fullmatch(name)
+    return {key: text for key, text in zip(names, match.groups(), strict=True) if key} if match else None
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
@@ -161,13 +127,7 @@ SPACINGS = ('even', 'interpolated')
 
 @dataclass(frozen=True)
 class FileFormat:
-    """How a file is read, where its kind does not say it.
-
-    Examples
-    --------
-    >>> FileFormat(delimiter=';', decimal=',').header
-    True
-    """
+    """How a file is read, where its kind does not say it."""
 
     delimiter: str = param('', "Sets the character between columns of a text file; '' finds one of , ; tab | or space.")
     decimal: str = param('.', 'Sets the decimal sign of numbers in a text file.', choices=('.', ','))
@@ -192,13 +152,7 @@ class FileFormat:
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """When the rows were sampled.
-
-    Examples
-    --------
-    >>> TimeColumn('time', unit='ms').spacing
-    'even'
-    """
+    """When the rows were sampled."""
 
     column: str = param('', "Names the column of time; '' takes rows as evenly spaced at `rate_hz`.")
     unit: str = param('s', 'Names the unit of the column of time.', choices=tuple(TIME_UNITS))
@@ -215,13 +169,7 @@ class TimeColumn:
 
 @dataclass(frozen=True)
 class StreamColumns:
-    """The columns of one stream: `signal` for vibration, `signal_static` for slow channels.
-
-    Examples
-    --------
-    >>> StreamColumns(['accel_*'], unit='g', rate_hz=1000.0).time.gap
-    1.75
-    """
+    """The columns of one stream: `signal` for vibration, `signal_static` for slow channels."""
 
     columns: list[str] = param(  # noqa: RUF009 – it gives a field
         [], "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8')."
@@ -249,13 +197,7 @@ class StreamColumns:
 
 @dataclass(frozen=True)
 class LabelColumn:
-    """Where the surface of a slide is named.
-
-    Examples
-    --------
-    >>> LabelColumn('material', names={'0': 'cork'}).names['0']
-    'cork'
-    """
+    """Where the surface of a slide is named."""
 
     column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the label.')
     value: str = param('', 'Names the label of all slides, in place of a column.')
@@ -269,13 +211,7 @@ class LabelColumn:
 
 @dataclass(frozen=True)
 class SlideBorders:
-    """Parameters that say where slides begin and end.
-
-    Examples
-    --------
-    >>> SlideBorders('pause', pause_s=1.0).min_s
-    0.2
-    """
+    """Parameters that say where slides begin and end."""
 
     by: str = param(
         'file',
@@ -303,13 +239,7 @@ class SlideBorders:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number that holds for a slide or changes along it.
-
-    Examples
-    --------
-    >>> Quantity(value='20', unit='mm/s').column
-    ''
-    """
+    """A number that holds for a slide or changes along it."""
 
     column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the number.')
     value: str = param('', 'Sets the number for all slides, in place of a column.')
@@ -325,25 +255,6 @@ CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
 
 
 @dataclass(frozen=True)
-class ConditionQuantities:
-    """How the finger slid; what is not named is unknown."""
-
-    speed: Quantity = field(default_factory=Quantity)
-    force: Quantity = field(default_factory=Quantity)
-    direction: Quantity = field(default_factory=Quantity)
-
-    def __post_init__(self) -> None:
-        for name, units in CONDITION_UNITS.items():
-            quantity = getattr(self, name)
-            if quantity.unit and quantity.unit not in units:
-                raise InvalidParameter(f"the unit of {name} is '{quantity.unit}'; use one of {', '.join(units)}")
-            try:
-                float(quantity.value or 0.0)
-            except ValueError as error:
-                raise InvalidParameter(f"the {name} is '{quantity.value}'; write a number, such as 0.05") from error
-
-
-@dataclass(frozen=True)
 class TableMapping:
     """Parameters that map the columns of tables to signals and slides.
 
@@ -352,12 +263,6 @@ class TableMapping:
     >>> mapping = mapping_from({'streams': {'signal': {'columns': ['ax']}}, 'label': {'column': 'material'}})
     >>> mapping.slides.by, mapping.streams['signal'].columns
     ('file', ['ax'])
-    >>> mapping.format == FileFormat(), mapping.label == LabelColumn('material'), mapping.slides == SlideBorders()
-    (True, True, True)
-    >>> mapping.streams['signal'] == StreamColumns(['ax'])
-    True
-    >>> mapping.conditions == ConditionQuantities(speed=Quantity())  # unknown
-    True
     """
 
     files: str = param('*', "Gives the template of the paths below the source, such as '{material}/run{run}.csv'.")
@@ -368,7 +273,7 @@ class TableMapping:
     streams: Mapping[str, StreamColumns] = field(default_factory=dict)
     label: LabelColumn = field(default_factory=LabelColumn)
     slides: SlideBorders = field(default_factory=SlideBorders)
-    conditions: ConditionQuantities = field(default_factory=ConditionQuantities)
+    conditions: Mapping[str, Quantity] = field(default_factory=dict)  # what is not named is unknown
     session: str = param('', "Names the column or field by which slides go into bags; '' makes one bag a surface.")
     sensor: str = param('imported', 'Names the sensor in the bags.')
     motion: str = param('linear_slide', 'Names the motion in the bags.')
@@ -378,7 +283,17 @@ class TableMapping:
 
     def __post_init__(self) -> None:
         for template in filter(None, (self.files, self.tables)):
-            NameTemplate(template)
+            template_pattern(template)
+        for name, quantity in self.conditions.items():
+            if name not in CONDITION_UNITS:
+                raise unknown_name(name, CONDITION_UNITS, 'condition')
+            if quantity.unit and quantity.unit not in CONDITION_UNITS[name]:
+                units = ', '.join(CONDITION_UNITS[name])
+                raise InvalidParameter(f"the unit of {name} is '{quantity.unit}'; use one of {units}")
+            try:
+                float(quantity.value or 0.0)
+            except ValueError as error:
+                raise InvalidParameter(f"the {name} is '{quantity.value}'; write a number, such as 0.05") from error
         if not self.streams or not set(self.streams) <= set(STREAMS):
             raise InvalidParameter(
                 f'the streams are {", ".join(self.streams) or "none"}; name {" or ".join(STREAMS)}, or both'
@@ -390,6 +305,14 @@ class TableMapping:
             raise InvalidParameter('the label has not one origin; give `column` or `value` under `label`')
         if self.slides.by == 'column' and not self.slides.column:
             raise InvalidParameter('slides end where a column changes, and none is named; give `column` under `slides`')
+
+    def texts(self) -> list[str]:
+        """Return the names of the columns that are read as texts."""
+        return [self.label.column, self.session, *[self.slides.column] * (self.slides.by == 'column')]
+
+    def quantity(self, name: str) -> Quantity:
+        """Return where a condition comes from."""
+        return self.conditions.get(name, Quantity())
 
 
 def load_mapping(name_or_path: str | Path) -> TableMapping:
@@ -413,13 +336,13 @@ def mapping_from(content: object, where: str = 'mapping') -> TableMapping:
 # Files of anybody as tables: CSV, NumPy, MATLAB, HDF5, Parquet, sound, and bags of standard messages.
 #
 # The libraries that read them believe what a file says of its size. So a child process reads, with a limit of memory
-# and
-# of time, and no reader has limits of its own.
+# and of time, and no reader has limits of its own.
 
 MAX_FILE_BYTES = 1000 * MB
 MEMORY_BYTES = 1000 * MB  # beyond what the interpreter takes, and `MEMORY_TIMES` the size of the file
 MEMORY_TIMES = 4
 DEADLINE_S, DEADLINE_BYTES = 10.0, 5 * MB  # for each of so many bytes; the machine may be busy
+START_S = 120.0  # for the process to load its libraries, on a machine that does much else
 MAX_VALUES = 50_000_000  # of one table: 400 MB
 EXAMPLES = 5
 RANGE = re.compile(r'(\D*)(\d{1,9})-\1(\d{1,9})')
@@ -431,15 +354,8 @@ BLOCK_ROWS = 20_000  # of a text file, which are parsed at once
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
 
-@dataclass(frozen=True)
-class MalformedRow:
-    """A row that cannot be read, for a sentence.
-
-    Examples
-    --------
-    >>> print(MalformedRow(17, 'force', "'n/a' is no finite number"))
-    row 17, column 'force': 'n/a' is no finite number
-    """
+class MalformedRow(NamedTuple):
+    """A row that cannot be read, for a sentence."""
 
     row: int
     column: str
@@ -463,12 +379,16 @@ class Columns:
         Number in the file of each row, from 1, for sentences; None if rows count from 0.
     malformed
         The first rows that are malformed.
+    facts
+        What holds for the whole table: `place`, `fields`, `rate_hz`, `clocks` as in `Table`, and `chosen`, the names of
+        the columns of each stream.
     """
 
     numbers: Mapping[str, Array]
     texts: Mapping[str, NDArray[np.str_]]
     rows: AnyArray | None = None
     malformed: Sequence[MalformedRow] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def row(self, index: int) -> int:
         """Return the number in the file of a row."""
@@ -526,6 +446,30 @@ class Table:
             found += meant
         return found
 
+    def mapped(self, mapping: TableMapping, fields: Mapping[str, str]) -> Columns:
+        """Return the columns that a mapping uses; `fields` are those of the name of the file.
+
+        Raises
+        ------
+        InvalidData
+            If one is missing, with the nearest name.
+        """
+        fields = {**self.fields, **fields}
+        chosen = {name: self.chosen(stream.columns) for name, stream in mapping.streams.items()}
+        wanted = [column for columns in chosen.values() for column in columns]
+        wanted += [stream.time.column for stream in mapping.streams.values()]
+        wanted += [quantity.column for quantity in mapping.conditions.values()]
+        texts = mapping.texts()
+        for name in filter(None, (*wanted, *texts)):
+            if name not in fields and name not in self.names:
+                raise InvalidData(f"'{self.place}': {unknown_name(name, (*self.names, *fields), 'column')}")
+        clocks = {name: self.clocks[name] for name in (*wanted, *texts) if name in self.clocks}
+        numbers = dict.fromkeys((*wanted, *clocks.values()))
+        both = (numbers, dict.fromkeys(texts))
+        read = self.read(*([name for name in names if name and name not in fields] for names in both))
+        facts = {'place': self.place, 'fields': fields, 'rate_hz': self.rate_hz, 'clocks': clocks, 'chosen': chosen}
+        return replace(read, facts=facts)
+
 
 def _meant(name: str, names: Sequence[str]) -> list[str]:
     match = RANGE.fullmatch(name)
@@ -540,21 +484,21 @@ def _meant(name: str, names: Sequence[str]) -> list[str]:
 class TableFiles:
     """Read tables in a child process that has limits; use it in a `with` block.
 
-    The child reads one file after another. What it was asked for it sends as plain bytes, so that nothing which a file
-    may do to it reaches this process.
+    The child reads one file after another and sends plain bytes, so that nothing which a file may do to it reaches this
+    process.
     """
 
     def __enter__(self) -> TableFiles:
         self._child: subprocess.Popen[bytes] | None = None
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._end()
 
-    def tables(self, kind: str, path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-        """Yield the tables of a file; each can be read until the next one is asked for.
+    def tables(
+        self, kind: str, path: Path, place: str, mapping: TableMapping, fields: Mapping[str, str] | None = None
+    ) -> Iterator[Columns]:
+        """Yield the tables of a file, of each the columns that a mapping uses.
 
         Parameters
         ----------
@@ -566,38 +510,37 @@ class TableFiles:
             Its name for sentences.
         mapping
             Says how the file is read and what is wanted of it.
+        fields
+            Values in its name.
 
         Yields
         ------
-        Table
-            Its columns are read when asked for.
+        Columns
+            With the `facts` of the table.
 
         Raises
         ------
         InvalidData
-            If it is no file of its kind, is damaged, or takes more memory or time than the limit.
+            If it is no file of its kind, lacks a column, is damaged, or takes more memory or time than the limit.
         """
         size = _checked_size(path, place)
         if self._child is None:
             self._begin()
-        self._left_s = DEADLINE_S * max(1.0, size / DEADLINE_BYTES)
+        self._limit_s = DEADLINE_S * max(1.0, size / DEADLINE_BYTES)
+        self._left_s = START_S
         self._memory = MEMORY_BYTES + MEMORY_TIMES * size
-        try:
-            reply = self._ask((kind, str(path), place, mapping, self._memory), place)
-            while facts := reply.get('table'):
-                yield Table(read=partial(self._columns, place), **facts)
-                reply = self._ask(None, place)
-        except GeneratorExit:
-            self._end()  # in the middle of a file: the child would take what comes next for an answer
-            raise
-
-    def _columns(self, place: str, numbers: Sequence[str], texts: Sequence[str]) -> Columns:
-        reply = self._ask((list(numbers), list(texts)), place)
-        read: dict[str, dict[str, AnyArray]] = {'numbers': {}, 'texts': {}, 'rows': {}}
-        for group, name, kind in reply['arrays']:
-            read[group][name] = np.frombuffer(self._receive(place), np.dtype(kind))
-        malformed = [MalformedRow(**row) for row in reply['malformed']]
-        return Columns(read['numbers'], read['texts'], read['rows'].get(''), malformed)
+        with suppress(OSError):  # it has ended: the answer says why
+            self._connection.send((kind, str(path), place, mapping, dict(fields or {}), self._memory))
+        while reply := self._reply(place):
+            read: dict[str, dict[str, AnyArray]] = {'numbers': {}, 'texts': {}, 'rows': {}}
+            for group, name, dtype in reply['arrays']:
+                read[group][name] = np.frombuffer(self._receive(place), np.dtype(dtype))
+            malformed = [MalformedRow(*row) for row in reply['malformed']]
+            try:
+                yield Columns(read['numbers'], read['texts'], read['rows'].get(''), malformed, reply['facts'])
+            except GeneratorExit:
+                self._end()  # in the middle of a file: what comes next would be taken for an answer
+                raise
 
     def _begin(self) -> None:
         self._connection, theirs = Pipe()
@@ -619,11 +562,10 @@ class TableFiles:
         child.kill()
         return child.wait()
 
-    def _ask(self, request: object, place: str) -> Any:
-        with suppress(OSError):  # it has ended: the answer says why
-            self._connection.send(request)
+    def _reply(self, place: str) -> Any:
         reply = json.loads(self._receive(place))
         if reply.get('ready'):  # libraries are loaded; only now the time of the file begins
+            self._left_s = self._limit_s
             reply = json.loads(self._receive(place))
         if 'refused' in reply:
             raise InvalidData(reply['refused'])
@@ -675,39 +617,27 @@ def serve(number: int) -> None:
     connection = Connection(number)
     while True:
         try:
-            request = connection.recv()
+            kind, path, place, mapping, fields, memory = connection.recv()
         except EOFError:
             return
+        reply = {}
         try:
-            _serve_file(connection, request)
-            reply = {}
+            for name, files, extra in LIBRARIES.get(kind, ()):
+                library(name, files, extra)
+            connection.send_bytes(b'{"ready": true}')
+            taken = int(Path('/proc/self/statm').read_text(encoding='ascii').split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
+            for table in READERS[kind](Path(path), place, mapping):
+                _send(connection, table.mapped(mapping, fields), place)
         except (InvalidData, MissingLibrary) as error:
             reply = {'refused': str(error)}
-        except MemoryError:
-            reply = {'refused': _refusal(request[2], f'it takes more than {request[4] / MB:.0f} MB of memory to read')}
         # Whatever a library raises, which depends on the byte that is wrong, is said of the file.
         except Exception as error:
-            reply = {'refused': _refusal(request[2], str(error) or type(error).__name__)}
+            out_of_memory = f'it takes more than {memory / MB:.0f} MB of memory to read'
+            reason = out_of_memory if isinstance(error, MemoryError) else str(error) or type(error).__name__
+            reply = {'refused': f"'{place}' cannot be read: {reason[:300]}; save it again"}
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         connection.send_bytes(json.dumps(reply).encode())
-
-
-def _refusal(place: str, reason: str) -> str:
-    return f"'{place}' cannot be read: {reason[:300]}; save it again"
-
-
-def _serve_file(connection: Connection, request: tuple[str, str, str, TableMapping, int]) -> None:
-    kind, path, place, mapping, memory = request
-    for name, files, extra in LIBRARIES.get(kind, ()):
-        library(name, files, extra)
-    connection.send_bytes(b'{"ready": true}')
-    taken = int(Path('/proc/self/statm').read_text(encoding='ascii').split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
-    for table in READERS[kind](Path(path), place, mapping):
-        facts = {key: getattr(table, key) for key in ('place', 'fields', 'rate_hz', 'clocks')}
-        connection.send_bytes(json.dumps({'table': {**facts, 'names': list(table.names)}}).encode())
-        while wanted := connection.recv():
-            _send(connection, table.read(*wanted), place)
 
 
 def _send(connection: Connection, columns: Columns, place: str) -> None:
@@ -719,11 +649,9 @@ def _send(connection: Connection, columns: Columns, place: str) -> None:
     arrays += [('rows', '', columns.rows)] if columns.rows is not None else []
     if sum(array.nbytes for _, _, array in arrays) > 8 * MAX_VALUES:
         raise InvalidData(f"'{place}' has more than {MAX_VALUES // 1_000_000} million values; split it into files")
-    facts = {
-        'arrays': [(group, name, array.dtype.str) for group, name, array in arrays],
-        'malformed': [asdict(row) for row in columns.malformed],
-    }
-    connection.send_bytes(json.dumps(facts).encode())
+    listed = [(group, name, array.dtype.str) for group, name, array in arrays]
+    reply = {'arrays': listed, 'malformed': columns.malformed, 'facts': columns.facts}
+    connection.send_bytes(json.dumps(reply).encode())
     for _, _, array in arrays:
         connection.send_bytes(array.tobytes())
 
@@ -981,12 +909,12 @@ def _groups(names: Sequence[str], template: str) -> dict[str, tuple[dict[str, st
     """Return by table its fields, and the names of its arrays by that of their columns."""
     if not template:
         return {'': ({}, {name: name for name in names})}
-    form = NameTemplate(template)
     groups: dict[str, tuple[dict[str, str], dict[str, str]]] = {}
+    depth = template.count('/') + 1
     for name in names:
         parts = name.split('/')
-        table, rest = '/'.join(parts[: form.depth]), '/'.join(parts[form.depth :])
-        fields = form.match(table)
+        table, rest = '/'.join(parts[:depth]), '/'.join(parts[depth:])
+        fields = template_fields(template, table)
         if fields is not None:
             groups.setdefault(table, (fields, {}))[1][rest] = name
     return groups
@@ -1041,27 +969,7 @@ def _joined(name: str, part: str) -> str:
 
 
 def table_columns(columns: Mapping[str, AnyArray], place: str, numbers: Sequence[str], texts: Sequence[str]) -> Columns:
-    """Return columns as numbers and texts.
-
-    Parameters
-    ----------
-    columns
-        By name, (n,) each.
-    place
-        File, and array in it, for sentences.
-    numbers, texts
-        Names of the columns.
-
-    Returns
-    -------
-    Columns
-        NaN for numbers that are not finite.
-
-    Raises
-    ------
-    InvalidData
-        If numbers are asked for where texts are.
-    """
+    """Return columns, (n,) each, as numbers and texts; NaN for numbers that are not finite."""
     read, malformed = {}, []
     for name in numbers:
         array = columns[name]
@@ -1083,984 +991,6 @@ def _texts(array: AnyArray) -> AnyArray:
     if array.dtype.kind == 'f' and np.array_equal(array, np.round(array)):  # 3.0 is meant as 3
         return array.astype(np.int64).astype(str)
     return array.astype(str)
-
-
-def _read_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    module = importlib.import_module('texture_recordings.tables')  # which needs this one
-    yield from module.read_message_bag(path, place, mapping)
-
-
-# Opens a file as tables, in the child process: path, name to be shown, mapping. What it raises is said of the file.
-TableReader = Callable[[Path, str, TableMapping], Iterator[Table]]
-
-
-BAG = 'bag'
-READERS: Mapping[str, TableReader] = {
-    '.csv': _read_csv,
-    '.tsv': _read_csv,
-    '.txt': _read_csv,
-    '.npz': _read_numpy,
-    '.npy': _read_numpy,
-    '.mat': _read_mat,
-    '.wav': _read_wav,
-    '.h5': _read_hdf5,
-    '.hdf5': _read_hdf5,
-    '.parquet': _read_parquet,
-    BAG: _read_bag,
-}
-# Libraries that a kind of file needs: module, what it reads, and the extra of this package that brings it.
-HDF5 = ('h5py', 'HDF5 files', 'hdf5')
-PARQUET = ('pyarrow.parquet', 'Parquet files', 'parquet')
-LIBRARIES: Mapping[str, Sequence[tuple[str, str, str]]] = {
-    '.mat': (('scipy.io', 'MATLAB files', 'mat'),),
-    '.wav': (('scipy.io', 'sound files', 'wav'),),
-    '.h5': (HDF5,),
-    '.hdf5': (HDF5,),
-    '.parquet': (PARQUET,),
-    BAG: (('texture_recordings.tables', 'bags', 'bag'),),
-}
-# What `texture import` is given a mapping for, and the kinds of files which that means.
-MAPPED: Mapping[str, Sequence[str]] = {'table': tuple(kind for kind in READERS if kind != BAG), 'bag': (BAG,)}
-
-
-# --------------------
-# Turn tables into labelled bags, as a mapping says.
-
-SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
-ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
-
-
-@dataclass(frozen=True, eq=False)
-class GridRows:
-    """Samples of one slide on an even grid.
-
-    Parameters
-    ----------
-    samples : (n, n_channels)
-        NaN for bad ones.
-    index : (n,)
-        Place of each on the grid from 0; it jumps where samples were lost.
-    jitter_s : (m,)
-        By how much steps of time differ from the sampling interval, gaps left out.
-    gaps, lost
-        Number of gaps, and of samples lost in them.
-    disordered
-        Number of rows left out because their time does not come after that of all rows before.
-
-    Examples
-    --------
-    >>> rows = on_grid(np.zeros((4, 1)), np.array([0.0, 0.01, 0.05, 0.06]), 100.0, gap=1.75, interpolated=False)
-    >>> rows.index.tolist(), rows.gaps, rows.lost
-    ([0, 1, 5, 6], 1, 3)
-    """
-
-    samples: Array
-    index: NDArray[np.int64]
-    jitter_s: Array
-    gaps: int = 0
-    lost: int = 0
-    disordered: int = 0
-
-
-def estimated_rate_hz(time_s: Array) -> float:
-    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other.
-
-    Parameters
-    ----------
-    time_s : (n,)
-        Time of each row, NaN where it is unknown.
-
-    Examples
-    --------
-    >>> estimated_rate_hz(np.array([0.0, 0.011, 0.019, 0.03, 0.53, 0.54]))
-    100.0
-    """
-    steps = np.diff(_spread(time_s[np.isfinite(time_s)]))
-    steps = steps[steps > 0]
-    if not len(steps):
-        return float('nan')
-    usual = steps[steps < 1.75 * np.median(steps)]
-    rate_hz = 1.0 / float(usual.mean())
-    simple = float(f'{rate_hz:.2g}')
-    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
-
-
-def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float, interpolated: bool) -> GridRows:
-    """Return the rows of one slide on a grid that begins with its first row.
-
-    Parameters
-    ----------
-    samples : (n, n_channels)
-        Rows in their order; NaN for bad values.
-    time_s : (n,)
-        Time of each row, NaN where it is unknown; None: rows are evenly spaced.
-    rate_hz
-        Rate of the grid.
-    gap
-        Steps longer than so many intervals are gaps.
-    interpolated
-        Whether samples are interpolated at the times of the grid; else they are taken as evenly spaced between gaps.
-
-    Returns
-    -------
-    GridRows
-        Rows whose time comes after that of all before.
-    """
-    if time_s is None or len(samples) < 2:
-        return GridRows(samples, np.arange(len(samples)), np.empty(0))
-    times = _known(time_s) if interpolated else _spread(_known(time_s))
-    later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
-    samples, times = samples[later], times[later]
-    steps = np.diff(times) * rate_hz
-    gaps = steps > gap
-    missing = np.where(gaps, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
-    jitter = (steps[~gaps] - 1.0) / rate_hz
-    disordered = int((~later).sum())
-    if not interpolated:
-        index = np.concatenate(([0], np.cumsum(1 + missing)))
-        return GridRows(samples, index, jitter, int(gaps.sum()), int(missing.sum()), disordered)
-    parts = [
-        _interpolated(samples[rows], (times[rows] - times[0]) * rate_hz)
-        for rows in np.split(np.arange(len(times)), np.flatnonzero(gaps) + 1)
-    ]
-    index = np.concatenate([own for own, _ in parts])
-    lost = int(index[-1] + 1 - len(index)) if len(index) else 0
-    return GridRows(np.concatenate([x for _, x in parts]), index, jitter, int(gaps.sum()), lost, disordered)
-
-
-def repaired(rows: GridRows, longest: int) -> tuple[GridRows, int]:
-    """Return rows whose holes of bad samples, up to `longest` of them, are interpolated, and how many samples that are.
-
-    Holes at the edges of the slide and beside lost samples stay.
-    """
-    bad = np.logical_or.reduce(np.isnan(rows.samples), axis=1)
-    if not longest or not bad.any() or bad.all():
-        return rows, 0
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], bad, [0])).astype(int))).reshape(-1, 2)
-    fill = np.zeros(len(bad), dtype=bool)
-    for first, last in edges.tolist():
-        inside = first > 0 and last < len(bad)
-        if inside and last - first <= longest and rows.index[last] - rows.index[first - 1] == last - first + 1:
-            fill[first:last] = True
-    samples = rows.samples.copy()
-    for channel in samples.T:
-        channel[fill] = np.interp(rows.index[fill], rows.index[~bad], channel[~bad])
-    return GridRows(samples, rows.index, rows.jitter_s, rows.gaps, rows.lost, rows.disordered), int(fill.sum())
-
-
-def _known(time_s: Array) -> Array:
-    """Return times in which an unknown one lies between its neighbours."""
-    known = np.isfinite(time_s)
-    if known.all() or not known.any():
-        return time_s if known.any() else np.arange(len(time_s), dtype=np.float64)
-    rows = np.arange(len(time_s))
-    filled: Array = np.interp(rows, rows[known], time_s[known])
-    return filled
-
-
-def _spread(times: Array) -> Array:
-    """Return times in which rows of one time are spread to the next: of a coarse clock, or of samples in batches."""
-    starts = np.flatnonzero(np.concatenate(([True], times[1:] != times[:-1])))
-    if len(starts) == len(times) or len(starts) < 2:
-        return times
-    counts = np.diff(np.append(starts, len(times)))
-    steps = np.diff(times[starts]) / counts[:-1]
-    steps = np.append(steps, steps[-1])
-    within = np.arange(len(times)) - np.repeat(starts, counts)
-    forward = np.where(steps > 0, steps, 0.0)  # a time that goes back tells nothing
-    spread: Array = np.repeat(times[starts], counts) + within * np.repeat(forward, counts)
-    return spread
-
-
-def _interpolated(samples: Array, place: Array) -> tuple[AnyArray, Array]:
-    grid = np.arange(np.ceil(place[0] - 1e-6), np.floor(place[-1] + 1e-6) + 1)
-    values = np.stack([np.interp(grid, place, channel) for channel in samples.T], axis=1)
-    return grid.astype(np.int64), values
-
-
-@dataclass
-class StreamCounts:
-    """Counts of one stream over all slides."""
-
-    rate_hz: float = 0.0
-    samples: int = 0
-    gaps: int = 0
-    lost: int = 0
-    disordered: int = 0
-    repaired: int = 0
-    steps: int = 0
-    jitter_sum_s2: float = 0.0
-    jitter_max_s: float = 0.0
-
-    def add(self, rows: GridRows, repaired: int) -> None:
-        """Count one slide."""
-        self.samples += len(rows.samples)
-        self.gaps += rows.gaps
-        self.lost += rows.lost
-        self.disordered += rows.disordered
-        self.repaired += repaired
-        self.steps += len(rows.jitter_s)
-        self.jitter_sum_s2 += float(np.square(rows.jitter_s).sum())
-        self.jitter_max_s = max(self.jitter_max_s, float(np.abs(rows.jitter_s).max(initial=0.0)))
-
-    @property
-    def jitter_s(self) -> float:
-        """Root mean square of what steps of time differ from the sampling interval."""
-        return float(np.sqrt(self.jitter_sum_s2 / self.steps)) if self.steps else 0.0
-
-
-@dataclass
-class ImportReport:
-    """Counts of an import.
-
-    Examples
-    --------
-    >>> report = ImportReport(files=1, rows=10, streams={'signal': StreamCounts(rate_hz=100.0, samples=10)})
-    >>> report.note('run.csv', 2, [])
-    >>> report.lines()[1]
-    'malformed rows: 2 of 10'
-    """
-
-    bags: list[Path] = field(default_factory=list)
-    files: int = 0
-    ignored_files: int = 0
-    rows: int = 0
-    malformed_rows: int = 0
-    examples: list[str] = field(default_factory=list)
-    short_slides: int = 0
-    slides: Counter[str] = field(default_factory=Counter)
-    streams: dict[str, StreamCounts] = field(default_factory=dict)
-
-    def note(self, place: str, count: int, rows: Iterable[MalformedRow]) -> None:
-        """Count malformed rows of a table, and keep the first ones.
-
-        Parameters
-        ----------
-        place
-            File, and array in it.
-        count
-            Number of malformed rows.
-        rows
-            The first of them.
-        """
-        self.malformed_rows += count
-        if count:
-            self.examples += [f"'{place}', {row}" for row in rows][: EXAMPLES - len(self.examples)]
-
-    def lines(self) -> list[str]:
-        """Return the counts in lines for people."""
-        slides = sum(self.slides.values())
-        said = [
-            f'{slides} slides over {len(self.slides)} surfaces from {self.files} files'
-            + (f'; {self.ignored_files} files have other names' if self.ignored_files else ''),
-            f'malformed rows: {self.malformed_rows} of {self.rows}',
-            *(f'  {example}' for example in self.examples),
-        ]
-        for name, stream in self.streams.items():
-            said.append(
-                f'{name}: {stream.samples} samples at {stream.rate_hz:g} Hz; jitter {1e3 * stream.jitter_s:.2f} ms '
-                f'rms, {1e3 * stream.jitter_max_s:.2f} ms at most; {stream.lost} samples lost in {stream.gaps} gaps, '
-                f'{stream.disordered} rows out of order left out, {stream.repaired} samples interpolated'
-            )
-        if self.short_slides:
-            said.append(f'slides too short, left out: {self.short_slides}')
-        return said
-
-
-DETECTION_BATCH = 1000  # rows
-
-
-@dataclass(frozen=True, eq=False)
-class SlideRows:
-    """The rows of one stream by which slides are cut.
-
-    Parameters
-    ----------
-    time_s : (n,)
-        Time of each row; NaN where it is unknown.
-    samples : (n, n_channels)
-        Values.
-    rate_hz
-        Sampling rate.
-    keys : (n,)
-        Values of the column that changes between slides, if one does.
-    place
-        File, for sentences.
-
-    Examples
-    --------
-    >>> time_s = np.array([0.0, 0.1, 0.2, 5.0, 5.1])  # a pause after the third row
-    >>> rows = SlideRows(time_s, np.zeros((5, 1)), rate_hz=10.0, keys=None, place='run.csv')
-    >>> spans(rows, SlideBorders(by='pause', pause_s=1.0))
-    [slice(0, 3, None), slice(3, 5, None)]
-    """
-
-    time_s: Array
-    samples: Array
-    rate_hz: float
-    keys: AnyArray | None
-    place: str
-
-
-def spans(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    """Return the rows of each slide in their order, the ends that are left out already taken away."""
-    found = IMPORT_TABLES_RULES[borders.by](rows, borders)
-    skip, drop = (round(seconds * rows.rate_hz) for seconds in (borders.start_s, borders.end_s))
-    return [slice(span.start + skip, max(span.start + skip, span.stop - drop)) for span in found]
-
-
-def _by_file(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    return [slice(0, len(rows.time_s))]
-
-
-def _by_column(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    if rows.keys is None:
-        return _by_file(rows, borders)  # a field of the file's name: it holds for the whole file
-    edges = [0, *(np.flatnonzero(rows.keys[1:] != rows.keys[:-1]) + 1).tolist(), len(rows.keys)]
-    chosen = [
-        slice(first, last) for first, last in pairwise(edges) if _slides_at(str(rows.keys[first]), borders.values)
-    ]
-    if not chosen:
-        raise InvalidData(
-            f"'{rows.place}': column '{borders.column}' has none of the values "
-            f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(rows.keys)[:5].tolist())}'
-        )
-    return chosen
-
-
-def _slides_at(value: str, wanted: Sequence[str]) -> bool:
-    """Return whether the finger slides at a value of the column: one of those wanted, or any that is not empty."""
-    return any(fnmatch.fnmatchcase(value, one) or value == one for one in wanted) if wanted else value != ''
-
-
-def _by_pause(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    known = np.flatnonzero(np.isfinite(rows.time_s))
-    steps = np.diff(rows.time_s[known])
-    edges = [0, *known[1:][(steps >= borders.pause_s) | (steps < 0)].tolist(), len(rows.time_s)]
-    return [slice(first, last) for first, last in pairwise(edges)]
-
-
-def _by_time(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    since = rows.time_s - np.nanmin(rows.time_s)
-    number = np.floor(np.maximum.accumulate(np.nan_to_num(since, nan=0.0)) / borders.length_s + 1e-9)
-    edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
-    whole = (1.0 - 1e-6) * borders.length_s * rows.rate_hz - 1.0
-    return [slice(a, b) for a, b in pairwise(edges) if b - a >= whole]
-
-
-def _by_detection(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    # These need scipy, which reading and writing of bags does without.
-    from texture_features.segmentation import SegmentationParams, segment_recording  # noqa: PLC0415
-
-    params = SegmentationParams(on=borders.on, off=borders.off, min_duration_s=max(borders.min_s, 0.05))
-    channels = tuple(str(number) for number in range(rows.samples.shape[1]))
-    samples = rows.samples.astype(np.float32)
-    batches = [
-        TactileSignal(
-            round(first / rows.rate_hz * NANOSECONDS), '', channels, (), rows.rate_hz, first,
-            samples[first : first + DETECTION_BATCH],
-        )
-        for first in range(0, len(samples), DETECTION_BATCH)
-    ]  # fmt: skip
-    states = segment_recording({'signal': batches}, params)
-    return [
-        slice(*(round(at * rows.rate_hz / NANOSECONDS) for at in (s.stamp_ns, s.stamp_ns + s.steady_s * NANOSECONDS)))
-        for s in states
-        if s.phase.value == 'slide'
-    ]
-
-
-IMPORT_TABLES_RULES: Mapping[str, Callable[[SlideRows, SlideBorders], list[slice]]] = {
-    'file': _by_file,
-    'column': _by_column,
-    'pause': _by_pause,
-    'time': _by_time,
-    'detection': _by_detection,
-}
-
-
-START_NS = 1_000_000_000 * NANOSECONDS
-PAUSE_NS = NANOSECONDS
-DELAY_NS = 100_000  # a batch is logged this long after its last sample
-BATCH_S = 0.1
-MAX_BAGS = 500
-Message = tuple[int, str, TactileSignal | ExplorationState]  # log time, topic, value
-
-
-@dataclass(frozen=True, eq=False)
-class StreamSamples:
-    """The samples of one stream during a slide.
-
-    Parameters
-    ----------
-    sensor, channels, unit, rate_hz
-        As in a `TactileSignal`.
-    samples : (n, n_channels)
-        NaN for bad ones.
-    index : (n,)
-        Running index of each from 0; a jump is a loss.
-    """
-
-    sensor: str
-    channels: tuple[str, ...]
-    unit: str
-    rate_hz: float
-    samples: Array
-    index: NDArray[np.int64]
-
-    @property
-    def duration_s(self) -> float:
-        """Time from the first sample to the one after the last."""
-        return float(self.index[-1] + 1) / self.rate_hz if len(self.index) else 0.0
-
-
-@dataclass(frozen=True)
-class StateSpan:
-    """Speed, force and direction from a time of the slide on, in SI units; NaN if unknown."""
-
-    start_s: float
-    speed_m_s: float = math.nan
-    force_n: float = math.nan
-    direction_rad: float = math.nan
-
-
-@dataclass(frozen=True, eq=False)
-class ImportedSlide:
-    """One slide.
-
-    Parameters
-    ----------
-    surface, exploration_id, motion
-        Label, name and motion.
-    streams
-        By topic.
-    spans
-        Conditions in the order of time; the first begins at 0.
-    """
-
-    surface: str
-    exploration_id: str
-    motion: str
-    streams: Mapping[str, StreamSamples]
-    spans: Sequence[StateSpan] = field(default=(StateSpan(0.0),))
-
-    @property
-    def duration_s(self) -> float:
-        """How long all streams last."""
-        return min(stream.duration_s for stream in self.streams.values())
-
-
-class SlideBags:
-    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
-
-    Stamps are made up: each slide begins a second after the one before, in whatever bag that is, so slides keep their
-    order over all bags.
-
-    Parameters
-    ----------
-    out
-        Folder for the bags; made if missing.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from texture_recordings.dataset import find_slides
-    >>> stream = StreamSamples('finger', ('x',), 'g', 100.0, np.zeros((200, 1)), np.arange(200))
-    >>> slide = ImportedSlide('cork', 'run1', 'linear_slide', {'signal': stream}, (StateSpan(0.0, speed_m_s=0.05),))
-    >>> with TemporaryDirectory() as folder:
-    ...     with SlideBags(folder) as bags:
-    ...         bags.write('monday', slide)
-    ...     print([(found.name, found.speed_m_s) for found in find_slides(bags.paths)])
-    [('cork/1', 0.05)]
-    """
-
-    def __init__(self, out: str | Path) -> None:
-        self._out = Path(out)
-        self._open = ExitStack()
-        self._bags: dict[str, BagWriter] = {}
-        self._next: dict[tuple[str, str], int] = {}
-        self._now_ns = START_NS
-
-    @property
-    def paths(self) -> list[Path]:
-        """Paths of the bags in the order in which they were begun."""
-        return [bag.path for bag in self._bags.values()]
-
-    def write(self, session: str, slide: ImportedSlide) -> None:
-        """Write a slide into the bag of a session.
-
-        Raises
-        ------
-        InvalidData
-            If the bag exists already, cannot be made, or is one too many.
-        """
-        bag = self._bag(session)
-        end_ns = self._now_ns + round(slide.duration_s * NANOSECONDS)
-        messages: list[Message] = [*self._states(slide, end_ns)]
-        for topic, stream in slide.streams.items():
-            messages += self._batches(session, topic, stream)
-        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
-            bag.write(topic, value, log_ns)
-        self._now_ns = max(end_ns, *(log_ns for log_ns, _, _ in messages)) + PAUSE_NS
-
-    def _bag(self, session: str) -> BagWriter:
-        if session not in self._bags:
-            name = checked_label(session)
-            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
-                raise InvalidData(
-                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
-                    'names are made, choose another `session`'
-                )
-            self._out.mkdir(parents=True, exist_ok=True)
-            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
-        return self._bags[session]
-
-    def _states(self, slide: ImportedSlide, end_ns: int) -> list[Message]:
-        edges_s = [*(span.start_s for span in slide.spans), slide.duration_s]
-        states: list[Message] = []
-        for span, (begin_s, until_s) in zip(slide.spans, pairwise(edges_s), strict=True):
-            stamp_ns = self._now_ns + round(begin_s * NANOSECONDS)
-            stop_ns = self._now_ns + round(until_s * NANOSECONDS)
-            state = ExplorationState(
-                stamp_ns, slide.exploration_id, slide.motion, Phase.SLIDE, max(0, stop_ns - stamp_ns) / NANOSECONDS,
-                span.speed_m_s, span.force_n, span.direction_rad, begin_s / max(slide.duration_s, 1e-9), slide.surface,
-            )  # fmt: skip
-            states.append((stamp_ns, 'exploration', state))
-        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 1):
-            state = ExplorationState(
-                end_ns, slide.exploration_id, slide.motion, phase, progress=1.0, surface=slide.surface
-            )
-            states.append((end_ns + (2 + count) * DELAY_NS, 'exploration', state))
-        return states
-
-    def _batches(self, session: str, topic: str, stream: StreamSamples) -> list[Message]:
-        first = self._next.get((session, topic), 0)
-        step = max(1, round(BATCH_S * stream.rate_hz))
-        jumps = np.flatnonzero(np.diff(stream.index) != 1) + 1
-        bounds = [0, *jumps.tolist(), len(stream.index)]
-        samples = stream.samples.astype(np.float32)
-        batches: list[Message] = []
-        for begin, end in pairwise(bounds):
-            for row in range(begin, end, step):
-                part = samples[row : min(row + step, end)]
-                place = int(stream.index[row])
-                stamp_ns = self._now_ns + round(place / stream.rate_hz * NANOSECONDS)
-                batch = TactileSignal(
-                    stamp_ns, stream.sensor, stream.channels, (stream.unit,) * len(stream.channels), stream.rate_hz,
-                    first + place, part, stream.sensor,
-                )  # fmt: skip
-                batches.append((batch.end_ns + DELAY_NS, topic, batch))
-        if len(stream.index):
-            self._next[session, topic] = first + int(stream.index[-1]) + 1
-        return batches
-
-    def __enter__(self) -> SlideBags:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._open.__exit__(kind, error, trace)
-        if kind:
-            for path in self.paths:
-                shutil.rmtree(path, ignore_errors=True)
-
-
-MAX_FILES = 100_000
-STATE_S = 0.1  # a state so often where a condition changes along a slide
-SAME_RATE = 1.05  # files of one stream may differ by this factor
-LONGEST_GAP_S = 3600.0
-SAME_TIME_S = 1e-9
-
-
-def import_tables(
-    mapping: TableMapping, source: str | Path, out: str | Path, kinds: Sequence[str] = MAPPED['table']
-) -> ImportReport:
-    """Write bags of the slides in the tables below a folder, and return what was found.
-
-    Parameters
-    ----------
-    mapping
-        What becomes of the columns; see `load_mapping`.
-    source
-        Folder of the files, or one file.
-    out
-        Folder for the bags; made if missing.
-    kinds
-        Endings of the files that are read, of `MAPPED`.
-
-    Returns
-    -------
-    ImportReport
-        The bags, and what was counted.
-
-    Raises
-    ------
-    InvalidData
-        If no file matches, a file lacks a column or has too many malformed rows, or a bag exists already.
-    """
-    report = ImportReport()
-    with SlideBags(out) as bags, TableFiles() as files:
-        for path, place, fields in _files(mapping, Path(source), kinds, report):
-            for table in files.tables(_kind(path), path, place, mapping):
-                for session, slide in _TableSlides(mapping, table, fields, report).slides():
-                    bags.write(session, slide)
-                    report.slides[slide.surface] += 1
-        if not report.slides:
-            raise InvalidData(
-                f"no slide of {mapping.slides.min_s:g} s or more in '{source}': {report.short_slides} are shorter; "
-                'look at `slides` in the mapping'
-            )
-    report.bags = bags.paths
-    return report
-
-
-def _files(
-    mapping: TableMapping, source: Path, kinds: Sequence[str], report: ImportReport
-) -> Iterator[tuple[Path, str, dict[str, str]]]:
-    """Yield the files that the mapping means, with their names for sentences and what these hold."""
-    template = NameTemplate(mapping.files)
-    found = False
-    for path in _paths(source, template.depth):
-        place = path.name if path == source else path.relative_to(source).as_posix()
-        fields = template.match(place)
-        if fields is None or _kind(path) not in kinds:
-            report.ignored_files += 1
-            continue
-        found = True
-        report.files += 1
-        yield path, place, fields
-    if not found:
-        raise InvalidData(
-            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
-            'give the folder that holds them, or correct `files` in the mapping'
-        )
-
-
-def _paths(source: Path, depth: int) -> list[Path]:
-    """Return the files at a depth below a folder, in the order of their names with numbers counted as such."""
-    if not source.exists():
-        raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
-    if source.is_file() or is_bag(source):
-        return [source]
-    paths: list[Path] = []
-    for folder, folders, names in os.walk(source):
-        level = len(Path(folder).relative_to(source).parts)
-        if level + 1 == depth:
-            paths += [Path(folder) / name for name in folders if is_bag(Path(folder) / name)]
-        if level + 1 >= depth:
-            folders.clear()
-        if level + 1 == depth:
-            paths += [Path(folder) / name for name in names]
-        if len(paths) > MAX_FILES:
-            raise InvalidData(f"'{source}' holds more than {MAX_FILES} files; give a smaller folder")
-    return sorted(paths)
-
-
-def _kind(path: Path) -> str:
-    return BAG if is_bag(path) else path.suffix.lower()
-
-
-@dataclass(frozen=True, eq=False)
-class _Stream:
-    """One stream of a table before it is cut."""
-
-    params: StreamColumns
-    channels: tuple[str, ...]
-    samples: Array
-    time_s: Array
-    timed: bool  # whether times were recorded
-    rate_hz: float
-    clock: str  # column of time that the file states for it
-
-
-class _TableSlides:
-    """The slides of one table."""
-
-    def __init__(self, mapping: TableMapping, table: Table, fields: Mapping[str, str], report: ImportReport) -> None:
-        self._mapping, self._table, self._report = mapping, table, report
-        self._fields = {**table.fields, **fields}
-        self._chosen = {name: table.chosen(stream.columns) for name, stream in mapping.streams.items()}
-        self._columns = self._read()
-        self._check_rows()
-        self._streams = {name: self._stream(name, params) for name, params in mapping.streams.items()}
-
-    def slides(self) -> Iterator[tuple[str, ImportedSlide]]:
-        """Yield session and slide."""
-        borders = self._mapping.slides
-        reference, found = self._spans()
-        for number, span in enumerate(found, 1):
-            if (span.stop - span.start) / reference.rate_hz < max(borders.min_s, 2.0 / reference.rate_hz):
-                self._report.short_slides += 1
-                continue
-            yield self._slide(reference, span, number)
-
-    def _spans(self) -> tuple[_Stream, list[slice]]:
-        """Return the stream by which slides are cut, and its rows of each slide."""
-        borders, place = self._mapping.slides, self._table.place
-        reference = next(iter(self._streams.values()))
-        keys = self._text(borders.column) if borders.by == 'column' else None
-        if keys is None:
-            rows = SlideRows(reference.time_s, reference.samples, reference.rate_hz, None, place)
-            return reference, spans(rows, borders)
-        clock = self._table.clocks.get(borders.column, '')
-        same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
-        if same:
-            return same[0], spans(SlideRows(same[0].time_s, same[0].samples, same[0].rate_hz, keys, place), borders)
-        times = self._times_of(borders.column, len(keys))
-        rows = SlideRows(times, keys[:, None], estimated_rate_hz(times), keys, place)
-        return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in spans(rows, borders)]
-
-    def _slide(self, reference: _Stream, span: slice, number: int) -> tuple[str, ImportedSlide]:
-        times = reference.time_s[span]
-        begin_s, end_s = float(np.nanmin(times)), float(np.nanmax(times)) + 1.0 / reference.rate_hz
-        cut = _Cut(len(reference.samples), reference.clock, span, begin_s, end_s)
-        surface = self._label(cut)
-        session = self._value(self._mapping.session, cut, 'session') if self._mapping.session else surface
-        slide = ImportedSlide(
-            surface,
-            f'{self._table.place}/{number}',
-            self._mapping.motion,
-            {name: self._samples(name, stream, cut) for name, stream in self._streams.items()},
-            self._conditions(cut),
-        )
-        return session, slide
-
-    def _samples(self, name: str, stream: _Stream, cut: _Cut) -> StreamSamples:
-        rows = cut.rows(len(stream.samples), stream.clock, stream.time_s)
-        samples, times = stream.samples[rows], stream.time_s[rows]
-        if not len(samples):
-            raise InvalidData(
-                f"'{self._table.place}' has no samples of '{name}' from {cut.begin_s:g} to {cut.end_s:g} s of a slide; "
-                'look at the times of the streams'
-            )
-        self._refuse_jumps(name, times if stream.timed else None, rows)
-        time = stream.params.time
-        grid = on_grid(
-            samples, times if stream.timed else None, stream.rate_hz,
-            gap=time.gap, interpolated=time.spacing == 'interpolated',
-        )  # fmt: skip
-        grid, count = repaired(grid, round(stream.params.repair_s * stream.rate_hz))
-        self._report.streams[name].add(grid, count)
-        params = stream.params
-        return StreamSamples(
-            self._mapping.sensor, stream.channels, params.unit, stream.rate_hz, grid.samples, grid.index
-        )
-
-    def _refuse_jumps(self, name: str, times: Array | None, rows: slice) -> None:
-        steps = np.diff(times[np.isfinite(times)]) if times is not None else np.empty(0)
-        if steps.max(initial=0.0) > LONGEST_GAP_S:
-            row = self._columns.row(rows.start + int(steps.argmax()) + 1)
-            raise InvalidData(
-                f"'{self._table.place}', row {row}, column '{self._mapping.streams[name].time.column}': time jumps by "
-                f'{steps.max():g} s within a slide; look at the unit of time and at `slides` in the mapping'
-            )
-
-    def _stream(self, name: str, params: StreamColumns) -> _Stream:
-        names = self._chosen[name]
-        columns = [self._columns.numbers[column] for column in names]
-        if len({len(column) for column in columns}) > 1:
-            raise InvalidData(
-                f"'{self._table.place}': the columns of '{name}' have {sorted({len(c) for c in columns})} rows; put "
-                'columns of different rates into two streams'
-            )
-        if params.channels and len(params.channels) != len(names):
-            raise InvalidData(
-                f"'{self._table.place}': the stream '{name}' has {len(names)} columns and {len(params.channels)} names "
-                'of channels; give one for each'
-            )
-        samples = np.stack(columns, axis=1)
-        samples *= params.scale
-        time_column = self._time_column(name)
-        rate_hz = self._rate_hz(name, params, time_column)
-        if time_column:
-            time_s = self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)]
-            if len(time_s) != len(samples):
-                raise InvalidData(
-                    f"'{self._table.place}': column '{time_column}' has {len(time_s)} rows, '{name}' {len(samples)}"
-                )
-        else:
-            time_s = np.arange(len(samples)) / rate_hz
-        channels = tuple(params.channels) or tuple(names)
-        return _Stream(
-            params, channels, samples, time_s, bool(time_column), rate_hz, self._table.clocks.get(names[0], '')
-        )
-
-    def _rate_hz(self, name: str, params: StreamColumns, time_column: str) -> float:
-        """Return the rate of a stream: as stated, else that of the first file, from which later ones differ little."""
-        counts = self._report.streams.setdefault(name, StreamCounts(rate_hz=params.rate_hz))
-        own = self._table.rate_hz
-        if time_column:
-            own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
-        counts.rate_hz = counts.rate_hz or own
-        if not MIN_HZ <= counts.rate_hz <= MAX_HZ:
-            raise InvalidData(
-                f"'{self._table.place}': the rate of '{name}' is {counts.rate_hz:g} Hz by its times; give a column of "
-                f'time that grows and its unit, or `rate_hz`, from {MIN_HZ:g} to {MAX_HZ:g}'
-            )
-        if own and not 1 / SAME_RATE <= own / counts.rate_hz <= SAME_RATE:
-            raise InvalidData(
-                f"'{self._table.place}': '{name}' has {own:g} Hz by its times, {counts.rate_hz:g} Hz are expected; "
-                f"look at the unit of column '{time_column}' and at `rate_hz` in the mapping"
-            )
-        return counts.rate_hz
-
-    def _time_column(self, name: str) -> str:
-        return self._mapping.streams[name].time.column or self._table.clocks.get(self._chosen[name][0], '')
-
-    def _time_unit(self, name: str) -> str:
-        stated = self._mapping.streams[name].time
-        return stated.unit if stated.column else 's'
-
-    def _read(self) -> Columns:
-        mapping = self._mapping
-        wanted = [column for columns in self._chosen.values() for column in columns]
-        wanted += [self._time_column(name) for name in mapping.streams]
-        wanted += [self._quantity(name).column for name in CONDITION_UNITS]
-        texts = [mapping.label.column, mapping.session]
-        texts += [mapping.slides.column] if mapping.slides.by == 'column' else []
-        for name in filter(None, (*wanted, *texts)):
-            if name not in self._fields and name not in self._table.names:
-                known = (*self._table.names, *self._fields)
-                raise InvalidData(f"'{self._table.place}': {unknown_name(name, known, 'column')}")
-        clocks = [self._table.clocks.get(name, '') for name in (*wanted, *texts)]
-        return self._table.read(self._of_table((*wanted, *clocks)), self._of_table(texts))
-
-    def _of_table(self, names: Sequence[str]) -> list[str]:
-        return [name for name in dict.fromkeys(names) if name and name not in self._fields]
-
-    def _check_rows(self) -> None:
-        """Count the rows with a bad number; InvalidData if they are too many."""
-        by_length: dict[int, AnyArray] = {}
-        for values in self._columns.numbers.values():
-            bad = by_length.setdefault(len(values), np.zeros(len(values), dtype=bool))
-            bad |= np.isnan(values)
-        for rows, bad in by_length.items():
-            count = int(bad.sum())
-            self._report.rows += rows
-            self._report.note(self._table.place, count, self._columns.malformed)
-            if not rows or count > self._mapping.max_malformed * rows:
-                raise InvalidData(self._malformed_sentence(count, rows))
-
-    def _malformed_sentence(self, count: int, rows: int) -> str:
-        first = str(next(iter(self._columns.malformed), 'no row at all'))
-        return (
-            f"'{self._table.place}' has {count} malformed rows of {rows}, first {first}; "
-            f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
-            'and at `format` in the mapping'
-        )
-
-    def _text(self, name: str) -> AnyArray | None:
-        return None if name in self._fields else self._columns.texts[name]
-
-    def _label(self, cut: _Cut) -> str:
-        label = self._mapping.label
-        code = label.value or self._value(label.column, cut, 'label')
-        surface = checked_label(label.names.get(code, code))
-        if not surface:
-            raise InvalidData(f"'{self._table.place}': a slide has an empty label; name another column under `label`")
-        return surface
-
-    def _value(self, name: str, cut: _Cut, kind: str) -> str:
-        """Return the one value that a column has during a slide."""
-        texts = self._text(name)
-        if texts is None:
-            return self._fields[name]
-        rows = cut.rows(len(texts), self._table.clocks.get(name, ''), self._times_of(name, len(texts)))
-        own = texts[rows]
-        if not len(own):
-            raise InvalidData(f"'{self._table.place}': column '{name}' has no value during a slide; name another")
-        other = np.flatnonzero(own != own[0])
-        if len(other):
-            place = f"'{self._table.place}', row {self._columns.row(rows.start + int(other[0]))}, column '{name}'"
-            change = f"the {kind} changes from '{own[0]}' to '{own[other[0]]}' within a slide"
-            raise InvalidData(f"{place}: {change}; let slides end where '{name}' changes (`slides: {{by: column}}`)")
-        return str(own[0])
-
-    def _times_of(self, name: str, length: int) -> Array:
-        """Return the times of a column: of its own clock, or of the stream with as many rows."""
-        clock = self._table.clocks.get(name)
-        if clock:
-            return self._columns.numbers[clock]
-        for stream in self._streams.values():
-            if len(stream.samples) == length:
-                return stream.time_s
-        raise InvalidData(
-            f"'{self._table.place}': column '{name}' has {length} rows, as no stream has; name one of the same length"
-        )
-
-    def _quantity(self, name: str) -> Quantity:
-        quantity: Quantity = getattr(self._mapping.conditions, name)
-        return quantity
-
-    def _conditions(self, cut: _Cut) -> list[StateSpan]:
-        """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        tracks = {name: self._track(name, cut) for name in CONDITION_UNITS}
-        changing = any(len(values) > 1 and np.ptp(values[np.isfinite(values)]) > 0 for _, values in tracks.values()
-                       if np.isfinite(values).any())  # fmt: skip
-        count = max(1, round((cut.end_s - cut.begin_s) / STATE_S)) if changing else 1
-        edges = cut.begin_s + STATE_S * np.arange(count + 1) if changing else np.array([cut.begin_s, math.inf])
-        edges[-1] = math.inf
-        means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
-        return [StateSpan(float(start - cut.begin_s), *mean) for start, mean in zip(edges, means, strict=False)]
-
-    def _track(self, name: str, cut: _Cut) -> tuple[Array, Array]:
-        """Return times and values of a condition in SI units, (n,) each."""
-        quantity = self._quantity(name)
-        factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
-        if quantity.column in self._fields or not quantity.column:
-            text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
-            return np.array([cut.begin_s]), np.array(
-                [_number_of_import_tables(text, self._table.place, quantity.column)]
-            ) * factor
-        values = self._columns.numbers[quantity.column]
-        times = self._times_of(quantity.column, len(values))
-        rows = cut.rows(len(values), self._table.clocks.get(quantity.column, ''), times)
-        return times[rows], values[rows] * factor
-
-
-@dataclass(frozen=True)
-class _Cut:
-    """A slide: rows of the stream by which it was cut, and its time."""
-
-    length: int
-    clock: str
-    span: slice
-    begin_s: float
-    end_s: float
-
-    def rows(self, length: int, clock: str, time_s: Array) -> slice:
-        """Return the rows of a column: the same ones if it has the same clock, else those of the time of the slide."""
-        if length == self.length and clock == self.clock:
-            return self.span
-        return _rows_between(time_s, self.begin_s, self.end_s)
-
-
-def _rows_between(time_s: Array, begin_s: float, end_s: float) -> slice:
-    inside = np.flatnonzero((time_s >= begin_s - SAME_TIME_S) & (time_s < end_s - SAME_TIME_S))
-    return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
-
-
-def _ends(time_s: Array, span: slice) -> tuple[float, float]:
-    """Return the time of the first row, and of the row after the last."""
-    if span.stop <= span.start:
-        return 0.0, 0.0
-    after = time_s[span.stop] if span.stop < len(time_s) else 2 * time_s[-1] - time_s[max(0, len(time_s) - 2)]
-    return float(time_s[span.start]), float(after)
-
-
-def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
-    if len(values) == 1:
-        return float(values[0])
-    inside = values[(times >= begin_s) & (times < end_s) & np.isfinite(values)]
-    return float(inside.mean()) if len(inside) else math.nan
-
-
-def _number_of_import_tables(text: str, place: str, column: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InvalidParameter(f"'{place}': '{column}' is '{text}' in its name; a number is needed there") from error
 
 
 # --------------------
@@ -2170,7 +1100,7 @@ def wanted_columns(mapping: TableMapping) -> set[str]:
     names = [column for stream in mapping.streams.values() for column in stream.columns]
     names += [stream.time.column for stream in mapping.streams.values()]
     names += [mapping.label.column, mapping.session, mapping.slides.column]
-    names += [getattr(mapping.conditions, name).column for name in CONDITION_UNITS]
+    names += [quantity.column for quantity in mapping.conditions.values()]
     return set(filter(None, names))
 
 
@@ -2239,3 +1169,847 @@ class _Topic:
 
 def _usual(steps_s: Array) -> float:
     return float(np.median(steps_s)) if len(steps_s) else 0.0
+
+
+# --------------------
+# The kinds of files.
+
+# Opens a file as tables, in the child process: path, name to be shown, mapping. What it raises is said of the file.
+TableReader = Callable[[Path, str, TableMapping], Iterator[Table]]
+
+
+BAG = 'bag'
+READERS: Mapping[str, TableReader] = {
+    '.csv': _read_csv,
+    '.tsv': _read_csv,
+    '.txt': _read_csv,
+    '.npz': _read_numpy,
+    '.npy': _read_numpy,
+    '.mat': _read_mat,
+    '.wav': _read_wav,
+    '.h5': _read_hdf5,
+    '.hdf5': _read_hdf5,
+    '.parquet': _read_parquet,
+    BAG: read_message_bag,
+}
+# Libraries that a kind of file needs: module, what it reads, and the extra of this package that brings it.
+HDF5 = ('h5py', 'HDF5 files', 'hdf5')
+PARQUET = ('pyarrow.parquet', 'Parquet files', 'parquet')
+LIBRARIES: Mapping[str, Sequence[tuple[str, str, str]]] = {
+    '.mat': (('scipy.io', 'MATLAB files', 'mat'),),
+    '.wav': (('scipy.io', 'sound files', 'wav'),),
+    '.h5': (HDF5,),
+    '.hdf5': (HDF5,),
+    '.parquet': (PARQUET,),
+}
+# What `texture import` is given a mapping for, and the kinds of files which that means.
+MAPPED: Mapping[str, Sequence[str]] = {'table': tuple(kind for kind in READERS if kind != BAG), 'bag': (BAG,)}
+
+
+# --------------------
+# Turn tables into labelled bags, as a mapping says.
+
+SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
+ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
+
+
+@dataclass(frozen=True, eq=False)
+class GridRows:
+    """Samples of one slide on an even grid.
+
+    Parameters
+    ----------
+    samples : (n, n_channels)
+        NaN for bad ones.
+    index : (n,)
+        Place of each on the grid from 0; it jumps where samples were lost.
+    jitter_s : (m,)
+        By how much steps of time differ from the sampling interval, gaps left out.
+    gaps, lost
+        Number of gaps, and of samples lost in them.
+    disordered
+        Number of rows left out because their time does not come after that of all rows before.
+    """
+
+    samples: Array
+    index: NDArray[np.int64]
+    jitter_s: Array = field(default_factory=lambda: np.empty(0))
+    gaps: int = 0
+    lost: int = 0
+    disordered: int = 0
+
+
+def estimated_rate_hz(time_s: Array) -> float:
+    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Time of each row, NaN where it is unknown.
+
+    Examples
+    --------
+    >>> estimated_rate_hz(np.array([0.0, 0.011, 0.019, 0.03, 0.53, 0.54]))
+    100.0
+    """
+    steps = np.diff(_spread(time_s[np.isfinite(time_s)]))
+    steps = steps[steps > 0]
+    if not len(steps):
+        return float('nan')
+    usual = steps[steps < 1.75 * np.median(steps)]
+    rate_hz = 1.0 / float(usual.mean())
+    simple = float(f'{rate_hz:.2g}')
+    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
+
+
+def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float, interpolated: bool) -> GridRows:
+    """Return the rows of one slide on a grid that begins with its first row.
+
+    Parameters
+    ----------
+    samples : (n, n_channels)
+        Rows in their order; NaN for bad values.
+    time_s : (n,)
+        Time of each row, NaN where it is unknown; None: rows are evenly spaced.
+    rate_hz
+        Rate of the grid.
+    gap
+        Steps longer than so many intervals are gaps.
+    interpolated
+        Whether samples are interpolated at the times of the grid; else they are taken as evenly spaced between gaps.
+
+    Returns
+    -------
+    GridRows
+        Rows whose time comes after that of all before.
+    """
+    if time_s is None or len(samples) < 2:
+        return GridRows(samples, np.arange(len(samples)))
+    times = _known(time_s) if interpolated else _spread(_known(time_s))
+    later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
+    samples, times = samples[later], times[later]
+    steps = np.diff(times) * rate_hz
+    gaps = steps > gap
+    missing = np.where(gaps, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
+    jitter = (steps[~gaps] - 1.0) / rate_hz
+    disordered = int((~later).sum())
+    if not interpolated:
+        index = np.concatenate(([0], np.cumsum(1 + missing)))
+        return GridRows(samples, index, jitter, int(gaps.sum()), int(missing.sum()), disordered)
+    parts = [
+        _interpolated(samples[rows], (times[rows] - times[0]) * rate_hz)
+        for rows in np.split(np.arange(len(times)), np.flatnonzero(gaps) + 1)
+    ]
+    index = np.concatenate([own for own, _ in parts])
+    lost = int(index[-1] + 1 - len(index)) if len(index) else 0
+    return GridRows(np.concatenate([x for _, x in parts]), index, jitter, int(gaps.sum()), lost, disordered)
+
+
+def repaired(rows: GridRows, longest: int) -> tuple[GridRows, int]:
+    """Return rows whose holes of bad samples, up to `longest` of them, are interpolated, and how many samples that are.
+
+    Holes at the edges of the slide and beside lost samples stay.
+    """
+    bad = np.logical_or.reduce(np.isnan(rows.samples), axis=1)
+    if not longest or not bad.any() or bad.all():
+        return rows, 0
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], bad, [0])).astype(int))).reshape(-1, 2)
+    fill = np.zeros(len(bad), dtype=bool)
+    for first, last in edges.tolist():
+        inside = first > 0 and last < len(bad)
+        if inside and last - first <= longest and rows.index[last] - rows.index[first - 1] == last - first + 1:
+            fill[first:last] = True
+    samples = rows.samples.copy()
+    for channel in samples.T:
+        channel[fill] = np.interp(rows.index[fill], rows.index[~bad], channel[~bad])
+    return replace(rows, samples=samples), int(fill.sum())
+
+
+def _known(time_s: Array) -> Array:
+    """Return times in which an unknown one lies between its neighbours."""
+    known = np.isfinite(time_s)
+    if known.all() or not known.any():
+        return time_s if known.any() else np.arange(len(time_s), dtype=np.float64)
+    rows = np.arange(len(time_s))
+    filled: Array = np.interp(rows, rows[known], time_s[known])
+    return filled
+
+
+def _spread(times: Array) -> Array:
+    """Return times in which rows of one time are spread to the next: of a coarse clock, or of samples in batches."""
+    starts = np.flatnonzero(np.concatenate(([True], times[1:] != times[:-1])))
+    if len(starts) == len(times) or len(starts) < 2:
+        return times
+    counts = np.diff(np.append(starts, len(times)))
+    steps = np.diff(times[starts]) / counts[:-1]
+    steps = np.append(steps, steps[-1])
+    within = np.arange(len(times)) - np.repeat(starts, counts)
+    forward = np.where(steps > 0, steps, 0.0)  # a time that goes back tells nothing
+    spread: Array = np.repeat(times[starts], counts) + within * np.repeat(forward, counts)
+    return spread
+
+
+def _interpolated(samples: Array, place: Array) -> tuple[AnyArray, Array]:
+    grid = np.arange(np.ceil(place[0] - 1e-6), np.floor(place[-1] + 1e-6) + 1)
+    values = np.stack([np.interp(grid, place, channel) for channel in samples.T], axis=1)
+    return grid.astype(np.int64), values
+
+
+@dataclass
+class StreamCounts:
+    """Counts of one stream over all slides."""
+
+    rate_hz: float = 0.0
+    samples: int = 0
+    gaps: int = 0
+    lost: int = 0
+    disordered: int = 0
+    repaired: int = 0
+    steps: int = 0
+    jitter_sum_s2: float = 0.0
+    jitter_max_s: float = 0.0
+
+    def add(self, rows: GridRows, repaired: int) -> None:
+        """Count one slide."""
+        self.samples += len(rows.samples)
+        self.gaps += rows.gaps
+        self.lost += rows.lost
+        self.disordered += rows.disordered
+        self.repaired += repaired
+        self.steps += len(rows.jitter_s)
+        self.jitter_sum_s2 += float(np.square(rows.jitter_s).sum())
+        self.jitter_max_s = max(self.jitter_max_s, float(np.abs(rows.jitter_s).max(initial=0.0)))
+
+    @property
+    def jitter_s(self) -> float:
+        """Root mean square of what steps of time differ from the sampling interval."""
+        return float(np.sqrt(self.jitter_sum_s2 / self.steps)) if self.steps else 0.0
+
+
+@dataclass
+class ImportReport:
+    """Counts of an import."""
+
+    bags: list[Path] = field(default_factory=list)
+    files: int = 0
+    ignored_files: int = 0
+    rows: int = 0
+    malformed_rows: int = 0
+    examples: list[str] = field(default_factory=list)
+    short_slides: int = 0
+    slides: Counter[str] = field(default_factory=Counter)
+    streams: dict[str, StreamCounts] = field(default_factory=dict)
+
+    def note(self, place: str, count: int, rows: Iterable[MalformedRow]) -> None:
+        """Count malformed rows of a table, and keep the first ones."""
+        self.malformed_rows += count
+        if count:
+            self.examples += [f"'{place}', {row}" for row in rows][: EXAMPLES - len(self.examples)]
+
+    def lines(self) -> list[str]:
+        """Return the counts in lines for people."""
+        slides = sum(self.slides.values())
+        said = [
+            f'{slides} slides over {len(self.slides)} surfaces from {self.files} files'
+            + (f'; {self.ignored_files} files have other names' if self.ignored_files else ''),
+            f'malformed rows: {self.malformed_rows} of {self.rows}',
+            *(f'  {example}' for example in self.examples),
+        ]
+        for name, stream in self.streams.items():
+            said.append(
+                f'{name}: {stream.samples} samples at {stream.rate_hz:g} Hz; jitter {1e3 * stream.jitter_s:.2f} ms '
+                f'rms, {1e3 * stream.jitter_max_s:.2f} ms at most; {stream.lost} samples lost in {stream.gaps} gaps, '
+                f'{stream.disordered} rows out of order left out, {stream.repaired} samples interpolated'
+            )
+        if self.short_slides:
+            said.append(f'slides too short, left out: {self.short_slides}')
+        return said
+
+
+DETECTION_BATCH = 1000  # rows
+
+
+class SlideRows(NamedTuple):
+    """The rows of one stream by which slides are cut: times (NaN where unknown), samples (n, n_channels), and keys.
+
+    `keys`, (n,), are the values of the column that changes between slides, if one does; `place` is for sentences.
+    """
+
+    time_s: Array
+    samples: Array
+    rate_hz: float
+    keys: AnyArray | None
+    place: str
+
+
+def spans(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    """Return the rows of each slide in their order, the ends that are left out already taken away."""
+    found = CUTTING_RULES[borders.by](rows, borders)
+    skip, drop = (round(seconds * rows.rate_hz) for seconds in (borders.start_s, borders.end_s))
+    return [slice(span.start + skip, max(span.start + skip, span.stop - drop)) for span in found]
+
+
+def _by_file(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    return [slice(0, len(rows.time_s))]
+
+
+def _by_column(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    if rows.keys is None:
+        return _by_file(rows, borders)  # a field of the file's name: it holds for the whole file
+    edges = [0, *(np.flatnonzero(rows.keys[1:] != rows.keys[:-1]) + 1).tolist(), len(rows.keys)]
+    chosen = [
+        slice(first, last) for first, last in pairwise(edges) if _slides_at(str(rows.keys[first]), borders.values)
+    ]
+    if not chosen:
+        raise InvalidData(
+            f"'{rows.place}': column '{borders.column}' has none of the values "
+            f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(rows.keys)[:5].tolist())}'
+        )
+    return chosen
+
+
+def _slides_at(value: str, wanted: Sequence[str]) -> bool:
+    """Return whether the finger slides at a value of the column: one of those wanted, or any that is not empty."""
+    return any(fnmatch.fnmatchcase(value, one) or value == one for one in wanted) if wanted else value != ''
+
+
+def _by_pause(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    known = np.flatnonzero(np.isfinite(rows.time_s))
+    steps = np.diff(rows.time_s[known])
+    edges = [0, *known[1:][(steps >= borders.pause_s) | (steps < 0)].tolist(), len(rows.time_s)]
+    return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def _by_time(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    since = rows.time_s - np.nanmin(rows.time_s)
+    number = np.floor(np.maximum.accumulate(np.nan_to_num(since, nan=0.0)) / borders.length_s + 1e-9)
+    edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
+    whole = (1.0 - 1e-6) * borders.length_s * rows.rate_hz - 1.0
+    return [slice(a, b) for a, b in pairwise(edges) if b - a >= whole]
+
+
+def _by_detection(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    # These need scipy, which reading and writing of bags does without.
+    from texture_features.segmentation import SegmentationParams, segment_recording  # noqa: PLC0415
+
+    params = SegmentationParams(on=borders.on, off=borders.off, min_duration_s=max(borders.min_s, 0.05))
+    channels = tuple(str(number) for number in range(rows.samples.shape[1]))
+    samples = rows.samples.astype(np.float32)
+    batches = [
+        TactileSignal(
+            round(first / rows.rate_hz * NANOSECONDS), '', channels, (), rows.rate_hz, first,
+            samples[first : first + DETECTION_BATCH],
+        )
+        for first in range(0, len(samples), DETECTION_BATCH)
+    ]  # fmt: skip
+    states = segment_recording({'signal': batches}, params)
+    return [
+        slice(*(round(at * rows.rate_hz / NANOSECONDS) for at in (s.stamp_ns, s.stamp_ns + s.steady_s * NANOSECONDS)))
+        for s in states
+        if s.phase.value == 'slide'
+    ]
+
+
+CUTTING_RULES: Mapping[str, Callable[[SlideRows, SlideBorders], list[slice]]] = {
+    'file': _by_file,
+    'column': _by_column,
+    'pause': _by_pause,
+    'time': _by_time,
+    'detection': _by_detection,
+}
+
+
+START_NS = 1_000_000_000 * NANOSECONDS
+PAUSE_NS = NANOSECONDS
+DELAY_NS = 100_000  # a batch is logged this long after its last sample
+BATCH_S = 0.1
+MAX_BAGS = 500
+Message = tuple[int, str, TactileSignal | ExplorationState]  # log time, topic, value
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """One stream of a table: its samples, (n, n_channels), and the time of each, s.
+
+    `timed` says whether times were recorded, and `clock` names the column of time that the file states for it.
+    """
+
+    params: StreamColumns
+    channels: tuple[str, ...]
+    samples: Array
+    time_s: Array
+    timed: bool
+    rate_hz: float
+    clock: str
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedSlide:
+    """One slide: label, name, the grid of each stream, and its conditions.
+
+    `spans`, in the order of time, begin at 0: time since the start of the slide, speed, force, direction; SI units,
+    NaN if unknown.
+    """
+
+    surface: str
+    exploration_id: str
+    streams: Mapping[str, tuple[Stream, GridRows]]
+    spans: Sequence[tuple[float, float, float, float]]
+
+    @property
+    def duration_s(self) -> float:
+        """How long all streams last."""
+        return min(
+            float(grid.index[-1] + 1) / stream.rate_hz if len(grid.index) else 0.0
+            for stream, grid in self.streams.values()
+        )
+
+
+class SlideBags:
+    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
+
+    Stamps are made up: each slide begins a second after the one before, in whatever bag that is, so slides keep their
+    order over all bags.
+
+    Parameters
+    ----------
+    mapping
+        Names sensor and motion.
+    out
+        Folder for the bags; made if missing.
+    """
+
+    def __init__(self, mapping: TableMapping, out: str | Path) -> None:
+        self._mapping, self._out = mapping, Path(out)
+        self._open = ExitStack()
+        self._bags: dict[str, BagWriter] = {}
+        self._next: dict[tuple[str, str], int] = {}
+        self._now_ns = START_NS
+
+    @property
+    def paths(self) -> list[Path]:
+        """Paths of the bags in the order in which they were begun."""
+        return [bag.path for bag in self._bags.values()]
+
+    def write(self, session: str, slide: ImportedSlide) -> None:
+        """Write a slide into the bag of a session.
+
+        Raises
+        ------
+        InvalidData
+            If the bag exists already, cannot be made, or is one too many.
+        """
+        bag = self._bag(session)
+        end_ns = self._now_ns + round(slide.duration_s * NANOSECONDS)
+        messages: list[Message] = [*self._states(slide, end_ns)]
+        for topic, (stream, grid) in slide.streams.items():
+            messages += self._batches(session, topic, stream, grid)
+        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
+            bag.write(topic, value, log_ns)
+        self._now_ns = max(end_ns, *(log_ns for log_ns, _, _ in messages)) + PAUSE_NS
+
+    def _bag(self, session: str) -> BagWriter:
+        if session not in self._bags:
+            name = checked_label(session)
+            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
+                raise InvalidData(
+                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
+                    'names are made, choose another `session`'
+                )
+            self._out.mkdir(parents=True, exist_ok=True)
+            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
+        return self._bags[session]
+
+    def _states(self, slide: ImportedSlide, end_ns: int) -> Iterator[Message]:
+        named = ExplorationState(
+            end_ns, slide.exploration_id, self._mapping.motion, Phase.SLIDE, surface=slide.surface, progress=1.0
+        )
+        edges_s = [*(start_s for start_s, *_ in slide.spans), slide.duration_s]
+        for (begin_s, *conditions), until_s in zip(slide.spans, edges_s[1:], strict=True):
+            stamp_ns, stop_ns = (self._now_ns + round(at_s * NANOSECONDS) for at_s in (begin_s, until_s))
+            facts: dict[str, Any] = dict(zip(('speed_m_s', 'force_n', 'direction_rad'), conditions, strict=True))
+            steady_s = max(0, stop_ns - stamp_ns) / NANOSECONDS
+            progress = begin_s / max(slide.duration_s, 1e-9)
+            state = replace(named, stamp_ns=stamp_ns, steady_s=steady_s, progress=progress, **facts)
+            yield stamp_ns, 'exploration', state
+        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 1):
+            yield end_ns + (2 + count) * DELAY_NS, 'exploration', replace(named, phase=phase)
+
+    def _batches(self, session: str, topic: str, stream: Stream, grid: GridRows) -> Iterator[Message]:
+        first = self._next.get((session, topic), 0)
+        step = max(1, round(BATCH_S * stream.rate_hz))
+        bounds = [0, *(np.flatnonzero(np.diff(grid.index) != 1) + 1).tolist(), len(grid.index)]
+        samples, units = grid.samples.astype(np.float32), (stream.params.unit,) * len(stream.channels)
+        sensor = self._mapping.sensor
+        for begin, end in pairwise(bounds):
+            for row in range(begin, end, step):
+                part, place = samples[row : min(row + step, end)], int(grid.index[row])
+                stamp_ns = self._now_ns + round(place / stream.rate_hz * NANOSECONDS)
+                batch = TactileSignal(
+                    stamp_ns, sensor, stream.channels, units, stream.rate_hz, first + place, part, sensor
+                )
+                yield batch.end_ns + DELAY_NS, topic, batch
+        if len(grid.index):
+            self._next[session, topic] = first + int(grid.index[-1]) + 1
+
+    def __enter__(self) -> SlideBags:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._open.__exit__(*error)
+        if error[0]:
+            for path in self.paths:
+                shutil.rmtree(path, ignore_errors=True)
+
+
+MAX_FILES = 100_000
+STATE_S = 0.1  # a state so often where a condition changes along a slide
+SAME_RATE = 1.05  # files of one stream may differ by this factor
+LONGEST_GAP_S = 3600.0
+SAME_TIME_S = 1e-9
+
+
+def import_tables(
+    mapping: TableMapping, source: str | Path, out: str | Path, kinds: Sequence[str] = MAPPED['table']
+) -> ImportReport:
+    """Write bags of the slides in the tables below a folder, and return what was found.
+
+    Parameters
+    ----------
+    mapping
+        What becomes of the columns; see `load_mapping`.
+    source
+        Folder of the files, or one file.
+    out
+        Folder for the bags; made if missing.
+    kinds
+        Endings of the files that are read, of `MAPPED`.
+
+    Returns
+    -------
+    ImportReport
+        The bags, and what was counted.
+
+    Raises
+    ------
+    InvalidData
+        If no file matches, a file lacks a column or has too many malformed rows, or a bag exists already.
+    """
+    report = ImportReport()
+    with SlideBags(mapping, out) as bags, TableFiles() as files:
+        for path, place, fields in _files(mapping, Path(source), kinds, report):
+            for table in files.tables(_kind(path), path, place, mapping, fields):
+                for session, slide in _TableSlides(mapping, table, report).slides():
+                    bags.write(session, slide)
+                    report.slides[slide.surface] += 1
+        if not report.slides:
+            raise InvalidData(
+                f"no slide of {mapping.slides.min_s:g} s or more in '{source}': {report.short_slides} are shorter; "
+                'look at `slides` in the mapping'
+            )
+    report.bags = bags.paths
+    return report
+
+
+def _files(
+    mapping: TableMapping, source: Path, kinds: Sequence[str], report: ImportReport
+) -> Iterator[tuple[Path, str, dict[str, str]]]:
+    """Yield the files that the mapping means, with their names for sentences and what these hold."""
+    found = False
+    for path in _paths(source, mapping.files.count('/') + 1):
+        place = path.name if path == source else path.relative_to(source).as_posix()
+        fields = template_fields(mapping.files, place)
+        if fields is None or _kind(path) not in kinds:
+            report.ignored_files += 1
+            continue
+        found = True
+        report.files += 1
+        yield path, place, fields
+    if not found:
+        raise InvalidData(
+            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
+            'give the folder that holds them, or correct `files` in the mapping'
+        )
+
+
+def _paths(source: Path, depth: int) -> list[Path]:
+    """Return the files at a depth below a folder, in the order of their names with numbers counted as such."""
+    if not source.exists():
+        raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
+    if source.is_file() or is_bag(source):
+        return [source]
+    paths: list[Path] = []
+    for folder, folders, names in os.walk(source):
+        level = len(Path(folder).relative_to(source).parts)
+        if level + 1 == depth:
+            paths += [Path(folder) / name for name in folders if is_bag(Path(folder) / name)]
+        if level + 1 >= depth:
+            folders.clear()
+        if level + 1 == depth:
+            paths += [Path(folder) / name for name in names]
+        if len(paths) > MAX_FILES:
+            raise InvalidData(f"'{source}' holds more than {MAX_FILES} files; give a smaller folder")
+    return sorted(paths)
+
+
+def _kind(path: Path) -> str:
+    return BAG if is_bag(path) else path.suffix.lower()
+
+
+class _TableSlides:
+    """The slides of one table."""
+
+    def __init__(self, mapping: TableMapping, columns: Columns, report: ImportReport) -> None:
+        self._mapping, self._columns, self._report = mapping, columns, report
+        facts = columns.facts
+        self._place, self._fields, self._chosen = facts['place'], facts['fields'], facts['chosen']
+        self._own_hz, self._clocks = facts['rate_hz'], facts['clocks']
+        self._check_rows()
+        self._streams = {name: self._stream(name, params) for name, params in mapping.streams.items()}
+
+    def slides(self) -> Iterator[tuple[str, ImportedSlide]]:
+        """Yield session and slide."""
+        borders = self._mapping.slides
+        reference, found = self._spans()
+        for number, span in enumerate(found, 1):
+            if (span.stop - span.start) / reference.rate_hz < max(borders.min_s, 2.0 / reference.rate_hz):
+                self._report.short_slides += 1
+                continue
+            yield self._slide(reference, span, number)
+
+    def _spans(self) -> tuple[Stream, list[slice]]:
+        """Return the stream by which slides are cut, and its rows of each slide."""
+        borders, place = self._mapping.slides, self._place
+        reference = next(iter(self._streams.values()))
+        keys = self._text(borders.column) if borders.by == 'column' else None
+        if keys is None:
+            rows = SlideRows(reference.time_s, reference.samples, reference.rate_hz, None, place)
+            return reference, spans(rows, borders)
+        clock = self._clocks.get(borders.column, '')
+        same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
+        if same:
+            return same[0], spans(SlideRows(same[0].time_s, same[0].samples, same[0].rate_hz, keys, place), borders)
+        times = self._times_of(borders.column, len(keys))
+        rows = SlideRows(times, keys[:, None], estimated_rate_hz(times), keys, place)
+        return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in spans(rows, borders)]
+
+    def _slide(self, reference: Stream, span: slice, number: int) -> tuple[str, ImportedSlide]:
+        times = reference.time_s[span]
+        begin_s, end_s = float(np.nanmin(times)), float(np.nanmax(times)) + 1.0 / reference.rate_hz
+        cut = _Cut(len(reference.samples), reference.clock, span, begin_s, end_s)
+        surface = self._label(cut)
+        session = self._value(self._mapping.session, cut, 'session') if self._mapping.session else surface
+        slide = ImportedSlide(
+            surface,
+            f'{self._place}/{number}',
+            {name: self._samples(name, stream, cut) for name, stream in self._streams.items()},
+            self._conditions(cut),
+        )
+        return session, slide
+
+    def _samples(self, name: str, stream: Stream, cut: _Cut) -> tuple[Stream, GridRows]:
+        rows = cut.rows(len(stream.samples), stream.clock, stream.time_s)
+        samples, times = stream.samples[rows], stream.time_s[rows]
+        if not len(samples):
+            raise InvalidData(
+                f"'{self._place}' has no samples of '{name}' from {cut.begin_s:g} to {cut.end_s:g} s of a slide; "
+                'look at the times of the streams'
+            )
+        self._refuse_jumps(name, times if stream.timed else None, rows)
+        time = stream.params.time
+        grid = on_grid(
+            samples, times if stream.timed else None, stream.rate_hz,
+            gap=time.gap, interpolated=time.spacing == 'interpolated',
+        )  # fmt: skip
+        grid, count = repaired(grid, round(stream.params.repair_s * stream.rate_hz))
+        self._report.streams[name].add(grid, count)
+        return stream, grid
+
+    def _refuse_jumps(self, name: str, times: Array | None, rows: slice) -> None:
+        steps = np.diff(times[np.isfinite(times)]) if times is not None else np.empty(0)
+        if steps.max(initial=0.0) > LONGEST_GAP_S:
+            row = self._columns.row(rows.start + int(steps.argmax()) + 1)
+            raise InvalidData(
+                f"'{self._place}', row {row}, column '{self._mapping.streams[name].time.column}': time jumps by "
+                f'{steps.max():g} s within a slide; look at the unit of time and at `slides` in the mapping'
+            )
+
+    def _stream(self, name: str, params: StreamColumns) -> Stream:
+        names = self._chosen[name]
+        columns = [self._columns.numbers[column] for column in names]
+        if len({len(column) for column in columns}) > 1:
+            raise InvalidData(
+                f"'{self._place}': the columns of '{name}' have {sorted({len(c) for c in columns})} rows; put "
+                'columns of different rates into two streams'
+            )
+        if params.channels and len(params.channels) != len(names):
+            raise InvalidData(
+                f"'{self._place}': the stream '{name}' has {len(names)} columns and {len(params.channels)} names "
+                'of channels; give one for each'
+            )
+        samples = np.stack(columns, axis=1)
+        samples *= params.scale
+        time_column = self._time_column(name)
+        rate_hz = self._rate_hz(name, params, time_column)
+        if time_column:
+            time_s = self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)]
+            if len(time_s) != len(samples):
+                raise InvalidData(
+                    f"'{self._place}': column '{time_column}' has {len(time_s)} rows, '{name}' {len(samples)}"
+                )
+        else:
+            time_s = np.arange(len(samples)) / rate_hz
+        channels = tuple(params.channels) or tuple(names)
+        return Stream(params, channels, samples, time_s, bool(time_column), rate_hz, self._clocks.get(names[0], ''))
+
+    def _rate_hz(self, name: str, params: StreamColumns, time_column: str) -> float:
+        """Return the rate of a stream: as stated, else that of the first file, from which later ones differ little."""
+        counts = self._report.streams.setdefault(name, StreamCounts(rate_hz=params.rate_hz))
+        own = self._own_hz
+        if time_column:
+            own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
+        counts.rate_hz = counts.rate_hz or own
+        if not MIN_HZ <= counts.rate_hz <= MAX_HZ:
+            raise InvalidData(
+                f"'{self._place}': the rate of '{name}' is {counts.rate_hz:g} Hz by its times; give a column of "
+                f'time that grows and its unit, or `rate_hz`, from {MIN_HZ:g} to {MAX_HZ:g}'
+            )
+        if own and not 1 / SAME_RATE <= own / counts.rate_hz <= SAME_RATE:
+            raise InvalidData(
+                f"'{self._place}': '{name}' has {own:g} Hz by its times, {counts.rate_hz:g} Hz are expected; "
+                f"look at the unit of column '{time_column}' and at `rate_hz` in the mapping"
+            )
+        return counts.rate_hz
+
+    def _time_column(self, name: str) -> str:
+        return self._mapping.streams[name].time.column or self._clocks.get(self._chosen[name][0], '')
+
+    def _time_unit(self, name: str) -> str:
+        stated = self._mapping.streams[name].time
+        return stated.unit if stated.column else 's'
+
+    def _check_rows(self) -> None:
+        """Count the rows with a bad number; InvalidData if they are too many."""
+        by_length: dict[int, AnyArray] = {}
+        for values in self._columns.numbers.values():
+            bad = by_length.setdefault(len(values), np.zeros(len(values), dtype=bool))
+            bad |= np.isnan(values)
+        for rows, bad in by_length.items():
+            count = int(bad.sum())
+            self._report.rows += rows
+            self._report.note(self._place, count, self._columns.malformed)
+            if not rows or count > self._mapping.max_malformed * rows:
+                raise InvalidData(self._malformed_sentence(count, rows))
+
+    def _malformed_sentence(self, count: int, rows: int) -> str:
+        first = str(next(iter(self._columns.malformed), 'no row at all'))
+        return (
+            f"'{self._place}' has {count} malformed rows of {rows}, first {first}; "
+            f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
+            'and at `format` in the mapping'
+        )
+
+    def _text(self, name: str) -> AnyArray | None:
+        return None if name in self._fields else self._columns.texts[name]
+
+    def _label(self, cut: _Cut) -> str:
+        label = self._mapping.label
+        code = label.value or self._value(label.column, cut, 'label')
+        surface = checked_label(label.names.get(code, code))
+        if not surface:
+            raise InvalidData(f"'{self._place}': a slide has an empty label; name another column under `label`")
+        return surface
+
+    def _value(self, name: str, cut: _Cut, kind: str) -> str:
+        """Return the one value that a column has during a slide."""
+        texts = self._text(name)
+        if texts is None:
+            return str(self._fields[name])
+        rows = cut.rows(len(texts), self._clocks.get(name, ''), self._times_of(name, len(texts)))
+        own = texts[rows]
+        if not len(own):
+            raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
+        other = np.flatnonzero(own != own[0])
+        if len(other):
+            place = f"'{self._place}', row {self._columns.row(rows.start + int(other[0]))}, column '{name}'"
+            change = f"the {kind} changes from '{own[0]}' to '{own[other[0]]}' within a slide"
+            raise InvalidData(f"{place}: {change}; let slides end where '{name}' changes (`slides: {{by: column}}`)")
+        return str(own[0])
+
+    def _times_of(self, name: str, length: int) -> Array:
+        """Return the times of a column: of its own clock, or of the stream with as many rows."""
+        clock = self._clocks.get(name)
+        if clock:
+            return self._columns.numbers[clock]
+        for stream in self._streams.values():
+            if len(stream.samples) == length:
+                return stream.time_s
+        raise InvalidData(
+            f"'{self._place}': column '{name}' has {length} rows, as no stream has; name one of the same length"
+        )
+
+    def _conditions(self, cut: _Cut) -> list[tuple[float, float, float, float]]:
+        """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
+        tracks = {name: self._track(name, cut) for name in CONDITION_UNITS}
+        changing = any(len(values) > 1 and np.ptp(values[np.isfinite(values)]) > 0 for _, values in tracks.values()
+                       if np.isfinite(values).any())  # fmt: skip
+        count = max(1, round((cut.end_s - cut.begin_s) / STATE_S)) if changing else 1
+        edges = cut.begin_s + STATE_S * np.arange(count + 1) if changing else np.array([cut.begin_s, math.inf])
+        edges[-1] = math.inf
+        means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
+        starts = (edges[:-1] - cut.begin_s).tolist()
+        return [(start, *mean) for start, mean in zip(starts, means, strict=True)]
+
+    def _track(self, name: str, cut: _Cut) -> tuple[Array, Array]:
+        """Return times and values of a condition in SI units, (n,) each."""
+        quantity = self._mapping.quantity(name)
+        factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
+        if quantity.column in self._fields or not quantity.column:
+            text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
+            try:
+                return np.array([cut.begin_s]), np.array([float(text)]) * factor
+            except ValueError as error:
+                raise InvalidParameter(
+                    f"'{self._place}': '{quantity.column}' is '{text}' in its name; a number is needed there"
+                ) from error
+        values = self._columns.numbers[quantity.column]
+        times = self._times_of(quantity.column, len(values))
+        rows = cut.rows(len(values), self._clocks.get(quantity.column, ''), times)
+        return times[rows], values[rows] * factor
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A slide: rows of the stream by which it was cut, and its time."""
+
+    length: int
+    clock: str
+    span: slice
+    begin_s: float
+    end_s: float
+
+    def rows(self, length: int, clock: str, time_s: Array) -> slice:
+        """Return the rows of a column: the same ones if it has the same clock, else those of the time of the slide."""
+        if length == self.length and clock == self.clock:
+            return self.span
+        return _rows_between(time_s, self.begin_s, self.end_s)
+
+
+def _rows_between(time_s: Array, begin_s: float, end_s: float) -> slice:
+    inside = np.flatnonzero((time_s >= begin_s - SAME_TIME_S) & (time_s < end_s - SAME_TIME_S))
+    return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
+
+
+def _ends(time_s: Array, span: slice) -> tuple[float, float]:
+    """Return the time of the first row, and of the row after the last."""
+    if span.stop <= span.start:
+        return 0.0, 0.0
+    after = time_s[span.stop] if span.stop < len(time_s) else 2 * time_s[-1] - time_s[max(0, len(time_s) - 2)]
+    return float(time_s[span.start]), float(after)
+
+
+def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
+    if len(values) == 1:
+        return float(values[0])
+    inside = values[(times >= begin_s) & (times < end_s) & np.isfinite(values)]
+    return float(inside.mean()) if len(inside) else math.nan

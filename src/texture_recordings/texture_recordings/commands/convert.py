@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that make bags of other recordings: `import` and `segment`."""
+"""The sub-commands of `texture` that turn recordings into others: `import`, `segment` and `export`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import argparse
 from pathlib import Path
 
 from texture_core.cli import Command, add_channels, add_seed, add_slides
-from texture_core.config import find, from_mapping, parameters_of
+from texture_core.config import find, from_mapping, parameters_of, writing
 from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.export import KINDS, export_slides, model_card
 from texture_recordings.public_sets import IMPORTS
 from texture_recordings.segment import segment_bags
 from texture_recordings.tables import MAPPED, import_tables, load_mapping
@@ -85,5 +87,29 @@ def _segment(options: argparse.Namespace) -> int:
     return 0
 
 
+def _configure_export(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('kind', choices=(*KINDS, 'card'), help='format; card: the card of a model, for a hub')
+    parser.add_argument('sources', nargs='+', metavar='BAG', help='bags, or folders of bags; of a card, MODEL.json')
+    parser.add_argument('-o', '--out', required=True, metavar='DIR', help='folder to make; of a card, file to write')
+    parser.add_argument('--license', default='other', metavar='NAME', help='as hubs name it, such as cc-by-4.0')
+    parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
+    add_slides(parser)
+
+
+def _export(options: argparse.Namespace) -> int:
+    """Write slides as others read them, or the card of a model."""
+    if options.kind == 'card':
+        card = ''.join(model_card(source, options.license) for source in options.sources[:1])
+        with writing(options.out):
+            Path(options.out).write_text(card, encoding='utf-8')
+        print(options.out)
+        return 0
+    dataset = SlideDataset.from_bags(options.sources, options.slides, options.namespace)
+    for line in export_slides(dataset, options.out, options.kind, options.license):
+        print(line)
+    return 0
+
+
+export = Command('write labelled slides as Parquet, HDF5 or a LeRobot data set', _configure_export, _export)
 import_ = Command("turn other people's recordings into labelled bags", _configure_import, _import)
 segment = Command('find the slides in bags that do not tell them', _configure_segment, _segment)

@@ -14,11 +14,12 @@ from texture_recordings.nodes.replay import ReplayNode, ReplayParams
 
 def _configure_record(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('out', help='folder of the new bag; nothing may exist there')
+    parser.add_argument('--all', action='store_true', help='every topic in the namespace, not only those of the suite')
     add_namespace(parser)
 
 
 def _record(options: argparse.Namespace) -> int:
-    run_node(RecordNode, {'out': options.out}, options.namespace)
+    run_node(RecordNode, {'out': options.out, 'all': options.all}, options.namespace)
     return 0
 
 
@@ -26,12 +27,13 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', help='the bag, or a folder of bags')
     parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded')
     parser.add_argument('--slides', default='', help="which slides of each surface, such as '1-30'; all if not given")
+    parser.add_argument('--clock', action='store_true', help='publish the time of the recording on /clock')
     add_namespace(parser)
 
 
 def _replay(options: argparse.Namespace) -> int:
     check_option(ReplayParams, 'rate', options.rate)
-    parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides}
+    parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides, 'clock': options.clock}
     run_node(ReplayNode, parameters, options.namespace)
     return 0
 

@@ -6,24 +6,30 @@ from __future__ import annotations
 import queue
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from typing import Any
 
+from rcl_interfaces.msg import Parameter, ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
+from rclpy.task import Future
 
 from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_recordings.bags import BagWriter, Continuity, RawMessage, SignalDecoder, short_name
-from texture_recordings.ros import TOPICS, Topic
+from texture_core.types import Quality
+from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, SignalDecoder, typestore
+from texture_recordings.ros import TOPICS, message_class
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
 NOTHING = RawMessage('', '', 0, b'')
+EVENTS = '/parameter_events'
 DISCOVERY_S = 0.5  # how often it is asked what else is published
 
 
@@ -32,17 +38,23 @@ class RecordParams:
     """Parameters of the recorder."""
 
     out: str = param('', 'Folder of the new bag; nothing may exist there.')
+    all: bool = param(
+        False, 'Records every topic in the namespace and below it, not only those of the suite and a few of ROS.'
+    )
 
 
 class RecordNode(Node):
-    """Write every message of the suite's topics, in its namespace and below it, to a bag, with its time of arrival."""
+    """Write the topics of the suite's messages, in its namespace and below it, to a bag, with their times of arrival.
+
+    Also `/diagnostics`, `/rosout`, `/tf_static` and `/parameter_events`, and there, once, what the parameters are.
+    """
 
     def __init__(self) -> None:
         super().__init__('record')
         params = declare(self, RecordParams)
         if not params.out:
             raise InvalidParameter("parameter 'out' is ''; give the folder of the new bag")
-        self._path = params.out
+        self._path, self._all = params.out, params.all
         self._bag = BagWriter(params.out)
         self._counts: Counter[str] = Counter()
         self._continuity = Continuity()
@@ -52,9 +64,11 @@ class RecordNode(Node):
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
-        self._subscribed: set[str] = set()
+        self._seen: set[str] = set()  # topics that are recorded, or of which it was said that they are not
+        self._askers: dict[str, AsyncParameterClient] = {}  # of the nodes whose parameters are noted
+        self._asked: defaultdict[str, bool] = defaultdict(bool)
         for topic in TOPICS.values():
-            self._subscribe(topic, self.resolve_topic_name(topic.name))
+            self._subscribe(self.resolve_topic_name(topic.name), topic.msgtype, topic.qos)
         self._diagnostics = Diagnostics(self, self._report)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # with use_sim_time the node's own may stand still
         self.create_timer(POLL_S, self._check, clock=steady)
@@ -74,23 +88,59 @@ class RecordNode(Node):
             self._diagnostics.end()
 
     def _find_more(self) -> None:
-        """Subscribe to what has appeared below the namespace: further fingers, and the nodes of further namespaces."""
+        """Subscribe to what has appeared, and note the parameters of nodes that have."""
         for name, types in self.get_topic_names_and_types():
-            topic = TOPICS.get(short_name(name))
-            ours = topic is not None and name.startswith(f'{self._namespace}/')
-            if topic is not None and ours and name not in self._subscribed and topic.msgtype in types:
-                self._subscribe(topic, name)
-                self.get_logger().info(f"recording '{name}', too")
+            ours = name.startswith(f'{self._namespace}/') and (self._all or types[0] in MESSAGES)
+            if name not in self._seen and (ours or name in COMMON):
+                if types[0] in typestore().types:
+                    offered = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
+                    self._subscribe(name, types[0], offered[0] if offered else QoSProfile(depth=100))
+                else:
+                    self._seen.add(name)
+                    self.get_logger().warning(f"'{name}' is not recorded: bags know no {types[0]}")
+        for name, namespace in self.get_node_names_and_namespaces():
+            node = f'{namespace.rstrip("/")}/{name}'
+            if node.startswith(f'{self._namespace}/') and node != self.get_fully_qualified_name():
+                self._note_parameters(node)
 
-    def _subscribe(self, topic: Topic, name: str) -> None:
-        self._subscribed.add(name)
-        # Deep queues: a burst must not be lost while the executor is busy. Volatile: of an exploration that was over
-        # before the recording began, the states alone would come, without the signal.
-        qos = QoSProfile(depth=1000, reliability=topic.qos.reliability)
-        self.create_subscription(topic.type, name, lambda raw: self._on_message(name, topic, raw), qos, raw=True)
+    def _subscribe(self, name: str, msgtype: str, offered: QoSProfile) -> None:
+        self._seen.add(name)
+        reliable, latched = ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL
+        depth = max(1, offered.depth)  # unknown of a publisher in another process: 0
+        quality = Quality(depth, offered.reliability == reliable, offered.durability == latched)
+        self._bag.qualities[name] = quality
+        # Deep queues: a burst must not be lost while the executor is busy. Volatile, but for what is said once for all:
+        # of an exploration that was over before the recording began, the states alone would come.
+        once = name in COMMON or name.endswith('_baseline')
+        durability = offered.durability if once else DurabilityPolicy.VOLATILE
+        qos = QoSProfile(depth=1000, reliability=offered.reliability, durability=durability)
+        kind = message_class(msgtype)
+        self.create_subscription(kind, name, lambda raw: self._on_message(name, msgtype, raw), qos, raw=True)
+        if name not in TOPICS:
+            self.get_logger().info(f"recording '{name}'")
 
-    def _on_message(self, name: str, topic: Topic, raw: bytes) -> None:
-        message = RawMessage(name, topic.msgtype, self.get_clock().now().nanoseconds, raw)
+    def _note_parameters(self, node: str) -> None:
+        """Ask a node once for all its parameters, and write them as if it had just been given them."""
+        client = self._askers.get(node)
+        if client is None:
+            client = self._askers[node] = AsyncParameterClient(self, node)
+        elif not self._asked[node] and client.services_are_ready():
+            self._asked[node] = True
+
+            def write(values: Future, names: list[str]) -> None:
+                pairs = zip(names, values.result().values, strict=True)
+                event = ParameterEvent(node=node, stamp=self.get_clock().now().to_msg())
+                event.new_parameters = [Parameter(name=name, value=value) for name, value in pairs]
+                self._on_message(EVENTS, 'rcl_interfaces/msg/ParameterEvent', serialize_message(event))
+
+            def ask(listed: Future) -> None:
+                names = list(listed.result().result.names)
+                client.get_parameters(names).add_done_callback(lambda values: write(values, names))
+
+            client.list_parameters([], 10).add_done_callback(ask)
+
+    def _on_message(self, name: str, msgtype: str, raw: bytes) -> None:
+        message = RawMessage(name, msgtype, self.get_clock().now().nanoseconds, raw)
         try:
             self._queue.put_nowait(message)
         except queue.Full:

@@ -92,6 +92,12 @@ class ReplayParams:
         high=100,
     )
     deadline_s: float = param(30.0, 'Sets how long to wait for the subscribers before giving up.', unit='s', low=0.0)
+    end_delay_s: float = param(
+        0.0,
+        'Time to wait after the last message, in which the last estimates come, before the node ends.',
+        unit='s',
+        low=0.0,
+    )
     start_delay_s: float = param(1.0, 'Sets the time between finding the subscribers and the start.', unit='s', low=0.0)
     clock: bool = param(
         False,
@@ -217,6 +223,7 @@ class ReplayNode(Node):
             f'published {counts}: {schedule.played_s:.1f} s in {time.monotonic() - start:.1f} s, '
             f'at most {1000 * latest_s:.0f} ms late'
         )
+        self._stop.wait(self._params.end_delay_s)
 
 
 def main() -> None:
