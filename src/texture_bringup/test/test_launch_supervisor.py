@@ -149,6 +149,13 @@ def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
     assert launched.end() == 0
 
 
+def test_a_node_that_dies_more_often_than_it_may_be_restarted_stops_the_others(launch) -> None:
+    again = 'respawn="true" respawn_max_retries="2"'
+    launched = launch({'good': GOOD, 'mortal': 'echo born; exit 3'}, mortal=again)
+    assert launched.end() == 1
+    assert launched.lines.count('[mortal] born') == 3
+
+
 @pytest.mark.parametrize(('given', 'again'), [('', 'restart.xml'), ('/mine.xml', 'mine.xml')])
 def test_a_node_in_the_place_of_a_dead_one_gets_the_profile_for_restarts(launch, monkeypatch, given, again) -> None:
     monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', given)

@@ -141,6 +141,7 @@ class NodeDescription:
     screen: bool = False
     respawn: bool = False
     respawn_delay_s: float = 0.0
+    respawn_max_retries: int = -1  # below 0: as often as it dies
     needed: bool = False
     environment: Mapping[str, str] = field(default_factory=dict)
 
@@ -230,6 +231,7 @@ class RunningNode:
         say: Callable[[str], None],
     ) -> None:
         self.node = node
+        self.deaths = 0  # of processes of the same node before
         self._say = say
         try:
             self._process = subprocess.Popen(
@@ -344,7 +346,7 @@ class Supervisor:
         self._say = say
         self._together = together
         self._commands: dict[int, list[str]] = {}  # by the id of the node
-        self._due: list[tuple[float, NodeDescription, bool]] = []  # when to start which node, and whether it had died
+        self._due: list[tuple[float, NodeDescription, int]] = []  # when to start which node, and how often it had died
         self._running: list[RunningNode] = []
         self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
@@ -361,7 +363,7 @@ class Supervisor:
             try:
                 for index, node in enumerate(self._nodes):
                     self._commands[id(node)] = command(node, Path(folder) / str(index))
-                self._due = [(0.0, node, False) for node in self._nodes]
+                self._due = [(0.0, node, 0) for node in self._nodes]
                 while self._running or self._due:
                     self._step(time.monotonic())
             finally:
@@ -384,10 +386,10 @@ class Supervisor:
         if self._stopping_since_s is not None:
             self._due.clear()
             self._send_signals(now - self._stopping_since_s)
-        for when, node, again in list(self._due):
+        for when, node, deaths in list(self._due):
             if when <= now:
-                self._due.remove((when, node, again))
-                self._start(node, again)
+                self._due.remove((when, node, deaths))
+                self._start(node, deaths)
         for key, _ in self._selector.select(POLL_S):
             if not key.data.read(key.fileobj):  # the end of the stream: it would stay readable for ever
                 self._selector.unregister(key.fileobj)
@@ -396,14 +398,15 @@ class Supervisor:
             if code is not None:
                 self._end(process, code)
 
-    def _start(self, node: NodeDescription, again: bool) -> None:
+    def _start(self, node: NodeDescription, deaths: int) -> None:
         environment = dict(node.environment)
-        if again and not any(environment.get(name) for name in PROFILES):
+        if deaths and not any(environment.get(name) for name in PROFILES):
             # In the place of a dead node, with which the others still count, Fast DDS is to be discovered soon.
             environment[PROFILES[0]] = str(config.folder('texture_bringup', 'config/fastdds') / 'restart.xml')
         process = RunningNode(node, self._commands[id(node)], environment, self._say)
         for stream in process.streams:
             self._selector.register(stream, selectors.EVENT_READ, process)
+        process.deaths = deaths
         self._running.append(process)
         self._say(f'[launch] {node.label} started (process {process.pid})')
 
@@ -421,11 +424,12 @@ class Supervisor:
         node, stopping = process.node, self._stopping_since_s is not None
         # What was started wrongly would only end again.
         restart = node.respawn and code != MISTAKE and not (stopping or self._together)
+        restart = restart and (node.respawn_max_retries < 0 or process.deaths < node.respawn_max_retries)
         needed = node.needed or node.respawn or (self._together and code != 0)
         self._failed |= code != 0 and not (stopping or restart)
         self._say(f'[launch] {node.label} {ending(code)}')
         if restart:
-            self._due.append((time.monotonic() + node.respawn_delay_s, node, True))
+            self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
             self._say(f'[launch] {node.label} is needed by the others, which are stopped now')
             self.stop()
@@ -643,7 +647,17 @@ MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
 MAX_INCLUDES = 20  # of files within each other
 SUFFIX = '.launch.xml'
 CONDITIONS = ('if', 'unless')
-NODE_TEXTS = ('pkg', 'exec', 'name', 'namespace', 'output', 'respawn', 'respawn_delay', 'on_exit')
+NODE_TEXTS = (
+    'pkg',
+    'exec',
+    'name',
+    'namespace',
+    'output',
+    'respawn',
+    'respawn_delay',
+    'respawn_max_retries',
+    'on_exit',
+)
 # Attributes and child elements of each element; None: any element.
 ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
     'launch': (('version',), None),
@@ -814,14 +828,14 @@ def _truth(text: str, where: str) -> bool:
     return value
 
 
-def _seconds(text: str) -> float:
+def _number(text: str, name: str, lowest: float) -> float:
     try:
-        seconds = float(text or 0.0)
+        number = float(text)
     except ValueError:
-        seconds = math.nan
-    if not 0.0 <= seconds < math.inf:
-        raise InvalidLaunch(f"'respawn_delay' of <node> is '{text}'; a number of seconds from 0 is needed")
-    return seconds
+        number = math.nan
+    if not lowest <= number < math.inf:
+        raise InvalidLaunch(f"'{name}' of <node> is '{text}'; a number from {lowest:g} is needed")
+    return number
 
 
 def _wanted(element: Element, scope: Scope) -> bool:
@@ -929,7 +943,8 @@ class _Reader:
                 remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
                 screen=_choice(texts['output'], ON_SCREEN, "'output' of <node>"),
                 respawn=_truth(texts['respawn'] or 'false', "'respawn' of <node>"),
-                respawn_delay_s=_seconds(texts['respawn_delay']),
+                respawn_delay_s=_number(texts['respawn_delay'] or '0', 'respawn_delay', 0.0),
+                respawn_max_retries=int(_number(texts['respawn_max_retries'] or '-1', 'respawn_max_retries', -1.0)),
                 needed=_choice(texts['on_exit'], SHUTDOWN_ON_EXIT, "'on_exit' of <node>"),
                 environment=dict(scope.environment),
             )

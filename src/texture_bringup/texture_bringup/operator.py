@@ -12,6 +12,8 @@ from types import TracebackType
 from typing import Any
 
 from action_msgs.msg import GoalStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import ParameterType
 from rclpy.action import ActionClient
 from rclpy.context import Context
@@ -129,6 +131,11 @@ OFFERED_S, ANSWER_S = 10.0, 60.0
 RETRY_PERIOD_S = 5.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
+# The transition that brings a lifecycle node one step nearer to being active, or to being inactive, by its state.
+STEPS: Mapping[bool, Mapping[str, int]] = {
+    True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
+    False: {'active': Transition.TRANSITION_DEACTIVATE},
+}
 VANISHED = (
     'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
     'the output of the explorer'
@@ -332,6 +339,41 @@ class Operator:
         silent = f'{name} does not answer; look at the robot, and at the output of its node'
         answer = self._ask(Trigger, service, Trigger.Request(), (OFFERED_S, missing), (ANSWER_S, silent))
         return bool(answer.success), str(answer.message)
+
+    def set_active(self, node: str, active: bool) -> str:
+        """Bring a lifecycle node to the state 'active', over 'inactive', or from it back to 'inactive'.
+
+        Parameters
+        ----------
+        node
+            Name of the node.
+        active
+            Whether it shall work.
+
+        Returns
+        -------
+        str
+            Its state then.
+
+        Raises
+        ------
+        LaunchFailed
+            If there is no such node, it does not answer, or it refuses.
+        """
+        missing = f"no lifecycle node '{node}' answers; start it, or give its --namespace"
+        silent = f"node '{node}' does not answer; look at its output"
+        for _ in range(3):  # two transitions at most, and a look at the state behind them
+            state = self._ask(
+                GetState, f'{node}/get_state', GetState.Request(), (OFFERED_S, missing), (ANSWER_S, silent)
+            )
+            label = str(state.current_state.label)
+            if label not in STEPS[active]:
+                break
+            request = ChangeState.Request(transition=Transition(id=STEPS[active][label]))
+            answer = self._ask(ChangeState, f'{node}/change_state', request, (OFFERED_S, missing), (ANSWER_S, silent))
+            if not answer.success:
+                raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output says why")
+        return label
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
         """Add an exploration, the last one if '', to a texture; return its number of windows and a message.

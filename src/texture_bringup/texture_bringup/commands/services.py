@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
 from texture_bringup.launcher import given_arguments
 from texture_bringup.operator import Operator
@@ -87,6 +88,31 @@ def _remove(options: argparse.Namespace) -> int:
 
 add = Command('add the slide that was explored last to a texture; or undo it', _configure_add, _add)
 remove = Command('remove a texture that was added since the training', _configure_remove, _remove)
+
+# --------------------
+# Lifecycle nodes: the sensor, and the explorer with its arm.
+
+
+def _activating(active: bool) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
+    """Return what `activate` or `deactivate` is configured by, and what it does."""
+    # The arm is let go first, and taken last.
+    usual = ['sensor', 'explorer'] if active else ['explorer', 'sensor']
+
+    def configure(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument('nodes', nargs='*', metavar='NODE', help=f'in this order; default: {" ".join(usual)}')
+        add_namespace(parser)
+
+    def run(options: argparse.Namespace) -> int:
+        with Operator(options.namespace) as operator:
+            for node in options.nodes or usual:
+                print(f'{node}: {operator.set_active(node, active)}')
+        return 0
+
+    return configure, run
+
+
+activate = Command('configure and activate nodes: sensor and arm begin to work', *_activating(True))
+deactivate = Command('deactivate nodes: sensor and arm are let go, the nodes stay', *_activating(False))
 
 # --------------------
 # Parameters.
