@@ -7,6 +7,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 
 from texture_bringup import operator as operators
@@ -187,15 +188,44 @@ def test_a_service_that_no_node_offers_is_one_sentence_and_exit_code_2(monkeypat
     assert said.count('\n') == 1
 
 
+def asked(graph, *arguments):
+    """Return the exit code of a command, while the nodes of a graph answer it."""
+    codes = []
+    asking = threading.Thread(target=lambda: codes.append(main(list(arguments))))
+    asking.start()
+    graph.until(lambda: bool(codes))
+    asking.join()
+    return codes[0]
+
+
+class Fragile(LifecycleNode):
+    """A lifecycle node that cannot be activated while it is broken."""
+
+    def __init__(self, **options):
+        super().__init__('fragile', **options)
+        self.broken = False
+
+    def on_activate(self, state):
+        return TransitionCallbackReturn.FAILURE if self.broken else super().on_activate(state)
+
+
+@pytest.mark.realtime
+def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refusal_is_reported(monkeypatch, capsys):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '97')
+    with LocalGraph(97, deadline_s=60.0) as graph:
+        node = graph.add(Fragile)
+        for command, state in (('activate', 'active'), ('deactivate', 'inactive'), ('deactivate', 'inactive')):
+            assert asked(graph, command, 'fragile') == 0
+            assert capsys.readouterr().out == f'fragile: {state}\n'
+        node.broken = True
+        assert asked(graph, 'activate', 'fragile') == 2
+    assert "node 'fragile' is inactive and refuses to change" in capsys.readouterr().err
+
+
 @pytest.mark.realtime
 def test_the_answer_of_a_running_node_is_printed(monkeypatch, capsys):
     monkeypatch.setenv('ROS_DOMAIN_ID', '97')
     with LocalGraph(97, deadline_s=60.0) as graph:
         graph.peer.create_service(Trigger, 'recover', lambda _request, _answer: Trigger.Response(message='it burns'))
-        codes = []
-        asking = threading.Thread(target=lambda: codes.append(main(['recover'])))
-        asking.start()
-        graph.until(lambda: bool(codes))
-        asking.join()
-    assert codes == [1]
+        assert asked(graph, 'recover') == 1
     assert capsys.readouterr().out == 'it burns\n'

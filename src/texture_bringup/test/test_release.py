@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a release is made of agrees with itself: versions, containers, workflows."""
 
+import configparser
 import re
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 import yaml
+
+from texture_bringup.launcher import STOP, find_launch_file
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = sorted(manifest.parent for manifest in ROOT.glob('src/*/package.xml'))
@@ -76,3 +79,15 @@ def test_the_profile_for_restarts_shortens_no_lease_and_uses_no_shared_memory() 
         profile.findtext(f'.//{{*}}{name}/{{*}}nanosec') for name in ('leaseAnnouncement', 'heartbeatPeriod')
     )
     assert (announcement, heartbeat) == ('500000000', '200000000')
+
+
+def test_the_service_is_stopped_as_by_ctrl_c_and_never_started_again_by_itself() -> None:
+    text = (ROOT / 'src/texture_bringup/config/systemd/tactile-texture.service').read_text()
+    unit = configparser.ConfigParser(strict=False, interpolation=None)
+    unit.optionxform = str
+    unit.read_string(text)
+    service = unit['Service']
+    # The launcher passes the signal on and kills what is left after 8 s; systemd must wait longer.
+    assert (service['KillSignal'], service['KillMode'], service['Restart']) == ('SIGINT', 'mixed', 'no')
+    assert int(service['TimeoutStopSec']) > STOP[-1][0]
+    assert find_launch_file(re.search(r'TEXTURE_LAUNCH=(\w+)', text)[1]).is_file()

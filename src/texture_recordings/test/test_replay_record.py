@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 from texture_msgs import msg
@@ -17,7 +19,7 @@ from texture_core.errors import InvalidData
 from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import ExplorationState, Phase, TactileSignal
-from texture_recordings.bags import BagWriter, read_bag, read_foreign, typestore
+from texture_recordings.bags import BagWriter, read_bag, read_foreign
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -120,7 +122,7 @@ def test_streams_of_other_names_transforms_logs_and_parameters_are_recorded_and_
     with Reader(out) as reader:
         offered = {c.topic: c.ext.offered_qos_profiles[0].durability.name for c in reader.connections}
         events = [
-            typestore().deserialize_cdr(data, c.msgtype)
+            deserialize_message(data, ParameterEvent)
             for c, _, data in reader.messages()
             if c.topic == '/parameter_events'
         ]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -858,43 +858,10 @@ def import_lmt29(
 # Data sets that `texture import` knows.
 
 
-class Importer(Protocol):
-    """Turns a public data set into labelled bags, one for each material."""
-
-    def __call__(
-        self,
-        source: str | Path,
-        out: str | Path,
-        slides: str = '',
-        materials: Sequence[str] = (),
-        channels: str = 'all',
-    ) -> list[Path]:
-        """Write the bags, and return their paths.
-
-        Parameters
-        ----------
-        source
-            Folder that holds the files of the data set.
-        out
-            Folder for the bags; made if missing.
-        slides
-            Which slides of each material, such as '1-30'; '' for all.
-        materials
-            Names of materials; none for all.
-        channels
-            'fast' for the vibration alone, 'all' for the slow channels too.
-
-        Returns
-        -------
-        list of Path
-            Of the bags.
-
-        Raises
-        ------
-        InvalidData
-            If the source lacks files or slides, the channels are not there, or a bag exists already.
-        """
-
+# Each takes the folder with the files of the data set, the folder for the bags, which slides of each material ('' for
+# all), names of materials (none for all) and 'fast' or 'all' channels, and returns the paths of the bags. InvalidData
+# is raised if the source lacks files or slides, the channels are not there, or a bag exists already.
+Importer = Callable[..., list[Path]]
 
 IMPORTS: Mapping[str, Importer] = {
     'biotac20': import_biotac20,  # 20 materials × 40 slides, BioTac on a robot arm
