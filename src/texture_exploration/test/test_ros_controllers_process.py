@@ -66,8 +66,10 @@ while True:
 
 @pytest.fixture
 def graph():
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored, and a node would inherit that
     with LocalGraph(94, deadline_s=DEADLINE_S) as graph:
         yield graph
+    signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture
