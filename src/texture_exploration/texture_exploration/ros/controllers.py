@@ -56,10 +56,12 @@ def _is_free(path: Path) -> bool:
 
 
 def claim(node: Node) -> IO[str] | None:
-    """Lock the file of a node's participant until the process ends or closes it, None if files cannot be written."""
+    """Lock the file of a node's participant until the process ends or closes it; None where that cannot be done."""
     publisher = node.create_publisher(TwistStamped, f'claim_{uuid.uuid4().hex}', 1)
-    (info,) = node.get_publishers_info_by_topic(publisher.topic_name)
+    infos = node.get_publishers_info_by_topic(publisher.topic_name)
     node.destroy_publisher(publisher)
+    if not infos:  # a middleware that tells it later
+        return None
     folder = claims()
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -68,7 +70,7 @@ def claim(node: Node) -> IO[str] | None:
         for old in folder.iterdir():
             if time.time() - old.stat().st_mtime > FORGOTTEN_S and _is_free(old):
                 old.unlink()
-        file = (folder / bytes(info.endpoint_gid[PARTICIPANT]).hex()).open('w')
+        file = (folder / bytes(infos[0].endpoint_gid[PARTICIPANT]).hex()).open('w')
         fcntl.flock(file, fcntl.LOCK_EX)
     except OSError:
         return None
