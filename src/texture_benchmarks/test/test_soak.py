@@ -193,7 +193,8 @@ def test_a_force_above_the_limit_is_timed_without_a_break() -> None:
         ({'ending': 'aborted'}, []),
         ({'ending': 'aborted', 'message': ''}, ['every exploration succeeds or is aborted by name']),
         ({'hazard': 'none', 'ending': 'aborted'}, ['after a hazard one of 3 explorations succeeds']),
-        ({'happened': False}, ['every hazard comes']),
+        ({'hazard': 'guard stopped for 3 s', 'happened': False}, ['every hazard comes']),
+        ({'happened': False}, []),  # but in another attempt
         ({'above_s': 0.11}, ['no force above 10 N for more than 0.1 s in any direction']),
         ({'left_n': 0.3}, ['no finger stays pressed where the arm obeys']),
     ],
@@ -204,6 +205,6 @@ def test_a_hazard_that_breaks_a_limit_is_named(changed, asked, tmp_path) -> None
     assert [result.asked for result in check_hazards(records) if not result.holds] == asked
     numbers = json.loads(write_hazards(records, tmp_path, 0, 60.0).read_text())['numbers']
     assert (numbers['injections'], numbers['hazards']['guard killed']['peak_n']) == (
-        sum(item.hazard != 'none' for item in records),
+        sum(item.hazard != 'none' and item.happened for item in records),
         12,
     )

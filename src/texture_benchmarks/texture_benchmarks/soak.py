@@ -586,12 +586,12 @@ def check_hazards(records: Sequence[HazardRecord]) -> list[Requirement]:
     """Return what is required of the explorations with hazards, and what was seen."""
     calm = [item for item in records if item.hazard == NO_HAZARD]
     blocked = sum(all(item.ending != SUCCESS for item in calm[i : i + ATTEMPTS]) for i in range(len(calm)))
-    missing = [item.hazard for item in records if not item.happened]
+    missing = {item.hazard for item in records} - {item.hazard for item in records if item.happened}
     nameless = [item.hazard for item in records if item.ending != SUCCESS and not item.message]
     longest = max(records, key=lambda item: item.above_s)
     pressed = max(records, key=lambda item: item.left_n)
     return [
-        Requirement('every hazard comes', f'not: {", ".join(missing) or "none"}', not missing),
+        Requirement('every hazard comes', f'not: {", ".join(sorted(missing)) or "none"}', not missing),
         Requirement('every exploration succeeds or is aborted by name', f'{len(nameless)} without', not nameless),
         Requirement(
             f'after a hazard one of {ATTEMPTS} explorations succeeds',
@@ -640,7 +640,7 @@ def write_hazards(records: Sequence[HazardRecord], out: Path, seed: int, duratio
             'seed': seed,
             'duration_s': duration_s,
             'explorations': len(records),
-            'injections': sum(item.hazard != NO_HAZARD for item in records),
+            'injections': sum(item.hazard != NO_HAZARD and item.happened for item in records),
             'requirements': [found._asdict() for found in check_hazards(records)],
             'hazards': numbers,
         },
