@@ -9,7 +9,7 @@ import enum
 import math
 import socket
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import pairwise
 from statistics import median
@@ -178,6 +178,33 @@ class TactileSignal:
 def lost_samples(batches: Sequence[TactileSignal]) -> int:
     """Return how many samples are missing between consecutive batches of one stream."""
     return sum(max(0, after.first_sample - before.next_sample) for before, after in pairwise(batches))
+
+
+def join_batches(batches: Sequence[TactileSignal], anchors_ns: Iterable[int] = ()) -> list[TactileSignal]:
+    """Return consecutive batches of one stream with those that continue one another joined: fewer and larger ones.
+
+    Parameters
+    ----------
+    batches
+        In their order.
+    anchors_ns
+        The first batch that ends after each of these times begins a joined one: the samples of a slide are counted from
+        the stamp of its first batch, and no jitter of later stamps may move them.
+    """
+    anchors = [next((n for n, batch in enumerate(batches) if batch.end_ns > time_ns), -1) for time_ns in anchors_ns]
+    groups: list[list[TactileSignal]] = []
+    for number, batch in enumerate(batches):
+        last = groups[-1][-1] if groups else None
+        if last and number not in anchors and batch.first_sample == last.next_sample and _alike(batch, last):
+            groups[-1].append(batch)
+        else:
+            groups.append([batch])
+    return [replace(own[0], samples=np.concatenate([batch.samples for batch in own])) for own in groups]
+
+
+def _alike(one: TactileSignal, other: TactileSignal) -> bool:
+    names = ('sensor', 'channels', 'units', 'sampling_rate_hz', 'frame_id')
+    return all(getattr(one, name) == getattr(other, name) for name in names)
 
 
 # --------------------

@@ -29,6 +29,7 @@ from texture_estimation.decisions import (
     fit_open_set_rule,
     fit_prediction_sets,
     fit_stopping_rule,
+    slide_scores,
     space_means,
 )
 from texture_estimation.evidence import EvidenceAccumulator
@@ -328,7 +329,7 @@ def test_the_limit_is_interpolated_and_stays_beyond_its_ends():
 
 def after_one_window(model, examples, slide='felt/0'):
     evidence = EvidenceAccumulator(model)
-    values = examples.values[examples.groups == slide][0]
+    values = examples.values[examples.groups == slide][0] * 0.85  # towards the middle of the textures
     evidence.update(FeatureVector(0, 'e1', 0.5, 0.1, examples.names, values, feature_set=examples.feature_set))
     return evidence.update(FeatureVector(10**9, 'e1', 0.0, 0.1, last=True))
 
@@ -408,3 +409,28 @@ def test_with_too_few_slides_for_the_coverage_there_is_no_set_but_a_reason(count
 
 def test_the_most_probable_texture_is_always_in_the_set():
     assert PredictionSets(0.9, (1.0,), (0.99,)).members(np.array([0.2, 0.5, 0.3]), 3.0) == [1]
+
+
+def test_the_scores_of_a_whole_slide_are_those_of_its_windows_one_by_one():
+    rng = np.random.default_rng(4)
+    classes = np.repeat(np.arange(3), 8)
+    values, hidden = rng.standard_normal((14, 5)), rng.standard_normal((14, 7))
+    distances = {
+        space: ClassDistance.fit(rng.standard_normal((24, count)) + classes[:, None], classes)
+        for space, count in ((FEATURES, 5), (HIDDEN, 7), (ONSET, 5))
+    }
+    evidence = rng.standard_normal((14, 3))
+    means = np.cumsum(evidence, axis=0) / np.arange(1, 15)[:, None]
+    effective_windows = 1.0 + 0.5 * np.arange(14)
+    one_by_one, novelty = [], SlideNovelty(distances, 3)
+    for number, length in enumerate(effective_windows.tolist()):
+        novelty.add(values[number], hidden[number], int(evidence[number].argmax()), length)
+        second, first = np.sort(means[number])[-2:]
+        one_by_one.append(novelty.scores(int(means[number].argmax()), first - second))
+    whole = slide_scores(distances, values, hidden, evidence, means=means, effective_windows=effective_windows)
+    np.testing.assert_allclose(whole, one_by_one, rtol=1e-9)
+    detector = NoveltyDetector.fit(distances, [whole] * len(NOVELTY_WINDOWS), 0.1)
+    steps = [
+        detector.score_and_threshold(*step) for step in zip(whole.tolist(), effective_windows.tolist(), strict=True)
+    ]
+    np.testing.assert_allclose(np.transpose(detector.scores_and_thresholds(whole, effective_windows)), steps)

@@ -30,7 +30,7 @@ def test_a_model_predicts_the_same_after_it_was_saved(saved, model, examples, en
 def test_the_card_holds_recipe_labels_and_facts(saved):
     card = json.loads(saved.with_suffix('.json').read_text())
     assert card['labels'] == ['cork', 'felt', 'slate', 'wood']
-    assert card['recipe']['learner']['mlp']['hidden'] == 256
+    assert card['recipe']['learner']['mlp']['hidden'] == 192
     assert card['accuracy'] == 0.98
 
 

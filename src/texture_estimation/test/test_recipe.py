@@ -71,7 +71,7 @@ def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_reci
 
 def test_augmentation_is_a_section_of_training_that_only_a_network_takes():
     recipe = load_recipe('default')
-    assert recipe.augmentation.copies == 8
+    assert recipe.augmentation.copies == 4
     assert Recipe.from_mapping(recipe.as_mapping(), 'default') == recipe
     assert 'augmentation' not in load_recipe('kaboli-svm').as_mapping()['training']
     content = {'inputs': {'signal': {'features': ['hjorth']}}, 'training': {'augmentation': {'copies': 3}}}

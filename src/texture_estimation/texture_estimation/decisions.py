@@ -23,6 +23,8 @@ from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes
 from texture_features.examples import Interval, SlideConditions
 
+Mask = NDArray[np.bool_]
+
 # --------------------
 # Distance of the mean features of a slide to the training slides of one class.
 
@@ -104,11 +106,11 @@ class ClassDistance:
 
     @cached_property
     def _own(self) -> dict[int, tuple[Array, Array]]:
-        """Slides of each class relative to the centre, (n_own, n_directions), and half their squares, (n_own,)."""
+        """Slides of each class relative to the centre, (n_directions, n_own), and half their squares, (n_own,)."""
         found = {}
         for code in np.unique(self.classes).tolist():
             own = self.references[self.classes == code] - self.centre
-            found[code] = (own, 0.5 * np.einsum('ij,ij->i', own, own))
+            found[code] = (own.T, 0.5 * np.einsum('ij,ij->i', own, own))
         return found
 
     @cached_property
@@ -121,28 +123,30 @@ class ClassDistance:
         """What the square along each direction counts less about the centre than about a slide, (n_directions,)."""
         return 1.0 - self.weights
 
-    def score(self, mean: Array, code: int) -> float:
-        """Return the score of the mean features (n_features,) of a slide for a class; infinite without its slides.
+    def score(self, mean: Array, code: int) -> Array:
+        """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides.
 
         Parameters
         ----------
-        mean : (n_features,)
-            Mean features of the slide.
+        mean : (..., n_features)
+            Mean features of slides.
         code
             Number of the label.
         """
         found = self._own.get(code)
         if found is None:
-            return np.inf
+            return np.full(mean.shape[:-1], np.inf)
         own, half_squares = found
         away = mean @ self._directions
         away -= self.centre
         # Half the squared distances, less half the square of what is away from the centre.
-        halves = half_squares - own @ away
-        if len(halves) > NEAREST:
+        halves = half_squares - away @ own
+        if halves.shape[-1] > NEAREST:
             halves.partition(NEAREST - 1)
-            halves = halves[:NEAREST]
-        return 2.0 * float(np.add.reduce(halves)) / len(halves) + float((away * away) @ self._nearer)
+            halves = halves[..., :NEAREST]
+        nearest: Array = np.add.reduce(halves, axis=-1) * (2.0 / halves.shape[-1])
+        nearest += (away * away) @ self._nearer
+        return nearest
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:
         """Return the distance with more reference slides, (n_slides, n_features) and (n_slides,).
@@ -249,6 +253,14 @@ class ConfidenceFloor:
         if FLOOR_ENTRY not in card:
             raise InvalidData(f"its card has no entry '{FLOOR_ENTRY}', the smallest confidence of known surfaces")
         return cls(**{name: tuple(map(float, values)) for name, values in card[FLOOR_ENTRY].items()})
+
+    def reached_by(self, confidences: Array, effective_windows: Array) -> Mask:
+        """Return what `reached` does for each window of a slide, (n_windows,)."""
+        if not self.log_odds:
+            return np.ones(len(confidences), dtype=bool)
+        least = np.interp(effective_windows, self.effective_window_counts, self.log_odds)
+        above: Mask = confidences >= 1.0 / (1.0 + np.exp(-least))
+        return above
 
     def reached(self, confidence: float, effective_windows: float) -> bool:
         """Return whether a known surface may have so little confidence.
@@ -935,6 +947,24 @@ class NoveltyDetector:
         tails = zip(scores, row[1 : 1 + count], row[1 + count :], strict=False)
         return sum((score - median) / spread for score, median, spread in tails if score > median), row[0]
 
+    def scores_and_thresholds(self, scores: Array, effective_windows: Array) -> tuple[Array, Array]:
+        """Return what `score_and_threshold` does for each window of a slide, (n_windows,) each.
+
+        Parameters
+        ----------
+        scores : (n_windows, n_scores)
+            As `slide_scores` returns them.
+        effective_windows : (n_windows,)
+            Effective window count after each.
+        """
+        levels = np.array(self._levels)
+        places = np.interp(effective_windows, NOVELTY_WINDOWS, np.arange(len(levels)))
+        rows = np.minimum(places.astype(np.intp), len(levels) - 2)
+        table = levels[rows] + (places - rows)[:, None] * (levels[rows + 1] - levels[rows])
+        count = table.shape[1] // 2
+        tails = np.maximum(scores[:, :count] - table[:, 1 : 1 + count], 0.0) / table[:, 1 + count :]
+        return tails.sum(axis=1), table[:, 0]
+
     def _row(self, effective_windows: float) -> list[float]:
         """Return the row of `_levels`, linear between two levels."""
         after = bisect_right(NOVELTY_WINDOWS, effective_windows)
@@ -1070,8 +1100,48 @@ class SlideNovelty:
     def _distance(self, space: str, label: int) -> float:
         found = self._found[space]
         if label not in found:
-            found[label] = self._distances[space].score(self._sums[space] / self._counts[space], label)
+            found[label] = float(self._distances[space].score(self._sums[space] / self._counts[space], label))
         return found[label]
+
+
+def slide_scores(
+    distances: Mapping[str, ClassDistance],
+    values: Array,
+    hidden: Array | None,
+    evidence: Array,
+    *,
+    means: Array,
+    effective_windows: Array,
+) -> Array:
+    """Return what `SlideNovelty` gives window by window for a whole slide at once, (n_windows, n_scores).
+
+    Parameters
+    ----------
+    distances
+        By space, as in `NoveltyDetector`.
+    values : (n_windows, n_features)
+    hidden : (n_windows, n_hidden) or None
+        Outputs of the hidden layer.
+    evidence, means : (n_windows, n_labels)
+        Evidence of each window alone, and its mean after each window.
+    effective_windows : (n_windows,)
+        Effective window count after each window.
+    """
+    counts = np.arange(1, len(values) + 1)
+    labels = means.argmax(axis=1)
+    highest = np.sort(means, axis=1)[:, -2:]
+    votes = np.cumsum(evidence.argmax(axis=1)[:, None] == np.arange(means.shape[1]), axis=0)
+    scores = np.empty((len(values), len(distances) + len(OTHER_SCORES)))
+    scores[:, -2] = highest[:, 0] - highest[:, 1]
+    scores[:, -1] = -votes[counts - 1, labels] / counts
+    for column, (space, distance) in enumerate(distances.items()):
+        own = hidden if space == HIDDEN and hidden is not None else values
+        summed = max(1, int(np.searchsorted(effective_windows, SPACES[space] + 1e-9, side='right')))
+        starts = np.cumsum(own[:summed], axis=0) / counts[:summed, None]
+        for label in set(labels.tolist()):
+            taken = labels == label
+            scores[taken, column] = distance.score(starts, label)[np.minimum(counts[taken], summed) - 1]
+    return scores
 
 
 def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str, Array]:
@@ -1226,7 +1296,6 @@ def _rank(slides: int, coverage: float) -> int:
 # --------------------
 # Early stopping of a slide by a rule fitted on held-out slides.
 
-Mask = NDArray[np.bool_]
 # Rules tried: end at this confidence and novelty score, or after so much sliding whatever they are. Without a novelty
 # detector the novelty score is 0. In windows that do not overlap.
 CONFIDENCES = 1.0 - np.geomspace(0.5, 1e-4, 50)

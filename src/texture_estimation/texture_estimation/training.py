@@ -10,7 +10,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from texture_core.errors import InvalidData
@@ -26,10 +25,12 @@ from texture_estimation.decisions import (
     ConfidenceFloor,
     Domain,
     ErrorBound,
+    Mask,
     NoveltyDetector,
-    SlideNovelty,
     fit_confidence_floor,
+    slide_scores,
     space_means,
+    window_count,
 )
 from texture_estimation.evidence_rules import EvidenceRule, deciding_rows, running_means
 from texture_estimation.gaussians import TrainingExamples
@@ -130,9 +131,10 @@ def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
     `runs` are the numbers of the slides or copies to which the windows belong, (n,).
     """
     starting = max(1, round(examples.window_s / examples.hop_s))
-    times = np.ones(len(runs), dtype=np.intp)
-    for run in np.unique(runs):
-        times[np.flatnonzero(runs == run)[:starting]] = start_weight
+    order = np.argsort(runs, kind='stable')
+    ordered = runs[order]
+    times = np.empty(len(runs), dtype=np.intp)
+    times[order] = np.where(np.arange(len(runs)) - np.searchsorted(ordered, ordered) < starting, start_weight, 1)
     return times
 
 
@@ -146,7 +148,7 @@ def _augmented_examples(
     names, first = np.unique(examples.groups, return_index=True)
     own = np.isin(copies.groups, names)
     copied = np.searchsorted(names, copies.groups[own])
-    runs = np.unique(np.stack([copied, copies.copies[own]]), axis=1, return_inverse=True)[1].reshape(-1)
+    runs = copied * (int(copies.copies.max(initial=0)) + 1) + copies.copies[own]
     means = group_means(examples.values, groups)
     classes = codes[first]
     centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
@@ -239,8 +241,8 @@ REFERENCE_COPIES = 6
 
 
 @dataclass(frozen=True, eq=False)
-class SlideTrace:
-    """One held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it.
+class HeldOutSlide:
+    """A held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it.
 
     Parameters
     ----------
@@ -250,23 +252,37 @@ class SlideTrace:
         Mean evidence after each window.
     effective_windows : (n_windows,)
         Length of the evidence.
-    scores : (n_windows, n_scores)
-        Of its novelty; (n_windows, 0) where none were computed.
+    scores : (n_windows, n_scores) or None
+        Of its novelty; None where none were computed.
     disturbance
         Kind of the disturbance; '' for none.
 
     Examples
     --------
-    >>> trace = SlideTrace(0, np.log([[0.7, 0.3], [0.8, 0.2]]), np.array([1.0, 1.2]), np.zeros((2, 0)))
-    >>> bool((trace.means.argmax(axis=1) == trace.truth).all())
+    >>> slide = HeldOutSlide(0, np.log([[0.7, 0.3], [0.8, 0.2]]), np.array([1.0, 1.2]))
+    >>> bool((slide.means.argmax(axis=1) == slide.truth).all())
     True
     """
 
     truth: int
     means: Array
     effective_windows: Array
-    scores: Array
+    scores: Array | None = None
     disturbance: str = ''
+
+    def posterior(self, rule: EvidenceRule, tempering_exponent: float) -> Array:
+        """Return the log-probabilities after each window.
+
+        Returns
+        -------
+        (n_windows, n_labels)
+        """
+        return rule.log_posterior(self.means, self.effective_windows[:, None], tempering_exponent)
+
+    def right(self, posterior: Array) -> Mask:
+        """Return whether the label after each window is the true one alone, (n_windows,)."""
+        right: Mask = (posterior.argmax(axis=1) == self.truth) & ~is_tied(posterior)
+        return right
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,7 +327,7 @@ def fit_novelty(
     *,
     gain_range: float = 1.0,
     scores: Collection[str] = SCORES,
-) -> tuple[NoveltyDetector, Sequence[SlideTrace]] | None:
+) -> tuple[NoveltyDetector, Sequence[HeldOutSlide]] | None:
     """Return the detector, and the held-out slides and disturbed copies by which it was fitted.
 
     Returns None if there are too few slides: MIN_SLIDES of each class are needed, and in all MIN_ALL_SLIDES or one over
@@ -336,7 +352,7 @@ def fit_novelty(
 
     Returns
     -------
-    (NoveltyDetector, sequence of SlideTrace), or None
+    (NoveltyDetector, sequence of HeldOutSlide), or None
     """
     classes = np.unique(examples.labels, return_inverse=True)[1]
     names, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
@@ -354,7 +370,7 @@ def fit_novelty(
     # what says when and how a window was made, and not what of: not compared
     apart = {temporal.SLIDE_ONSET, FORCE} if isinstance(learner, ForceDiscriminant) else {temporal.SLIDE_ONSET}
     compared = np.array([name.rsplit('/', 1)[-1] not in apart for name in examples.names], dtype=np.float64)
-    traces: list[SlideTrace] = []
+    traces: list[HeldOutSlide] = []
     for held_out, predictor in _folds(learner, fitted, classes, groups, held_out_parts(examples)):
         distances = _fit_distances(
             [slide for slide in slides if slide.group not in held_out],
@@ -364,6 +380,7 @@ def fit_novelty(
             compared=compared,
             scores=scores,
         )
+        hidden = hidden_layer(predictor) if predictor is not None else None
         for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
             values = slide.values
             trusted: Array | float = 1.0
@@ -374,10 +391,12 @@ def fit_novelty(
             else:
                 continue
             evidence = rule.window_evidence(log_probabilities)
-            effective_windows = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
-            means = running_means(rule, evidence, effective_windows, trusted)
-            followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
-            traces.append(_with_scores(followed, values, evidence, predictor, distances))
+            means, effective_windows = _follow(rule, evidence, overlap, trusted)
+            activations = hidden(values) if hidden else None
+            found = slide_scores(
+                distances, values, activations, evidence, means=means, effective_windows=effective_windows
+            )
+            traces.append(HeldOutSlide(slide.truth, means, effective_windows, found, slide.disturbance))
     final = learner.predictor(fitted.parameters)
     layered = final if hidden_layer(final) else None
     distances = _fit_distances(slides, copies, layered, overlap, compared=compared, scores=scores)
@@ -460,35 +479,16 @@ def _fit_distances(
 def _space_means(
     values: Array, hidden: Callable[[Array], Array] | None, overlap: float, compared: Array
 ) -> dict[str, Array]:
-    return space_means(compared * values, hidden(values) if hidden else None, overlap)
+    start = values[: window_count(NOVELTY_WINDOWS[-1], overlap)]  # later windows are in no mean
+    return space_means(compared * start, hidden(start) if hidden else None, overlap)
 
 
-def _with_scores(
-    trace: SlideTrace,
-    values: Array,
-    evidence: Array,
-    predictor: Predictor | None,
-    distances: Mapping[str, ClassDistance],
-) -> SlideTrace:
-    """Return the trace of a slide, whose windows have these features and gave this evidence, with its scores."""
-    hidden = hidden_layer(predictor) if predictor is not None else None
-    activations = hidden(values) if hidden else [None] * len(values)
-    highest = np.sort(trace.means, axis=1)[:, -2:]
-    novelty = SlideNovelty(distances, evidence.shape[1])
-    scores = []
-    for number, label in enumerate(trace.means.argmax(axis=1).tolist()):
-        effective_windows = float(trace.effective_windows[number])
-        novelty.add(values[number], activations[number], int(evidence[number].argmax()), effective_windows)
-        scores.append(novelty.scores(label, float(highest[number, 1] - highest[number, 0])))
-    return replace(trace, scores=np.array(scores))
-
-
-def _scores_at(traces: Sequence[SlideTrace], effective_windows: float) -> Array:
+def _scores_at(traces: Sequence[HeldOutSlide], effective_windows: float) -> Array:
     """Return the scores of undisturbed slides with the right label after so many windows, (n_slides, n_scores)."""
     found = []
     for trace in traces:
         place = int(np.abs(trace.effective_windows - effective_windows).argmin())
-        if not trace.disturbance and int(trace.means[place].argmax()) == trace.truth:
+        if trace.scores is not None and not trace.disturbance and int(trace.means[place].argmax()) == trace.truth:
             found.append(trace.scores[place])
     return np.array(found)
 
@@ -498,32 +498,6 @@ def _scores_at(traces: Sequence[SlideTrace], effective_windows: float) -> Array:
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_TEMPERING_EXPONENT = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class HeldOutSlide:
-    """A held-out slide: mean log-evidence and effective window count after each window.
-
-    Examples
-    --------
-    >>> means = np.log([[0.6, 0.4], [0.8, 0.2]])
-    >>> slide = HeldOutSlide(truth=0, means=means, effective_window_counts=np.array([1.0, 1.5]))
-    >>> slide.means.argmax(axis=1).tolist()
-    [0, 0]
-    """
-
-    truth: int
-    means: Array
-    effective_window_counts: Array
-
-    def posterior(self, rule: EvidenceRule, tempering_exponent: float) -> Array:
-        """Return the log-probabilities after each window.
-
-        Returns
-        -------
-        (n_windows, n_labels)
-        """
-        return rule.log_posterior(self.means, self.effective_window_counts[:, None], tempering_exponent)
 
 
 def held_out_slides(
@@ -579,8 +553,8 @@ def fit_tempering_exponent(slides: Sequence[HeldOutSlide], rule: EvidenceRule) -
     if not slides:
         return DEFAULT_TEMPERING_EXPONENT
     mean = np.concatenate([slide.means for slide in slides])
-    effective_window_counts = np.concatenate([slide.effective_window_counts for slide in slides])[:, None]
-    truth = np.concatenate([np.full(len(slide.effective_window_counts), slide.truth) for slide in slides])
+    effective_window_counts = np.concatenate([slide.effective_windows for slide in slides])[:, None]
+    truth = np.concatenate([np.full(len(slide.effective_windows), slide.truth) for slide in slides])
 
     def loss(tempering_exponent: float) -> float:
         return log_loss(rule.log_posterior(mean, effective_window_counts, tempering_exponent), truth)
@@ -642,14 +616,14 @@ def fit_open_set(
 
 
 def _course(
-    trace: SlideTrace, detector: NoveltyDetector, rule: EvidenceRule, tempering_exponent: float
+    trace: HeldOutSlide, detector: NoveltyDetector, rule: EvidenceRule, tempering_exponent: float
 ) -> stopping_rule.SlideCourse:
-    posterior = rule.log_posterior(trace.means, trace.effective_windows[:, None], tempering_exponent)
-    steps = list(zip(trace.scores.tolist(), trace.effective_windows.tolist(), strict=True))
-    novelty_scores, thresholds = np.array([detector.score_and_threshold(*step) for step in steps]).T
+    posterior = trace.posterior(rule, tempering_exponent)
+    scores = np.zeros((len(posterior), 0)) if trace.scores is None else trace.scores
+    novelty_scores, thresholds = detector.scores_and_thresholds(scores, trace.effective_windows)
     return stopping_rule.SlideCourse(
         confidences=np.exp(posterior.max(axis=1)),
-        right=(posterior.argmax(axis=1) == trace.truth) & ~is_tied(posterior),
+        right=trace.right(posterior),
         effective_windows=trace.effective_windows,
         known=novelty_scores <= thresholds,
         novelty_scores=novelty_scores,
@@ -684,8 +658,7 @@ def _fit_floor(courses: Sequence[stopping_rule.SlideCourse], rate: float, max_er
 
 def _with_floor(course: stopping_rule.SlideCourse, floor: ConfidenceFloor) -> stopping_rule.SlideCourse:
     """Return a course that is known only where its confidence reaches the floor, too."""
-    steps = zip(course.confidences.tolist(), course.effective_windows.tolist(), strict=True)
-    return replace(course, known=course.known & np.array([floor.reached(*step) for step in steps]))
+    return replace(course, known=course.known & floor.reached_by(course.confidences, course.effective_windows))
 
 
 def _fit_stopping(
@@ -695,14 +668,9 @@ def _fit_stopping(
     if not slides:
         return stopping_rule.StoppingRule()
     posteriors = [slide.posterior(rule, tempering_exponent) for slide in slides]
-    right: list[NDArray[np.bool_]] = [
-        (posterior.argmax(axis=1) == slide.truth) & ~is_tied(posterior)
-        for slide, posterior in zip(slides, posteriors, strict=True)
-    ]
+    right = [slide.right(posterior) for slide, posterior in zip(slides, posteriors, strict=True)]
     confidences = [np.exp(posterior.max(axis=1)) for posterior in posteriors]
-    return stopping_rule.fit_stopping_rule(
-        confidences, right, [slide.effective_window_counts for slide in slides], wrong
-    )
+    return stopping_rule.fit_stopping_rule(confidences, right, [slide.effective_windows for slide in slides], wrong)
 
 
 def fit_prediction_sets(
@@ -729,7 +697,7 @@ def fit_prediction_sets(
         return prediction_sets.PredictionSets(coverage)
     posteriors = [slide.posterior(rule, tempering_exponent) for slide in slides]
     return prediction_sets.fit_prediction_sets(
-        posteriors, [slide.truth for slide in slides], [slide.effective_window_counts for slide in slides], coverage
+        posteriors, [slide.truth for slide in slides], [slide.effective_windows for slide in slides], coverage
     )
 
 

@@ -57,7 +57,7 @@ def cut(params, slide_s=3.0, tone_hz=TONE_HZ):
 def augmented(**params):
     augmenter = Augmenter(FEATURES, Augmentation(**{'copies': 2, **params}))
     for name in ('cork/1', 'cork/2'):
-        augmenter.add(name, cut)
+        augmenter.add(name, cut(FEATURES.windows), cut)
     return augmenter.result()
 
 

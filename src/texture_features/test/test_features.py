@@ -6,7 +6,7 @@ from scipy import signal as scipy_signal
 from scipy.signal import lfilter
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_features.feature import ArraySpeedEstimator, WindowBatch
+from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES
 from texture_features.features.spectral import LogBands, PacinianPower, PeakToMedianPower, SpectralExponent
 from texture_features.features.taxels import SpatialBandPower, SpatialVariation
@@ -394,22 +394,6 @@ def test_shape_has_its_closed_forms():
     assert (level, log_variance) == (pytest.approx(-3.5), pytest.approx(np.log(5.25)))
     assert (rise, absolute, above) == (pytest.approx(-6.0), pytest.approx(6.0), pytest.approx(0.5))
     assert skewness == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize('speed', SPEEDS_M_S)
-def test_the_array_reports_its_own_speed_on_a_surface_it_never_met(speed):
-    trained = [(slide(0.04, surface=rough(seed)), SPATIAL_RATE_HZ, 0.04) for seed in range(4)]
-    tried = np.geomspace(0.01, 0.2, 200)
-    for estimator in (ArraySpeedEstimator.fit(trained), ArraySpeedEstimator.from_positions(PLACES_M)):
-        found = estimator(slide(speed, surface=rough(9)), SPATIAL_RATE_HZ, tried)
-        assert found == pytest.approx(speed, rel=0.05)
-
-
-def test_positions_of_taxels_are_estimated_to_a_tenth_of_a_millimetre():
-    training = ArraySpeedEstimator.fit([(slide(0.04, surface=rough(seed)), SPATIAL_RATE_HZ, 0.04) for seed in range(4)])
-    np.testing.assert_allclose(training.offsets_m, ArraySpeedEstimator.from_positions(PLACES_M).offsets_m, atol=2e-4)
-    with pytest.raises(InvalidData, match='no slides'):
-        ArraySpeedEstimator.fit([])
 
 
 def test_shares_keep_the_sign_and_leave_the_noise_of_free_taxels_out():

@@ -8,15 +8,17 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Protocol
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
+from scipy.signal import firwin, resample_poly
 
 from texture_core.config import param
 from texture_core.types import NANOSECONDS, Array
-from texture_features.feature_set import FeatureSet
+from texture_features.feature import WindowBatch
+from texture_features.feature_set import CHUNK, MOTION, FeatureSet
 from texture_features.windows import CutWindow, WindowEvent, WindowParams
 
 # --------------------
@@ -127,26 +129,9 @@ class SlideWindows:
         return rms
 
 
-class Disturbance(Protocol):
-    """Changes windows as a disturbance of some strength would."""
-
-    def __call__(self, windows: SlideWindows, strength: float, rng: np.random.Generator, /) -> Array:
-        """Return the samples of the windows with the disturbance.
-
-        Parameters
-        ----------
-        windows
-            Windows of one input.
-        strength
-            How strong; each disturbance says in which unit.
-        rng
-            Source of all that is random.
-
-        Returns
-        -------
-        (n_windows, n_samples, n_channels)
-            In the unit of the signal.
-        """
+# Takes the windows of one input, a strength, of which each disturbance says the unit, and the source of all that is
+# random; returns the samples (n_windows, n_samples, n_channels) as the disturbance would change them.
+Disturbance = Callable[[SlideWindows, float, np.random.Generator], Array]
 
 
 def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
@@ -171,9 +156,17 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
     longer = windows.samples
     ratio = Fraction(1.0 / speed).limit_denominator(RATIO_LIMIT)
     if ratio != 1:
-        longer = resample_poly(longer, ratio.numerator, ratio.denominator, axis=1, padtype='line')
+        taps = _resampling_filter(max(ratio.numerator, ratio.denominator))
+        longer = resample_poly(longer, ratio.numerator, ratio.denominator, axis=1, window=taps, padtype='line')
     resampled: Array = longer[:, :count]
     return resampled
+
+
+@lru_cache(maxsize=RATIO_LIMIT)
+def _resampling_filter(rate: int) -> Array:
+    """Return the low-pass that `resample_poly` makes anew at each call, which takes as long as the rest of the call."""
+    taps: Array = firwin(20 * rate + 1, 1.0 / rate, window=('kaiser', 5.0))
+    return taps
 
 
 def add_noise(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
@@ -269,42 +262,17 @@ def smooth_response(count: int, strength_db: float, rng: np.random.Generator) ->
     return response
 
 
-@dataclass(frozen=True)
-class StrengthRange:
-    """A disturbance, and its smallest and largest strength on which early stopping is fitted.
-
-    Parameters
-    ----------
-    disturbance
-        None for a change of speed, which needs longer windows.
-    weakest, strongest
-        From harmless to useless.
-
-    Examples
-    --------
-    >>> gain = StrengthRange(amplify, 0.4, 2.5)
-    >>> 0.4 <= gain.draw(np.random.default_rng(0)) <= 2.5
-    True
-    """
-
-    disturbance: Disturbance | None
-    weakest: float
-    strongest: float
-
-    def draw(self, rng: np.random.Generator) -> float:
-        """Return a strength, uniform in its logarithm."""
-        return math.exp(rng.uniform(math.log(self.weakest), math.log(self.strongest)))
-
-
-DISTURBANCES: Mapping[str, StrengthRange] = {
-    'speed': StrengthRange(None, 0.35, 2.2),
-    'gain': StrengthRange(amplify, 0.4, 2.5),
-    'noise': StrengthRange(add_noise, 0.003, 0.3),
-    'finger': StrengthRange(other_finger, 0.3, 5.0),
-    'drift': StrengthRange(add_drift, 0.1, 10.0),
-    'held': StrengthRange(hold_lost, 0.003, 0.3),
-    'clipped': StrengthRange(clip, 0.7, 4.0),
-    'low-pass': StrengthRange(low_pass, 0.1, 1.0),
+# Of each kind the disturbance, and its smallest and largest strength on which early stopping is fitted: from harmless
+# to useless. A change of speed has none, as it needs longer windows.
+DISTURBANCES: Mapping[str, tuple[Disturbance | None, float, float]] = {
+    'speed': (None, 0.35, 2.2),
+    'gain': (amplify, 0.4, 2.5),
+    'noise': (add_noise, 0.003, 0.3),
+    'finger': (other_finger, 0.3, 5.0),
+    'drift': (add_drift, 0.1, 10.0),
+    'held': (hold_lost, 0.003, 0.3),
+    'clipped': (clip, 0.7, 4.0),
+    'low-pass': (low_pass, 0.1, 1.0),
 }
 KINDS = tuple(DISTURBANCES)
 
@@ -385,6 +353,7 @@ NOISE = 'noise'
 PROBABILITY = 0.5  # of a change of speed, and of noise, in a copy
 Cut = Callable[[WindowParams], Sequence[WindowEvent]]
 Batches = Mapping[str, SlideWindows]
+Copy = tuple[NDArray[np.float32], str, int, str]  # values (n_windows, n_features), slide, number, kind
 
 
 class Augmenter:
@@ -402,7 +371,7 @@ class Augmenter:
     Examples
     --------
     >>> augmenter = Augmenter(FeatureSet.load('fast'), Augmentation(copies=2))
-    >>> augmenter.add('slide', lambda params: [])  # a slide without a window has no copies
+    >>> augmenter.add('slide', [], lambda params: [])  # a slide without a window has no copies
     >>> augmenter.result() is None
     True
     """
@@ -412,23 +381,25 @@ class Augmenter:
         self._augmentation = augmentation
         self._seed = seed
         self._slides = 0
-        self._copies: list[tuple[Array, str, int, str]] = []
-        self._disturbed: list[tuple[Array, str, int, str]] = []
+        self._copies: list[Copy] = []
+        self._disturbed: list[Copy] = []
         self._responses: list[Array] = []
 
-    def add(self, name: str, cut: Cut) -> None:
+    def add(self, name: str, events: Sequence[WindowEvent], cut: Cut) -> None:
         """Add the copies of a slide.
 
         Parameters
         ----------
         name
             Of the slide, as in the labelled features.
+        events
+            Its windows as the feature set cuts them.
         cut
-            Returns the windows of the slide for the given length and hop.
+            Returns the windows of the slide for another length.
         """
         rng = np.random.default_rng([self._seed, self._slides])
         self._slides += 1
-        windows = [event for event in cut(self._features.windows) if isinstance(event, CutWindow)]
+        windows = [event for event in events if isinstance(event, CutWindow)]
         if not windows:
             return
         self._responses.append(self._gain_response(windows[0]))
@@ -448,7 +419,7 @@ class Augmenter:
         if not self._copies:
             return None
         response: Array = np.mean(self._responses, axis=0)
-        return AugmentedFeatures(_gathered(self._copies), _gathered(self._disturbed or self._copies[:0]), response)
+        return AugmentedFeatures(_gathered(self._copies), _gathered(self._disturbed), response)
 
     def _longer(self, cut: Cut, times: float) -> list[CutWindow]:
         """Return longer windows, from which others can be cut at a higher speed."""
@@ -457,7 +428,9 @@ class Augmenter:
         params = dataclasses.replace(own, length_s=own.length_s * times + 0.02)
         return [event for event in cut(params) if isinstance(event, CutWindow)]
 
-    def _augmented(self, longer: Sequence[CutWindow], like: CutWindow, rng: np.random.Generator) -> tuple[Array, str]:
+    def _augmented(
+        self, longer: Sequence[CutWindow], like: CutWindow, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float32], str]:
         widest = math.log1p(self._augmentation.speed_range)
         speed = math.exp(rng.uniform(-widest, widest)) if rng.random() < PROBABILITY else 1.0
         batches = _at_speed(_batches(longer, self._features.window_names), like, speed)
@@ -465,38 +438,45 @@ class Augmenter:
         if noisy:
             strength = self._augmentation.noise_range * rng.random() ** 2
             batches = _changed(batches, lambda windows: add_noise(windows, strength, rng))
-        return self._extract(batches, longer, like, speed), NOISE if noisy else ''
+        return self._extract(batches, longer, speed), NOISE if noisy else ''
 
-    def _disturb(self, kind: str, cut: Cut, windows: Sequence[CutWindow], rng: np.random.Generator) -> Array | None:
-        strengths = DISTURBANCES[kind]
-        strength = strengths.draw(rng)
-        disturbance = strengths.disturbance
+    def _disturb(
+        self, kind: str, cut: Cut, windows: Sequence[CutWindow], rng: np.random.Generator
+    ) -> NDArray[np.float32] | None:
+        disturbance, weakest, strongest = DISTURBANCES[kind]
+        strength = math.exp(rng.uniform(math.log(weakest), math.log(strongest)))
         if disturbance is None:
             longer = self._longer(cut, max(strength, 1.0))
             if not longer:
                 return None
             batches = _at_speed(_batches(longer, self._features.window_names), windows[0], strength)
-            return self._extract(batches, longer, windows[0], strength)
+            return self._extract(batches, longer, strength)
         batches = _changed(
             _batches(windows, self._features.window_names), lambda batch: disturbance(batch, strength, rng)
         )
-        return self._extract(batches, windows, windows[0], 1.0)
+        return self._extract(batches, windows, 1.0)
 
-    def _extract(self, batches: Batches, windows: Sequence[CutWindow], like: CutWindow, speed: float) -> Array:
+    def _extract(self, batches: Batches, windows: Sequence[CutWindow], speed: float) -> NDArray[np.float32]:
         """Return the features (n_windows, n_features) of changed samples."""
-        events = [
-            dataclasses.replace(
-                window,
-                length_s=like.length_s,
-                speed_m_s=speed * window.speed_m_s,
-                windows={
-                    topic: dataclasses.replace(window.windows[topic], samples=batch.samples[number])
+        motion: dict[str, Any] = {name: np.array([getattr(window, name) for window in windows]) for name in MOTION}
+        motion['speed_m_s'] *= speed
+        parts = [slice(start, start + CHUNK) for start in range(0, len(windows), CHUNK)]
+        channels = {topic: windows[0].windows[topic].channels for topic in batches}
+        values = [
+            self._features.values(
+                [
+                    WindowBatch(
+                        batch.samples[part],
+                        batch.rate_hz,
+                        channels=channels[topic],
+                        **{name: each[part] for name, each in motion.items()},
+                    )
                     for topic, batch in batches.items()
-                },
+                ]
             )
-            for number, window in enumerate(windows)
+            for part in parts
         ]
-        return np.stack([vector.values for vector in self._features.extract_many(events)])
+        return np.concatenate(values).astype(np.float32)
 
     def _gain_response(self, window: CutWindow) -> Array:
         topic = self._features.window_names[0]
@@ -532,11 +512,11 @@ def _at_speed(batches: Batches, like: CutWindow, speed: float) -> Batches:
     }
 
 
-def _gathered(parts: Sequence[tuple[Array, str, int, str]]) -> FeatureCopies:
+def _gathered(parts: Sequence[Copy]) -> FeatureCopies:
     lengths = [len(values) for values, *_ in parts]
     if not parts:
         nothing = np.zeros(0, dtype=str)
         return FeatureCopies(np.zeros((0, 0), np.float32), nothing, np.zeros(0, np.intp), nothing)
     groups, copies, kinds = (np.repeat([part[column] for part in parts], lengths) for column in (1, 2, 3))
-    values = np.concatenate([values.astype(np.float32) for values, *_ in parts])
+    values = np.concatenate([values for values, *_ in parts])
     return FeatureCopies(values, groups, copies.astype(np.intp), kinds)

@@ -451,21 +451,28 @@ class SlideCoverage:
         states = self._states
         while len(states) > 1 and states[1][1].stamp_ns <= start and states[0][0] < end:
             states.popleft()
-        speeds = _WeightedMean()
-        forces = _WeightedMean()
-        tangential = _WeightedMean()
-        directions = _MeanDirection()
+        held: list[tuple[int, ExplorationState]] = []  # for how long each state holds in the span, ns
         for number, (covered, state) in enumerate(states):
-            enough = covered >= end
-            until = end if enough else min(states[number + 1][1].stamp_ns, end)
+            until = end if covered >= end else min(states[number + 1][1].stamp_ns, end)
             weight = until - max(state.stamp_ns, start)
-            speeds.add(state.speed_m_s, weight)
-            forces.add(state.force_n, weight)
-            tangential.add(state.tangential_force_n, weight)
-            directions.add(state.direction_rad, weight)
-            if enough or until >= end:
+            if weight > 0:
+                held.append((weight, state))
+            if until >= end:
                 break
-        return CoveredSpan(start, end, speeds.value, forces.value, directions.value, tangential.value)
+        speed_m_s = _mean([(weight, state.speed_m_s) for weight, state in held])
+        force_n = _mean([(weight, state.force_n) for weight, state in held])
+        tangential_n = _mean([(weight, state.tangential_force_n) for weight, state in held])
+        # The direction of the sum of unit vectors: angles have no mean.
+        headings = [(weight, state.direction_rad) for weight, state in held if math.isfinite(state.direction_rad)]
+        way = sum(cmath.rect(weight, heading) for weight, heading in headings)
+        return CoveredSpan(start, end, speed_m_s, force_n, cmath.phase(way) if way else math.nan, tangential_n)
+
+
+def _mean(weighted: Sequence[tuple[float, float]]) -> float:
+    """Return the weighted mean of the values that are known; NaN without any."""
+    known = [(weight, value) for weight, value in weighted if math.isfinite(value)]
+    total = sum(weight for weight, _ in known)
+    return sum(weight * value for weight, value in known) / total if total else math.nan
 
 
 class _WeightedMean:
@@ -483,21 +490,6 @@ class _WeightedMean:
     @property
     def value(self) -> float:
         return self._sum / self._weight if self._weight else math.nan
-
-
-class _MeanDirection:
-    """Weighted mean of the directions that are known, as that of their unit vectors."""
-
-    def __init__(self) -> None:
-        self._sum = 0j
-
-    def add(self, direction_rad: float, weight: float) -> None:
-        if weight > 0 and math.isfinite(direction_rad):
-            self._sum += cmath.rect(weight, direction_rad)
-
-    @property
-    def value(self) -> float:
-        return cmath.phase(self._sum) if self._sum else math.nan
 
 
 def _steady_ns(steady_s: float) -> int:

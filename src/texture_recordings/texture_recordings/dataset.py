@@ -32,6 +32,7 @@ from texture_core.types import (
     SlideMotion,
     TactileSignal,
     Window,
+    join_batches,
 )
 from texture_features.examples import LabelledFeatures
 from texture_features.feature import WindowBatch
@@ -39,7 +40,7 @@ from texture_features.windows import CutWindow, WindowEvent, WindowParams, cut_r
 from texture_recordings.bags import find_bags, read_bag
 
 if TYPE_CHECKING:
-    from texture_features.augmentation import Augmentation, AugmentedFeatures
+    from texture_features.augmentation import Augmentation
     from texture_features.feature_set import FeatureSet
 
 
@@ -375,10 +376,16 @@ def _slide(
     for topic, _, value in messages[first:last]:
         streams[topic].append(value)
     heard = streams.pop(STATES)
+    began = [now.stamp_ns for was, now in pairwise([None, *heard]) if _begins(was, now)]
+    # A hundred small batches a second take ten times the memory of their samples, and most of the time of the cutter.
+    signals = {topic: join_batches(batches, began) for topic, batches in streams.items()}
     return LabelledSlide(
-        path, states[0].exploration_id, surface, 0, start_ns, stop_ns, namespace, motion_made(states), dict(streams),
-        heard,
-    )  # fmt: skip
+        path, states[0].exploration_id, surface, 0, start_ns, stop_ns, namespace, motion_made(states), signals, heard
+    )
+
+
+def _begins(was: ExplorationState | None, now: ExplorationState) -> bool:
+    return now.phase is Phase.SLIDE and (was is None or was.phase is not Phase.SLIDE)
 
 
 def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
@@ -720,8 +727,7 @@ class SlideDataset:
             If a slide has nothing of an input.
         """
         for slide, events in self.windows(feature_set):
-            vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
-            yield slide, [replace(vector, exploration_id=slide.name) for vector in vectors]
+            yield slide, _described(slide, feature_set, events)
 
     def features(
         self, feature_set: FeatureSet, augmentation: Augmentation | None = None, touch_s: float = 0.0
@@ -749,7 +755,16 @@ class SlideDataset:
         ModelMismatch
             If a slide lacks an input, or the slides differ in rates or channels.
         """
-        vectors = [vector for _, own in self.vectors(feature_set) for vector in own]
+        augmenter = None
+        if augmentation is not None and augmentation.copies:
+            from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
+
+            augmenter = Augmenter(feature_set, augmentation)
+        vectors: list[FeatureVector] = []
+        for slide, events in self.windows(feature_set):
+            vectors += _described(slide, feature_set, events)
+            if augmenter is not None:
+                augmenter.add(slide.name, events, partial(_cut_by, slide, feature_set))
         if not vectors:
             raise no_window(self, feature_set)
         features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
@@ -760,7 +775,7 @@ class SlideDataset:
             name: replace(made, session=slides[name].session, place=slides[name].place)
             for name, made in features.conditions.items()
         }
-        augmented = self._augmented(feature_set, augmentation)
+        augmented = augmenter.result() if augmenter is not None else None
         return replace(features, motions=motions, conditions=conditions, augmented=augmented, touches=touches)
 
     def tare_faults(self, feature_set: FeatureSet) -> list[str]:
@@ -813,17 +828,6 @@ class SlideDataset:
                 event = CutWindow(slide.start_ns, slide.name, touch_s, touch_s, windows, *made)
                 touches[slide.name] = feature_set.extract(event).values
         return touches
-
-    def _augmented(self, feature_set: FeatureSet, augmentation: Augmentation | None) -> AugmentedFeatures | None:
-        """Return changed copies of the slides as features, for training; None without augmentation or copies."""
-        if augmentation is None or not augmentation.copies:
-            return None
-        from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
-
-        augmenter = Augmenter(feature_set, augmentation)
-        for slide in self.slides:
-            augmenter.add(slide.name, partial(_cut_by, slide, feature_set))
-        return augmenter.result()
 
     def samples(self, topic: str) -> list[SlideSamples]:
         """Return the samples of one topic of each slide without gaps, with speed, force and direction.
@@ -913,6 +917,12 @@ def _touch(slide: LabelledSlide, topic: str, touch_s: float) -> Window | None:
         return None
     before = samples.before[: max(1, round(touch_s * samples.rate_hz))]
     return Window(before, samples.rate_hz, samples.channels) if np.isfinite(before).all() and len(before) else None
+
+
+def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[WindowEvent]) -> list[FeatureVector]:
+    """Return the feature vectors of the windows of a slide under its name; not its end."""
+    vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
+    return [replace(vector, exploration_id=slide.name) for vector in vectors]
 
 
 def _cut_by(slide: LabelledSlide, feature_set: FeatureSet, windows: WindowParams) -> list[WindowEvent]:

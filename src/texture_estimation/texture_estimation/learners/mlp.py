@@ -7,7 +7,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from texture_features.features.temporal import SLIDE_ONSET
 # Augmented training examples of a learner: copies of slides, gains and slide jitter, drawn batch by batch.
 
 Inputs = NDArray[np.float32]
+BLOCK = 16  # batches that are drawn at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,29 +121,37 @@ class AugmentedBatches:
         self._response = (augmented.gain_response / scale).astype(np.float32)
         self._deviations = (augmented.slide_deviations / scale).astype(np.float32)
         self._clean, self._copies = _Rows(np.arange(len(inputs)), rng), _Rows(augmented.rows, rng)
+        self._drawn: list[tuple[Inputs, Codes]] = []
 
     def draw(self, count: int) -> tuple[Inputs, Codes]:
-        """Return so many inputs, (count, n_features), and their labels, (count,)."""
-        n_clean = round(count * self._augmented.augmentation.clean_share) if len(self._augmented.rows) else count
-        clean, copies = self._clean.take(n_clean), self._copies.take(count - n_clean)
-        changed = (self._augmented.values[copies] - self._mean) * self._factor
-        drawn = np.concatenate([self._inputs[clean], changed])
-        drawn += self._log_gains(count) * self._response
-        if len(self._deviations):
-            drawn += self._jitter(count) * self._deviations[self._rng.integers(len(self._deviations), size=count)]
-        return drawn, np.concatenate([self._codes[clean], self._augmented.codes[copies]])
+        """Return so many inputs, (count, n_features), and their labels, (count,); the same count at each call."""
+        if not self._drawn:
+            self._drawn = self._draw_block(count)
+        return self._drawn.pop()
 
-    def _log_gains(self, count: int) -> Inputs:
-        params = self._augmented.augmentation
+    def _draw_block(self, count: int) -> list[tuple[Inputs, Codes]]:
+        """Return several batches, whose random numbers and rows cost half as much together."""
+        params, total = self._augmented.augmentation, BLOCK * count
+        n_clean = round(count * params.clean_share) if len(self._augmented.rows) else count
+        block = np.empty((BLOCK, count, len(self._mean)), dtype=np.float32)
+        codes = np.empty((BLOCK, count), dtype=np.intp)
+        clean, copies = self._clean.take(BLOCK * n_clean), self._copies.take(total - BLOCK * n_clean)
+        block[:, :n_clean] = self._inputs[clean].reshape(BLOCK, n_clean, -1)
+        changed = self._augmented.values[copies]
+        changed -= self._mean
+        changed *= self._factor
+        block[:, n_clean:] = changed.reshape(BLOCK, count - n_clean, -1)
+        codes[:, :n_clean] = self._codes[clean].reshape(BLOCK, -1)
+        codes[:, n_clean:] = self._augmented.codes[copies].reshape(BLOCK, -1)
         widest = math.log(params.gain_range)
-        changed = self._rng.random((count, 1)) < params.gain_probability
-        gains: Inputs = (self._rng.uniform(-widest, widest, (count, 1)) * changed).astype(np.float32)
-        return gains
-
-    def _jitter(self, count: int) -> Inputs:
-        factors = self._rng.standard_normal((count, 1), dtype=np.float32)
-        jitter: Inputs = np.float32(self._augmented.augmentation.slide_jitter) * factors
-        return jitter
+        louder = self._rng.random((BLOCK, count, 1), dtype=np.float32) < params.gain_probability
+        louder = louder * self._rng.uniform(-widest, widest, louder.shape).astype(np.float32)
+        block += louder * self._response
+        if len(self._deviations):
+            factors = self._rng.standard_normal((BLOCK, count, 1), dtype=np.float32)
+            factors *= params.slide_jitter
+            block += factors * self._deviations[self._rng.integers(len(self._deviations), size=(BLOCK, count))]
+        return list(zip(block, codes, strict=True))
 
 
 class _Rows:
@@ -221,7 +230,10 @@ BATCH = 128
 MIN_STEPS = 400
 RATE = 2e-3
 MEAN_DECAY, SQUARE_DECAY = 0.9, 0.999  # Kingma & Ba's
-TINY = np.float32(1e-8)
+TINY = 1e-8
+NOISE_TABLE = 1 << 20
+CALIBRATION_SHARE = 0.5  # of the passes, that a network for the calibration makes
+HIDDEN_LAYER, OUTPUT_LAYER = 0, 2  # of the weights; their offsets follow them
 # Of one network, steps times features and labels: larger trainings make fewer passes, so that they end within minutes.
 # The shipped recipes come to 3 to 5 millions with 20 textures of 40 slides.
 MAX_WORK = 10e6
@@ -322,7 +334,7 @@ class Mlp:
             return Fitted(fitted, None, 'not calibrated, as a label has a single window')
         folds_of, note = split
         scores = np.empty((len(y), n_labels))
-        share = 1.0 if augmented is None else 0.5
+        share = 1.0 if augmented is None else CALIBRATION_SHARE
         folds = []
         for part in np.unique(folds_of):
             held = folds_of == part
@@ -354,7 +366,7 @@ class Mlp:
         inputs, rng = np.empty(X.shape, np.float32), np.random.default_rng(self.seed)
         for rows in chunks(*X.shape):
             inputs[rows] = (X[rows] - mean) / scale
-        drawn: _Draws = (
+        drawn = (
             AugmentedBatches(inputs, y, augmented, rng, mean=mean, scale=scale)
             if augmented
             else _Batches(inputs, y, rng)
@@ -375,27 +387,24 @@ class Mlp:
         return min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
 
     def _descend(
-        self, drawn: _Draws, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator, share: float
-    ) -> Weights:
+        self, drawn: AugmentedBatches | _Batches, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator,
+        share: float,
+    ) -> Weights:  # fmt: skip
         """Return the weights after this share of all passes over so many examples, (n, n_features)."""
         n_examples, n_features = shape
-        weights = _first_weights(n_features, self.hidden, n_labels, rng)
-        truth = np.eye(n_labels, dtype=np.float32)
+        network = Network(n_features, self.hidden, n_labels, rng)
+        # Noise is cut from a table at random places: a new number for each input took a fifth of the training.
+        table = np.float32(self.noise) * rng.standard_normal(max(NOISE_TABLE, 4 * BATCH * n_features), dtype=np.float32)
         steps = self._steps(n_examples, n_features + n_labels, share)
-        adam = _Adam(weights)
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))
-            noisy = inputs + np.float32(self.noise) * rng.standard_normal(inputs.shape, dtype=np.float32)
-            slopes = _slopes(weights, noisy, truth[codes])
-            for layer in (0, 2):
-                slopes[layer] += np.float32(self.decay / n_examples) * weights[layer]
-            adam.step(weights, slopes, RATE * 0.5 * (1.0 + math.cos(math.pi * step / steps)))
-        return weights
-
-
-class _Draws(Protocol):
-    def draw(self, count: int) -> tuple[NDArray[np.float32], Codes]:
-        """Return standardised inputs, (about count, n_features), and their labels."""
+            start = rng.integers(len(table) - inputs.size + 1)
+            inputs += table[start : start + inputs.size].reshape(inputs.shape)
+            network.find_slopes(inputs, codes)
+            for part in (HIDDEN_LAYER, OUTPUT_LAYER):
+                network.slopes[part] += self.decay / n_examples * network.weights[part]
+            network.step(RATE * 0.5 * (1.0 + math.cos(math.pi * step / steps)))
+        return network.weights
 
 
 class _Batches:
@@ -428,41 +437,86 @@ def _calibrated(parameters: Mapping[str, Array], temperature: float) -> dict[str
     return {**parameters, **output}
 
 
-class _Adam:
-    """Steps along the slopes, each weight at its own pace."""
+class Network:
+    """A network in training: weights, slopes and Adam's means as one vector each, so that a step is a few passes.
 
-    def __init__(self, weights: Weights) -> None:
-        self._means = [np.zeros_like(weight) for weight in weights]
-        self._squares = [np.zeros_like(weight) for weight in weights]
+    Parameters
+    ----------
+    n_features, hidden, n_labels
+        Its size.
+    rng
+        Source of the first weights.
+    dtype
+        Of all numbers.
+
+    Attributes
+    ----------
+    weights, slopes
+        Hidden layer (n_features, hidden), its offsets (hidden,), output (hidden, n_labels) and its offsets (n_labels,).
+
+    Source: Adam of Kingma & Ba 2015.
+
+    Examples
+    --------
+    >>> network = Network(2, 4, 3, np.random.default_rng(0))
+    >>> network.find_slopes(np.ones((5, 2), np.float32), np.zeros(5, np.intp))
+    >>> [part.shape for part in network.slopes]
+    [(2, 4), (4,), (4, 3), (3,)]
+    """
+
+    def __init__(
+        self, n_features: int, hidden: int, n_labels: int, rng: np.random.Generator, dtype: Any = np.float32
+    ) -> None:
+        shapes = [(n_features, hidden), (hidden,), (hidden, n_labels), (n_labels,)]
+        count = sum(map(math.prod, shapes))
+        self._vectors = np.zeros((6, count), dtype)  # weights, slopes, means, squares, two to compute in
+        ends = np.cumsum([math.prod(shape) for shape in shapes])[:-1]
+        self.weights, self.slopes = (
+            [part.reshape(shape) for part, shape in zip(np.split(vector, ends), shapes, strict=True)]
+            for vector in self._vectors[:2]
+        )
+        # Random layers that keep the size of the signals (He et al. 2015).
+        for part, factor in ((HIDDEN_LAYER, 2.0 / n_features), (OUTPUT_LAYER, 1.0 / hidden)):
+            rng.standard_normal(out=self.weights[part], dtype=dtype)
+            self.weights[part] *= math.sqrt(factor)
         self._count = 0
 
-    def step(self, weights: Weights, slopes: Weights, rate: float) -> None:
-        """Change the weights in place."""
+    def find_slopes(self, inputs: NDArray[np.floating[Any]], codes: Codes) -> None:
+        """Set the derivatives of the mean cross-entropy of inputs (n, n_features) with these labels (n,)."""
+        hidden, hidden_offset, output, output_offset = self.weights
+        active = inputs @ hidden
+        active += hidden_offset
+        np.maximum(active, 0.0, out=active)
+        error = active @ output
+        error += output_offset
+        error -= error.max(axis=1, keepdims=True)
+        np.exp(error, out=error)
+        error /= error.sum(axis=1, keepdims=True)
+        error[np.arange(len(codes)), codes] -= 1.0
+        error /= len(codes)
+        back = error @ output.T
+        back *= active > 0.0
+        np.matmul(inputs.T, back, out=self.slopes[0])
+        np.add.reduce(back, axis=0, out=self.slopes[1])
+        np.matmul(active.T, error, out=self.slopes[2])
+        np.add.reduce(error, axis=0, out=self.slopes[3])
+
+    def step(self, rate: float) -> None:
+        """Change the weights along the slopes, each at its own pace (Kingma & Ba 2015)."""
+        weights, slopes, means, squares, change, spread = self._vectors
         self._count += 1
-        pace = np.float32(rate * math.sqrt(1 - SQUARE_DECAY**self._count) / (1 - MEAN_DECAY**self._count))
-        for part, slope in enumerate(slopes):
-            self._means[part] += np.float32(1 - MEAN_DECAY) * (slope - self._means[part])
-            self._squares[part] += np.float32(1 - SQUARE_DECAY) * (slope * slope - self._squares[part])
-            weights[part] -= pace * self._means[part] / (np.sqrt(self._squares[part]) + TINY)
-
-
-def _first_weights(n_features: int, hidden: int, n_labels: int, rng: np.random.Generator) -> Weights:
-    """Return random layers that keep the size of the signals (He et al. 2015)."""
-    first = rng.standard_normal((n_features, hidden), dtype=np.float32) * np.float32(math.sqrt(2.0 / n_features))
-    second = rng.standard_normal((hidden, n_labels), dtype=np.float32) * np.float32(math.sqrt(1.0 / hidden))
-    return [first, np.zeros(hidden, np.float32), second, np.zeros(n_labels, np.float32)]
-
-
-def _slopes(weights: Weights, inputs: NDArray[np.float32], truth: NDArray[np.float32]) -> Weights:
-    """Return the derivatives of the mean cross-entropy, (n, n_features) and (n, n_labels)."""
-    hidden, hidden_offset, output, output_offset = weights
-    before = inputs @ hidden + hidden_offset
-    active = np.maximum(before, 0)
-    scores = active @ output + output_offset
-    odds = np.exp(scores - scores.max(axis=1, keepdims=True))
-    error = (odds / odds.sum(axis=1, keepdims=True) - truth) / np.float32(len(inputs))
-    back = (error @ output.T) * (before > 0)
-    return [inputs.T @ back, back.sum(axis=0), active.T @ error, error.sum(axis=0)]
+        pace = rate * math.sqrt(1 - SQUARE_DECAY**self._count) / (1 - MEAN_DECAY**self._count)
+        means *= MEAN_DECAY
+        means += np.multiply(slopes, 1 - MEAN_DECAY, out=change)
+        np.multiply(slopes, slopes, out=change)
+        change *= 1 - SQUARE_DECAY
+        squares *= SQUARE_DECAY
+        squares += change
+        np.sqrt(squares, out=spread)
+        spread += TINY
+        np.multiply(means, pace, out=change)
+        change /= spread
+        weights -= change
 
 
 # --------------------
