@@ -21,6 +21,7 @@ from texture_core.config import safe_repr
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes
+from texture_estimation.numerics import shrunk_covariance
 from texture_features.examples import Interval, SlideConditions
 
 Mask = NDArray[np.bool_]
@@ -90,9 +91,10 @@ class ClassDistance:
         scaled = means / scale
         own = np.stack([scaled[codes == code].mean(axis=0) for code in range(len(names))])
         centre = own.mean(axis=0)
-        within = _covariance(scaled - own[codes], len(means) - len(names))
+        apart, between_classes = scaled - own[codes], own - centre
+        within = shrunk_covariance(apart.T @ apart / max(len(means) - len(names), 1), SHRINKAGE)
         floor = FLOOR * max(float(np.diag(within).mean()), SMALLEST)
-        between = _covariance(own - centre, len(names) - 1)
+        between = shrunk_covariance(between_classes.T @ between_classes / max(len(names) - 1, 1), SHRINKAGE)
         spread, directions = eigh(between, within + floor * np.eye(len(within)))
         spread, directions = spread[-MAX_DIRECTIONS:], directions[:, -MAX_DIRECTIONS:]
         order = np.argsort(classes, kind='stable')
@@ -180,13 +182,6 @@ class ClassDistance:
             np.asarray(arrays[name], dtype=np.float64) for name in ('projection', 'references', 'centre', 'weights')
         )
         return cls(projection, references, np.asarray(arrays['classes'], dtype=np.intp), centre, weights)
-
-
-def _covariance(deviations: Array, freedom: int) -> Array:
-    """Return the covariance, drawn to its diagonal: few classes do not show all directions in which others differ."""
-    covariance = deviations.T @ deviations / max(freedom, 1)
-    shrunk: Array = (1.0 - SHRINKAGE) * covariance + SHRINKAGE * np.diag(np.diag(covariance))
-    return shrunk
 
 
 # --------------------

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from texture_core.types import AnyArray, Array
 from texture_estimation.decisions import window_count
 from texture_estimation.learners.learner import Codes
-from texture_estimation.numerics import group_means, log_softmax
+from texture_estimation.numerics import group_means, log_softmax, shrunk_covariance
 
 # --------------------
 # Gaussian classes with one covariance, to which classes of a few samples can be added.
@@ -134,7 +134,8 @@ def _projection(deviations: Array, freedom: int, scale: Array) -> Array:
     if deviations.shape[1] > MAX_CORRELATED:
         diagonal: Array = 1.0 / scale
         return diagonal
-    covariance = freedom / (freedom + PRIOR_SAMPLES) * (deviations.T @ deviations) / max(freedom, 1)
+    products = deviations.T @ deviations / max(freedom, 1)
+    covariance = shrunk_covariance(products, PRIOR_SAMPLES / (freedom + PRIOR_SAMPLES))
     np.fill_diagonal(covariance, 1.0)
     variances, directions = eigh(covariance)
     full: Array = directions / np.sqrt(variances) / scale[:, None]

@@ -3,17 +3,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, FoldFit, Predictor, assign_folds, trust
-from texture_estimation.numerics import log_loss, log_softmax
+from texture_estimation.learners.learner import Codes, Fitted, Predictor, assign_folds, fit_in_folds
+from texture_estimation.numerics import shrunk_covariance
 
 # --------------------
 # Linear discriminant analysis with a shrunk covariance, as one linear layer.
@@ -86,8 +86,8 @@ def linear_discriminant(
         covariance += stretch_weight * (between.T * own) @ between
     scale = np.sqrt(np.diag(covariance))
     scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
-    correlations = (1.0 - shrinkage) * covariance / np.outer(scale, scale)
-    correlations[np.diag_indices_from(correlations)] += shrinkage + CONSTANT
+    correlations = shrunk_covariance(covariance / np.outer(scale, scale), shrinkage)
+    correlations[np.diag_indices_from(correlations)] += CONSTANT
     relative = (means - centre) / scale
     layer = np.linalg.solve(correlations, relative.T)
     offsets = -0.5 * np.einsum('cf,fc->c', relative, layer)
@@ -174,7 +174,7 @@ class Discriminant:
             Number of the label of each, from 0, without gaps.
         groups : (n,)
             Number of the slide of each.
-        parts : (ngroups,) or None
+        parts : (n_groups,) or None
             Part in which the slide of each number is held out; by slides if None.
 
         Returns
@@ -182,33 +182,17 @@ class Discriminant:
         Fitted
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
-        from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
-
         n_labels = int(y.max()) + 1
+
+        def fit(held: NDArray[np.bool_]) -> dict[str, Array]:
+            return self._fit(X[~held], y[~held], groups[~held], n_labels)
+
         split = assign_folds(y, groups, self.folds, parts)
         if split is None:
-            return Fitted(
-                self._fit(X, y, groups, n_labels, 1.0), None, 'not calibrated, as a label has a single window'
-            )
-        folds_of, note = split
-        scores, trusted = np.empty((len(y), n_labels)), np.empty(len(y))
-        for part in np.unique(folds_of):
-            held = folds_of == part
-            predictor = self.predictor(self._fit(X[~held], y[~held], groups[~held], n_labels, 1.0))
-            scores[held], trusted[held] = predictor(X[held]), trust(predictor, X[held])
-        best = minimize_scalar(
-            lambda log_t: log_loss(trusted[:, None] * log_softmax(scores / math.exp(log_t)), y),
-            bounds=(-2.0, 8.0),
-            method='bounded',
-        )
-        temperature = math.exp(best.x)
-        folds = [
-            FoldFit(np.unique(groups[held]), self._fit(X[~held], y[~held], groups[~held], n_labels, temperature))
-            for held in (folds_of == part for part in np.unique(folds_of))
-        ]
-        return Fitted(
-            self._fit(X, y, groups, n_labels, temperature), log_softmax(scores / temperature), note, folds, trusted
-        )
+            nothing = np.zeros(len(y), dtype=bool)
+            return Fitted(fit(nothing), None, 'not calibrated, as a label has a single window')
+        tempered = ('weights', 'offsets')
+        return fit_in_folds(fit, self.predictor, X, y, groups, split=split, tempered=tempered, most=8.0)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
@@ -218,9 +202,9 @@ class Discriminant:
             np.asarray(parameters['offsets'], dtype=np.float64),
         )
 
-    def _fit(self, X: Array, y: Codes, _: Codes, n_labels: int, temperature: float) -> dict[str, Array]:
+    def _fit(self, X: Array, y: Codes, _: Codes, n_labels: int) -> dict[str, Array]:
         weights, offsets = linear_discriminant(X, y, n_labels, self.shrinkage)
-        return {'weights': weights / temperature, 'offsets': offsets / temperature}
+        return {'weights': weights, 'offsets': offsets}
 
 
 # --------------------
@@ -365,7 +349,7 @@ class ForceDiscriminant(Discriminant):
             column=int(parameters['column']),
         )
 
-    def _fit(self, X: Array, y: Codes, groups: Codes, n_labels: int, temperature: float) -> dict[str, Array]:
+    def _fit(self, X: Array, y: Codes, groups: Codes, n_labels: int) -> dict[str, Array]:
         forces = _log_force(X, self.column)
         middles = np.quantile(forces, (np.arange(self.ranges) + 0.5) / self.ranges)
         blind = X.copy()
@@ -385,8 +369,8 @@ class ForceDiscriminant(Discriminant):
             for middle in middles
         ]
         return {
-            'weights': np.stack([weights for weights, _ in layers]) / temperature,
-            'offsets': np.stack([offsets for _, offsets in layers]) / temperature,
+            'weights': np.stack([weights for weights, _ in layers]),
+            'offsets': np.stack([offsets for _, offsets in layers]),
             'log_forces': middles,
             'trained': np.quantile(forces, [OUTERMOST, 1.0 - OUTERMOST]),
             'reach': np.array(self.reach),

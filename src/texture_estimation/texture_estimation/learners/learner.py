@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.types import Array
+from texture_estimation.numerics import chunks, fit_temperature, log_softmax
 
 # --------------------
 # What a learner is: parameters that fit examples, and the predictor that it exports.
@@ -18,40 +19,12 @@ from texture_core.types import Array
 Codes = NDArray[np.intp]
 
 
-class Predictor(Protocol):
-    """Predict from features, as plain arrays."""
-
-    def __call__(self, X: Array) -> Array:
-        """Return log-probabilities up to a constant of the window.
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_labels)
-        """
+# From features (..., n_features) to log-probabilities up to a constant of the window, (..., n_labels), as plain arrays.
+# One with a hidden layer has a method `activations` besides, which gives its outputs (..., n_hidden).
+Predictor = Callable[[Array], Array]
 
 
-class HiddenPredictor(Protocol):
-    """A predictor with a hidden layer."""
-
-    def activations(self, X: Array) -> Array:
-        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features).
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_hidden)
-            Not negative.
-        """
-
-
-def hidden_layer(predictor: Predictor | HiddenPredictor) -> Callable[[Array], Array] | None:
+def hidden_layer(predictor: Predictor) -> Callable[[Array], Array] | None:
     """Return what computes the outputs of the hidden layer of a predictor; None if it has none.
 
     Returns
@@ -238,6 +211,61 @@ def _numbered(groups: Codes) -> Codes:
     rank = np.empty(len(first), dtype=np.intp)
     rank[np.argsort(first)] = np.arange(len(first))
     return rank[inverse.reshape(-1)]
+
+
+def fit_in_folds(
+    fit: Callable[[NDArray[np.bool_]], dict[str, Any]],
+    predictor: Callable[[Mapping[str, Any]], Predictor],
+    X: Array,
+    y: Codes,
+    groups: Codes,
+    *,
+    split: tuple[Codes, str],
+    tempered: Sequence[str],
+    most: float = 4.0,
+) -> Fitted:
+    """Fit to all examples and without each part of them, all with the temperature that suits what was held out.
+
+    Parameters
+    ----------
+    fit
+        Returns the parameters fitted without the examples of a mask, (n,).
+    predictor
+        Makes a predictor of them.
+    X, y, groups
+        As `Learner.fit` takes them.
+    split
+        What `assign_folds` returned.
+    tempered
+        Parameters of which the scores are linear functions.
+    most
+        Largest logarithm of the temperature.
+
+    Returns
+    -------
+    Fitted
+        With the log-probabilities of each example when it was held out.
+    """
+    folds_of, note = split
+    scores, trusted = np.empty((len(y), int(y.max()) + 1)), None
+    folds = []
+    for part in np.unique(folds_of):
+        held = folds_of == part
+        folds.append(FoldFit(np.unique(groups[held]), fit(held)))
+        fitted = predictor(folds[-1].parameters)
+        scores[held] = fitted(X[held])
+        if hasattr(fitted, 'trust'):
+            trusted = np.ones(len(y)) if trusted is None else trusted
+            trusted[held] = trust(fitted, X[held])
+    temperature = fit_temperature(scores, y, trusted, most)
+
+    def calibrated(parameters: Mapping[str, Any]) -> dict[str, Any]:
+        return {**parameters, **{name: parameters[name] / temperature for name in tempered if name in parameters}}
+
+    for rows in chunks(*scores.shape):
+        scores[rows] = log_softmax(scores[rows] / temperature)
+    folds = [FoldFit(fold.held_out, calibrated(fold.parameters)) for fold in folds]
+    return Fitted(calibrated(fit(np.zeros(len(y), dtype=bool))), scores, note, folds, trusted)
 
 
 # --------------------

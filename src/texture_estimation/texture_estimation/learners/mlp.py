@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.discriminant import linear_discriminant
-from texture_estimation.learners.learner import Codes, Fitted, FoldFit, assign_folds
-from texture_estimation.numerics import chunks, log_loss, log_softmax
+from texture_estimation.learners.learner import Codes, Fitted, assign_folds, fit_in_folds
+from texture_estimation.numerics import chunks
 from texture_features.augmentation import Augmentation
 from texture_features.features.temporal import SLIDE_ONSET
 
@@ -325,30 +325,18 @@ class Mlp:
         Fitted
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
-        from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
-
         n_labels = int(y.max()) + 1
         split = assign_folds(y, groups, self.folds, parts)
         if split is None:
             fitted = self._fit(X, y, n_labels, augmented)
             return Fitted(fitted, None, 'not calibrated, as a label has a single window')
-        folds_of, note = split
-        scores = np.empty((len(y), n_labels))
-        share = 1.0 if augmented is None else CALIBRATION_SHARE
-        folds = []
-        for part in np.unique(folds_of):
-            held = folds_of == part
-            slides = np.unique(groups[held])
-            rest = augmented.without(slides) if augmented else None
-            folds.append(FoldFit(slides, self._fit(X[~held], y[~held], n_labels, rest, share)))
-            scores[held] = self.predictor(folds[-1].parameters)(X[held])
-        best = minimize_scalar(lambda log_t: _loss_at(scores, y, math.exp(log_t)), bounds=(-2.0, 4.0), method='bounded')
-        temperature = math.exp(best.x)
-        fitted = _calibrated(self._fit(X, y, n_labels, augmented), temperature)
-        folds = [FoldFit(fold.held_out, _calibrated(fold.parameters, temperature)) for fold in folds]
-        for rows in chunks(*scores.shape):
-            scores[rows] = log_softmax(scores[rows] / temperature)
-        return Fitted(fitted, scores, note, folds)
+
+        def fit(held: NDArray[np.bool_]) -> dict[str, Array]:
+            rest = augmented.without(np.unique(groups[held])) if augmented else None
+            share = CALIBRATION_SHARE if augmented and held.any() else 1.0
+            return self._fit(X[~held], y[~held], n_labels, rest, share)
+
+        return fit_in_folds(fit, self.predictor, X, y, groups, split=split, tempered=TEMPERED)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> MlpPredictor:
@@ -422,19 +410,6 @@ class _Batches:
         rows = self._order[self._drawn % self._count :: self._count]
         self._drawn += 1
         return self._inputs[rows], self._codes[rows]
-
-
-def _loss_at(scores: Array, y: Codes, temperature: float) -> float:
-    """Return the mean negative log-probability of the true labels at a temperature; few rows at once take memory."""
-    parts = list(chunks(*scores.shape))
-    losses = [log_loss(log_softmax(scores[rows] / temperature), y[rows]) for rows in parts]
-    return float(np.average(losses, weights=[rows.stop - rows.start for rows in parts])) if losses[1:] else losses[0]
-
-
-def _calibrated(parameters: Mapping[str, Array], temperature: float) -> dict[str, Array]:
-    """Return the layers with the temperature worked into them."""
-    output = {name: parameters[name] / temperature for name in TEMPERED if name in parameters}
-    return {**parameters, **output}
 
 
 class Network:

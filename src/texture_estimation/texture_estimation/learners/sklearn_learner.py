@@ -15,7 +15,7 @@ from texture_core.config import safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
-from texture_estimation.numerics import log_loss, log_softmax
+from texture_estimation.numerics import fit_temperature, log_softmax
 
 # --------------------
 # Predict with a fitted estimator of scikit-learn.
@@ -228,7 +228,7 @@ class SklearnLearner:
         for part in np.unique(split[0]):
             held = split[0] == part
             held_out[held] = self.predictor(self._fit(X[~held], y[~held], n_labels))(X[held])
-        temperature = _fit_temperature(held_out, y)
+        temperature = fit_temperature(held_out, y)
         return Fitted(
             {**parameters, 'temperature': temperature},
             log_softmax(held_out / temperature),
@@ -284,13 +284,3 @@ def _plain(name: str, value: Any) -> Any:
     raise InvalidParameter(
         f'{name} is {safe_repr(value)}; a number, a text, true, false, null or a list of them is needed'
     )
-
-
-def _fit_temperature(scores: Array, y: Codes) -> float:
-    """Return the divisor of scores (n, n_labels) that makes the labels (n,) most probable."""
-    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
-
-    best = minimize_scalar(
-        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
-    )
-    return float(np.exp(best.x))

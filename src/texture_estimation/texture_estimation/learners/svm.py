@@ -14,7 +14,7 @@ import numpy as np
 from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, assign_folds
-from texture_estimation.numerics import group_means, log_loss, log_softmax
+from texture_estimation.numerics import fit_temperature, group_means, log_softmax
 
 # --------------------
 # From decisions between two labels each to calibrated probabilities of all labels.
@@ -111,16 +111,11 @@ def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
     PairCoupling
         With a temperature that makes the labels most probable.
     """
-    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
-
     pairs = combinations(range(n_labels), 2)
     sigmoids = np.array([_fit_sigmoid(decisions[:, number], y, *pair) for number, pair in enumerate(pairs)])
     coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)
-    scores = coupling.scores(decisions)
-    best = minimize_scalar(
-        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
-    )
-    return PairCoupling(n_labels, coupling.slopes, coupling.offsets, float(np.exp(best.x)))
+    temperature = fit_temperature(coupling.scores(decisions), y)
+    return PairCoupling(n_labels, coupling.slopes, coupling.offsets, temperature)
 
 
 def _fit_sigmoid(decisions: Array, y: Codes, first: int, second: int) -> Array:
