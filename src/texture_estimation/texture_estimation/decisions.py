@@ -22,7 +22,7 @@ from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes
 from texture_estimation.numerics import shrunk_covariance
-from texture_features.examples import Interval, SlideConditions
+from texture_features.examples import Interval, RunningConditions, SlideConditions
 
 Mask = NDArray[np.bool_]
 
@@ -428,12 +428,12 @@ class ErrorBound:
             raise InvalidData(f'{ERROR_BOUND_ENTRY} is {safe_repr(values):.80}; it needs {ALLOWED}')
         return cls(**values)
 
-    @property
+    @cached_property
     def highest_confidence(self) -> float:
         """Largest confidence that the held-out slides can show; 1 if none was held out: nothing is calibrated then."""
         return float(LEVEL ** (1.0 / self.slides)) if self.slides else 1.0
 
-    @property
+    @cached_property
     def slides_needed(self) -> float:
         """Smallest number of held-out slides that can show the allowed error rate; infinite if no error is allowed."""
         if self.max_error_rate >= 1.0:
@@ -442,7 +442,7 @@ class ErrorBound:
             return math.inf
         return math.ceil(math.log(LEVEL) / math.log1p(-self.max_error_rate))
 
-    @property
+    @cached_property
     def shown(self) -> bool:
         """Whether the held-out slides can show the allowed error rate."""
         return self.slides >= self.slides_needed
@@ -686,7 +686,7 @@ class Domain:
             slides=dict(Counter(self.slides) + Counter(new.slides)),
         )
 
-    def deviation(self, conditions: SlideConditions) -> str:
+    def deviation(self, conditions: SlideConditions | RunningConditions) -> str:
         """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
         found = '; '.join(self._deviations(conditions))
         return f'{OUTSIDE}: {found}' if found else ''
@@ -721,7 +721,7 @@ class Domain:
             **intervals,
         )
 
-    def _deviations(self, conditions: SlideConditions) -> Iterator[str]:
+    def _deviations(self, conditions: SlideConditions | RunningConditions) -> Iterator[str]:
         speed, force = conditions.speed_m_s, conditions.force_n
         if is_beyond(speed, self.speed_m_s, self.margins.speed):
             yield f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s'
@@ -739,7 +739,7 @@ class Domain:
             if is_beyond(level.rms, trained, self.margins.level):
                 yield f'signal level {level.rms:.3g} of {level.channel}, trained {_range(trained)}'
 
-    def _untrained_directions(self, conditions: SlideConditions) -> list[float]:
+    def _untrained_directions(self, conditions: SlideConditions | RunningConditions) -> list[float]:
         """Return the directions of a slide outside the arcs; none where directions are not compared."""
         if not self.directions_rad or conditions.motion in TURNING_MOTIONS:
             return []

@@ -162,7 +162,7 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.active_domain.deviation(self._conditions.get())
+        self._deviation = model.active_domain.deviation(self._conditions)
         scores, activations = model.predict_with_activations(vector.values)
         window_evidence = model.recipe.evidence.window_evidence(scores)
         self._windows += 1

@@ -130,36 +130,51 @@ class RunningConditions:
     """
 
     def __init__(self) -> None:
-        self._motion = self._sensor = ''
+        self.motion = self.sensor = ''
         self._speed = _RunningMean()
         self._force = _RunningMean()
-        self._directions: dict[float, None] = {}  # in the order in which they came
+        self.directions_rad: dict[float, None] = {}  # in the order in which they came
         self._levels: list[tuple[str, int, _RunningMean]] | None = None  # channel, place among the features, log power
 
     def update(self, vector: FeatureVector) -> None:
         """Take the conditions of one more window into account."""
-        self._motion = vector.motion or self._motion
-        self._sensor = vector.sensor or self._sensor
+        self.motion = vector.motion or self.motion
+        self.sensor = vector.sensor or self.sensor
         self._speed.update(vector.speed_m_s)
         self._force.update(vector.force_n)
         if math.isfinite(vector.direction_rad):
-            self._directions[round(vector.direction_rad, DIRECTION_DIGITS)] = None
+            self.directions_rad[round(vector.direction_rad, DIRECTION_DIGITS)] = None
         if self._levels is None and vector.names:
             self._levels = [(channel, place, _RunningMean()) for channel, place in _log_powers(vector.names)]
         for _, place, log_power in self._levels or ():
             log_power.update(float(vector.values[place]))
 
+    @property
+    def speed_m_s(self) -> float:
+        """Mean speed so far; NaN if unknown."""
+        return self._speed.value
+
+    @property
+    def force_n(self) -> float:
+        """Mean force so far; NaN if unknown."""
+        return self._force.value
+
+    @property
+    def levels(self) -> Sequence[SignalLevel]:
+        """Levels of the channels so far."""
+        return [_signal_level(channel, log_power) for channel, _, log_power in self._levels or ()]
+
     def get(self) -> SlideConditions:
         """Return the conditions of the windows so far."""
         return SlideConditions(
-            self._motion,
-            self._sensor,
-            self._speed.value,
-            self._force.value,
-            tuple(self._directions),
+            self.motion,
+            self.sensor,
+            self.speed_m_s,
+            self.force_n,
+            tuple(self.directions_rad),
             self._speed.range,
             self._force.range,
-            tuple(_signal_level(channel, log_power) for channel, _, log_power in self._levels or ()),
+            tuple(self.levels),
         )
 
 

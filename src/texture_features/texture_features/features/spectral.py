@@ -144,7 +144,8 @@ class MeanLogBands(LogBands):
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of log(density + floor)."""
         densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        return mean_over_segments(np.log(densities + self.floor))
+        logs = densities + self.floor
+        return mean_over_segments(np.log(logs, out=logs))
 
 
 # --------------------

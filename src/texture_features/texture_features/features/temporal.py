@@ -290,13 +290,18 @@ class Moments:
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; skewness and log kurtosis of a constant signal are 0."""
         signals, powers = signal_differences(windows), squares(windows)
-        mean = mean_weights(signals.shape[-1])
+        n_samples = signals.shape[-1]
+        mean = mean_weights(n_samples)
         square = powers @ mean
+        # Products of vectors for each row: no arrays of third and fourth powers.
+        cubes, fourths = (
+            (powers[..., None, :] @ other[..., :, None])[..., 0, 0] / n_samples for other in (signals, powers)
+        )
         values = (
             np.log(square + self.floor * self.floor),
             np.log(np.abs(signals) @ mean + self.floor),
-            ((powers * signals) @ mean) / (square * np.sqrt(square) + MOMENTS_TINY),
-            np.log(((powers * powers) @ mean + MOMENTS_TINY) / (square * square + MOMENTS_TINY)),
+            cubes / (square * np.sqrt(square) + MOMENTS_TINY),
+            np.log((fourths + MOMENTS_TINY) / (square * square + MOMENTS_TINY)),
         )
         return np.concatenate(values, axis=-1)
 
