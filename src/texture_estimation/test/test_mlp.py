@@ -10,7 +10,7 @@ from sklearn.neural_network import MLPClassifier
 from texture_estimation import numerics as log_probabilities
 from texture_estimation.learners import mlp
 from texture_estimation.learners.discriminant import linear_discriminant
-from texture_estimation.learners.mlp import Mlp, Network, OnsetMlp
+from texture_estimation.learners.mlp import Mlp, MlpTraining, OnsetMlp
 from texture_estimation.numerics import log_loss, log_softmax
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
@@ -19,7 +19,7 @@ from texture_features.examples import LabelledFeatures
 
 def test_slopes_are_the_derivatives_of_the_cross_entropy():
     rng = np.random.default_rng(0)
-    network = Network(3, 5, 4, rng, np.float64)
+    network = MlpTraining(3, 5, 4, rng, np.float64)
     weights = network.weights
     inputs, codes = rng.standard_normal((7, 3)), rng.integers(0, 4, 7)
 
@@ -83,8 +83,8 @@ def test_a_training_in_small_pieces_gives_the_same_network(examples, monkeypatch
 def test_a_training_that_would_take_too_long_makes_fewer_steps(examples, monkeypatch):
     codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
     counts = []
-    step = Network.step
-    monkeypatch.setattr(Network, 'step', lambda self, *args: (counts.append(1), step(self, *args))[1])
+    step = MlpTraining.step
+    monkeypatch.setattr(MlpTraining, 'step', lambda self, *args: (counts.append(1), step(self, *args))[1])
     Mlp(hidden=4, epochs=500).fit(examples.values, codes, groups)
     without_limit = len(counts)
     monkeypatch.setattr(mlp, 'MAX_WORK', 450 * (examples.values.shape[1] + 4))

@@ -380,7 +380,7 @@ class Mlp:
     ) -> Weights:  # fmt: skip
         """Return the weights after this share of all passes over so many examples, (n, n_features)."""
         n_examples, n_features = shape
-        network = Network(n_features, self.hidden, n_labels, rng)
+        network = MlpTraining(n_features, self.hidden, n_labels, rng)
         # Noise is cut from a table at random places: a new number for each input took a fifth of the training.
         table = np.float32(self.noise) * rng.standard_normal(max(NOISE_TABLE, 4 * BATCH * n_features), dtype=np.float32)
         steps = self._steps(n_examples, n_features + n_labels, share)
@@ -412,7 +412,7 @@ class _Batches:
         return self._inputs[rows], self._codes[rows]
 
 
-class Network:
+class MlpTraining:
     """A network in training: weights, slopes and Adam's means as one vector each, so that a step is a few passes.
 
     Parameters
@@ -433,7 +433,7 @@ class Network:
 
     Examples
     --------
-    >>> network = Network(2, 4, 3, np.random.default_rng(0))
+    >>> network = MlpTraining(2, 4, 3, np.random.default_rng(0))
     >>> network.find_slopes(np.ones((5, 2), np.float32), np.zeros(5, np.intp))
     >>> [part.shape for part in network.slopes]
     [(2, 4), (4,), (4, 3), (3,)]
