@@ -389,7 +389,8 @@ class ExplorationRequest:
     Raises
     ------
     InvalidData
-        If `surface` is no label (see `texture_core.types`), or `timeout_s` is negative or not finite.
+        If `surface` is no label (see `texture_core.types`), `timeout_s` is negative or not finite, or a start is given
+        that is not used.
     """
 
     motion: str
@@ -403,9 +404,17 @@ class ExplorationRequest:
     surface: str = ''
     early_stopping: bool = False
     timeout_s: float = 0.0
+    use_start: bool = False  # travel first to the start, in the frame of the surface; see `SurfacePatch`
+    start_x_m: float = 0.0
+    start_y_m: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'surface', checked_label(self.surface))
+        if not self.use_start and (self.start_x_m or self.start_y_m):
+            raise InvalidData(
+                f'the start is ({self.start_x_m:g}, {self.start_y_m:g}) m, but use_start is false; set it, or leave '
+                'start_x_m and start_y_m at 0'
+            )
         if not 0.0 <= self.timeout_s < math.inf:
             raise InvalidData(f'timeout_s is {self.timeout_s}; 0, for none, or a positive number of seconds is needed')
 

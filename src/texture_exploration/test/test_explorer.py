@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 import pytest
 
 from texture_core.errors import DeviceError, MotionRefused, UnknownName
@@ -6,7 +8,7 @@ from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.explorer import Explorer
-from texture_exploration.safety import SafetyLimits
+from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.stages import TouchParams
 
 pytestmark = pytest.mark.realtime
@@ -112,3 +114,41 @@ def test_an_arm_that_cannot_be_reached_refuses_in_a_sentence():
 
 def test_an_arm_that_is_not_connected_counts_nothing_and_ends_nothing():
     assert Explorer(UrArm(), TouchParams(), SafetyLimits(), lambda state: None).arm_counts() == {}
+
+
+PATCH = SurfacePatch(-0.03, 0.05, -0.02, 0.02)
+THERE = replace(QUICK, use_start=True, start_x_m=0.0, start_y_m=-0.02)
+
+
+def test_an_exploration_begins_at_its_start_on_the_patch_and_lifts_there():
+    states = []
+    arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
+    explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), states.append)
+    explorer.patch = PATCH
+    explorer.connect()
+    exploration = explorer.begin('one', THERE)
+    assert exploration.ended.wait(DEADLINE_S)
+    assert exploration.outcome.success, exploration.outcome.message
+    touched = next(state for state in states if state.phase is Phase.CONTACT)
+    assert (touched.x_m, touched.y_m) == pytest.approx((0.0, -0.02), abs=0.001)
+    travelling = [state for state in states if state.phase is Phase.APPROACH and abs(state.y_m) < 0.019]
+    assert min(state.z_m for state in travelling) > 0.0015  # in free air
+    end = explorer.arm.state().position
+    assert end[0] > 0.02 and end[2] > 0.0015
+    explorer.close()
+
+
+@pytest.mark.parametrize(
+    ('patch', 'start', 'said'),
+    [
+        (SurfacePatch(), {}, 'no surface is taught'),
+        (PATCH, {'start_x_m': 0.06}, r'start_x_m is 0\.06, off the surface patch; allowed is -0\.03 to 0\.05 m'),
+        (PATCH, {'start_y_m': float('nan')}, 'start_y_m is nan, off the surface patch'),
+        (PATCH, {'start_x_m': 0.045}, 'leaves the workspace.*the workspace of a request with a start is the surface'),
+        (SurfacePatch(-0.03, 0.05, 0.3, 0.4), {'start_y_m': 0.35}, 'start_y_m is 0.35, off'),
+    ],
+)
+def test_a_start_off_the_patch_or_a_slide_that_leaves_it_is_refused(explorer, patch, start, said):
+    explorer.patch = patch
+    with pytest.raises(MotionRefused, match=said):
+        explorer.begin('one', replace(THERE, **start))

@@ -9,7 +9,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timezone
 from typing import Literal
 
@@ -35,7 +35,15 @@ from texture_exploration.arms.arm import (
     Vector,
 )
 from texture_exploration.motions import MOTIONS
-from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, ForceGuard, ForceWatch, Listening, SafetyLimits
+from texture_exploration.safety import (
+    GAP_NS,
+    WITHOUT_GAPS,
+    ForceGuard,
+    ForceWatch,
+    Listening,
+    SafetyLimits,
+    SurfacePatch,
+)
 from texture_exploration.stages import LiftFirst, Motion, MotionStep, Rise, TouchParams
 
 # --------------------
@@ -439,6 +447,7 @@ MAKE_A_PLANE = 3
 TOUCHES = 4  # three always lie in a plane: only a further one shows whether it is the surface
 NARROWEST_M = 0.01  # spread of the touches across their longest direction, and distance between any two
 LARGEST_RESIDUAL_M = 0.002  # a surface that is bent more than this is no plane
+EDGES = (np.min, np.max)
 LARGEST_TURN_RAD = math.radians(15.0)  # against the pose before: beyond, a touch is more likely wrong than the pose
 
 
@@ -453,6 +462,7 @@ class SurfaceFit:
     pose: tuple[float, ...]
     residual_m: float
     largest_m: float
+    patch: SurfacePatch  # The rectangle around the touches
 
 
 def fit_surface(
@@ -516,7 +526,9 @@ def fit_surface(
     length = float(np.linalg.norm(x_axis))
     axes = np.column_stack([x_axis / length, np.cross(up, x_axis / length), up])
     pose = (*middle.tolist(), *rotation_vector(axes).tolist())
-    return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m)
+    (x_low, y_low), (x_high, y_high) = (edge(np.round((points - middle) @ axes[:, :2], 5), axis=0) for edge in EDGES)
+    patch = SurfacePatch(float(x_low), float(x_high), float(y_low), float(y_high))
+    return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m, patch)
 
 
 class SurfaceTouches:
@@ -601,7 +613,8 @@ class Explorer:
         signal_fault: Callable[[Listening], str] = no_signal_watch,
     ) -> None:
         self.arm = arm
-        self.touch, self.limits = touch, limits  # may be replaced; a running exploration keeps its own
+        # These may be replaced; a running exploration keeps its own.
+        self.touch, self.limits, self.patch = touch, limits, SurfacePatch()
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, late_steps=0)
         self._on_state = on_state
         self._signal_fault = signal_fault
@@ -822,8 +835,10 @@ class Explorer:
                 last = ', away from the others: it shows whether the first three are right' if missing == 1 else 's'
                 return f'{count}; touch the surface at {missing} more place{last}'
             arm.move_surface(fit.pose)
-            names = ('x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad')
-            values = ', '.join(f'surface_{name}: {value:.5f}' for name, value in zip(names, fit.pose, strict=True))
+            self.patch = fit.patch
+            names = (f'surface_{name}' for name in ('x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad'))
+            numbers = {**dict(zip(names, fit.pose, strict=True)), **asdict(fit.patch)}
+            values = ', '.join(f'{name}: {value:.5f}' for name, value in numbers.items())
             return (
                 f'{count}; the surface is {values}; residual {1e3 * fit.residual_m:.2f} mm rms, largest '
                 f'{1e3 * fit.largest_m:.2f} mm. Write these into your parameter file, and lift the finger by 10 mm'
@@ -877,8 +892,13 @@ class Explorer:
             raise MotionRefused('the explorer is shutting down')
         self._check_idle()
         plan = find(MOTIONS, request.motion, 'motion')
-        home = self._ready()
-        motion = plan(request, home, self.touch, self.limits)
+        start = self.patch.start(request, self._ready(), self.limits)
+        motion = plan(request, start, self.touch, self.limits)
+        if request.use_start:
+            try:
+                plan(request, start, self.touch, self.patch.within(self.limits))
+            except MotionRefused as error:
+                raise MotionRefused(f'{error}; the workspace of a request with a start is the surface patch') from error
         if self._lift_first:
             motion = LiftFirst(motion, self.touch, self.limits, lambda: self.arm.zeroed)
         return Exploration(

@@ -118,7 +118,7 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
         if 'speed_m_s' not in values:
             raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', to tell how far to slide")
         values['distance_m'] = values['speed_m_s'] * numbers['slide_s']
-    return ExplorationRequest(motion, **values)
+    return ExplorationRequest(motion, use_start=bool({'start_x_m', 'start_y_m'} & values.keys()), **values)
 
 
 def _sequence(key: str, values: Any, where: str) -> Sequence[Any]:

@@ -360,6 +360,77 @@ RANGES = {
 
 
 # --------------------
+# The part of the surface on which an exploration may be told to begin.
+
+
+@dataclass(frozen=True)
+class SurfacePatch:
+    """The rectangle of the surface frame in which an exploration with a start stays; not taught without extent."""
+
+    patch_x_low_m: float = param(
+        0.0, 'Lowest x coordinate of the surface patch; touches set it.', unit='m', low=-2.0, high=2.0
+    )
+    patch_x_high_m: float = param(
+        0.0,
+        'Highest x coordinate of the surface patch; one that is not above the lowest means no patch.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    patch_y_low_m: float = param(
+        0.0, 'Lowest y coordinate of the surface patch; touches set it.', unit='m', low=-2.0, high=2.0
+    )
+    patch_y_high_m: float = param(
+        0.0,
+        'Highest y coordinate of the surface patch; one that is not above the lowest means no patch.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+
+    @property
+    def taught(self) -> bool:
+        """Whether there is one."""
+        return self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m
+
+    def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
+        """Return where an exploration begins: at `home`, or above its start at the same height.
+
+        Raises
+        ------
+        MotionRefused
+            If it has a start and no patch is taught, or the start is not on the patch, or outside the workspace.
+        """
+        if not request.use_start:
+            return home
+        if not self.taught:
+            raise MotionRefused(
+                f'{request.motion}: no surface is taught, so a start means nothing; touch the corners of the surface '
+                "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'"
+            )
+        for name, low, high in (
+            ('start_x_m', max(limits.x_low_m, self.patch_x_low_m), min(limits.x_high_m, self.patch_x_high_m)),
+            ('start_y_m', max(limits.y_low_m, self.patch_y_low_m), min(limits.y_high_m, self.patch_y_high_m)),
+        ):
+            at = getattr(request, name)
+            if not low <= at <= high:  # so NaN is off, too
+                raise MotionRefused(
+                    f'{request.motion}: {name} is {at:g}, off the surface patch; allowed is {low:g} to {high:g} m'
+                )
+        return request.start_x_m, request.start_y_m, home[2]
+
+    def within(self, limits: SafetyLimits) -> SafetyLimits:
+        """Return the limits with the patch as the workspace along the surface."""
+        return replace(
+            limits,
+            x_low_m=max(limits.x_low_m, self.patch_x_low_m),
+            x_high_m=min(limits.x_high_m, self.patch_x_high_m),
+            y_low_m=max(limits.y_low_m, self.patch_y_low_m),
+            y_high_m=min(limits.y_high_m, self.patch_y_high_m),
+        )
+
+
+# --------------------
 # Whether the measured force can be believed, and whether it is too high in any direction.
 #
 # With a frozen or drifting sensor a force loop presses without limit; with a limit of the normal force alone a wall

@@ -54,6 +54,14 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
         help='direction of travel, from +x towards +y; of a circular motion, the angle at which the slide begins, rad; '
         'several: one exploration after the other',
     )
+    parser.add_argument(
+        '--start',
+        type=float,
+        nargs=2,
+        metavar=('X', 'Y'),
+        help='where to begin on the taught surface patch, in the surface frame, m; default: where the explorer took '
+        'control of the arm',
+    )
     parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
     parser.add_argument('--early-stopping', action='store_true', help='end the slide as soon as the texture is certain')
     parser.add_argument(
@@ -109,8 +117,12 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     """Return the requests that the options stand for, one for each direction."""
     find(MOTIONS, options.motion, 'motion')  # said before an explorer is waited for
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
+    x_m, y_m = options.start or (0.0, 0.0)
     request = ExplorationRequest(
         options.motion,
+        use_start=options.start is not None,
+        start_x_m=x_m,
+        start_y_m=y_m,
         surface=options.surface,
         early_stopping=options.early_stopping,
         timeout_s=options.timeout,

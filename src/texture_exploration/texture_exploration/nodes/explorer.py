@@ -7,7 +7,7 @@ import importlib
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -17,6 +17,7 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
@@ -52,7 +53,7 @@ from texture_exploration.explorer import (
     Explorer,
     no_signal_watch,
 )
-from texture_exploration.safety import Listening, SafetyLimits, SignalWatch, SignalWatchParams
+from texture_exploration.safety import Listening, SafetyLimits, SignalWatch, SignalWatchParams, SurfacePatch
 from texture_exploration.stages import TouchParams
 
 # --------------------
@@ -313,7 +314,9 @@ class ExplorerNode(PatientLifecycleNode):
         arm = arm_class(declare(self, arm_class.Params))
         touch = declare(self, TouchParams, changeable=True)
         limits = declare(self, SafetyLimits, changeable=True)
-        return Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
+        explorer = Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
+        explorer.patch = declare(self, SurfacePatch, changeable=True)
+        return explorer
 
     def _watch_signal(self) -> Callable[[Listening], str]:
         params = declare(self, SignalWatchParams)
@@ -334,6 +337,7 @@ class ExplorerNode(PatientLifecycleNode):
         on_change(self, EarlyStoppingParams, partial(setattr, self, '_early_stopping'))
         on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
         on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
+        on_change(self, SurfacePatch, partial(setattr, self._explorer, 'patch'))
 
     def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
         return self._explore(request, response, lambda exploration: exploration.ended.wait())
@@ -433,6 +437,8 @@ class ExplorerNode(PatientLifecycleNode):
             response.message = str(error)
         else:
             self._broadcast_surface()
+            patch = asdict(self._explorer.patch)
+            self.set_parameters([Parameter(name, value=value) for name, value in patch.items()])
         self.get_logger().info(f'touch_surface: {response.message}')
         return response
 
