@@ -20,6 +20,7 @@ from texture_benchmarks import (
     next_motion,
     overview,
     peers,
+    places,
     recipes,
     robustness,
     scale,
@@ -39,6 +40,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'borders': borders.run,  # at another place, on another day, with another finger
+    'places': places.run,  # trained at six places against six slides of one track, simulated samples that vary
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'roughness': latency.run_roughness,  # from window to grade

@@ -3,7 +3,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_simulation.surfaces import MIN_BLUR_M, Grating, SelfAffine, Surface
+from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide
+from texture_simulation.scene import load_scene
+from texture_simulation.surfaces import MIN_BLUR_M, Grating, PlaceVariation, SelfAffine, Surface
 
 SHARP = MIN_BLUR_M
 PLACES = np.linspace(0.0, 0.2, 20_000)
@@ -44,3 +47,28 @@ def test_random_roughness_has_its_rms_and_its_waves() -> None:
 def test_waves_that_do_not_fit_a_tile_are_refused() -> None:
     with pytest.raises(InvalidParameter, match='at most 32 times'):
         SelfAffine(longest_m=0.05, shortest_m=1e-4)
+
+
+def test_a_varying_sample_is_itself_at_the_same_place_and_another_elsewhere():
+    scene = load_scene('varying').without('noise')
+
+    def slide(x_m):
+        sliding = SimulatedSlide(0.05, 2.0, 1.0, start_x_m=x_m)
+        return simulate_slides(scene, 'suede', 1, sliding, np.random.default_rng())[0, :, 0]
+
+    first, again, other = slide(0.0), slide(0.0), slide(0.08)
+    assert np.abs(first - again).max() <= 1.0  # counts: the sample lies still, whatever the random numbers
+    assert np.abs(first - other).max() > 100.0
+
+
+def test_the_level_of_a_sample_varies_slowly_by_the_strength_of_its_variation():
+    x_m, blur_m = np.linspace(0.0, 1.0, 20_000), np.full(1, 1e-4)
+    terms = (Grating(pitch_m=1e-3, depth_m=1e-4),)
+    height = {
+        strength: Surface('s', terms, variation=PlaceVariation(strength=strength)).height_m(x_m, 0.0 * x_m, blur_m)
+        for strength in (0.0, 1.0)
+    }
+    assert height[0.0] == pytest.approx(Surface('s', terms).height_m(x_m, 0.0 * x_m, blur_m), abs=1e-12)
+    levels = np.log(height[1.0].reshape(200, 100).std(axis=1))  # of 5 mm each
+    assert 0.15 < levels.std() < 0.6
+    assert np.corrcoef(levels[1:], levels[:-1])[0, 1] > 0.5  # from one to the next it hardly changes

@@ -82,8 +82,10 @@ class SkinContact:
         return self._x_m, self._y_m
 
     def relocate(self) -> None:
-        """Let the sample lie otherwise from now on: no two touches meet the same place."""
+        """Let the sample lie otherwise from now on: no two touches meet the same place, unless the sample varies."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._batch_shape, 1))
+        if self._surface.variation is not None:  # then a place of the surface frame is a place of the sample
+            self._x_m, self._y_m = np.zeros((2, *self._batch_shape, 1))
         curved = np.isfinite(self._surface.shape.radius_m)
         shape = (2, *self._batch_shape, 1)
         self._tilt_rad = self._rng.uniform(-START_TILT_RAD, START_TILT_RAD, shape) if curved else np.zeros(shape)
@@ -134,6 +136,8 @@ class SkinContact:
         if drag:
             # One skin is dragged as a whole: all elements of a finger with several sense the same.
             dragged_n = drag.advance(placed)
+            if self._surface.variation is not None:
+                dragged_n = dragged_n * self._surface.variation.at(*np.broadcast_arrays(placed.x_m, placed.y_m))[2]
             variation_n = variation_n + (dragged_n if offset_m is None else dragged_n[..., None, :])
         for apply in self._force_filters:
             variation_n = apply(placed, variation_n)

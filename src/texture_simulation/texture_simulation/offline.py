@@ -109,16 +109,20 @@ def _parts(
     scene: Scene, count: int, sliding: SimulatedSlide, rng: np.random.Generator, points: int
 ) -> Iterator[tuple[Array, Array, SimulatedSlide]]:
     """Yield speed and force, (n, 1) each, as they become, and how these n slides go."""
-    speed_m_s, force_n, direction = (
+    speed_m_s, force_n, direction, x_m, y_m = (
         np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
-        for value in (sliding.speed_m_s, sliding.force_n, sliding.direction_rad)
-    )
+        for value in (
+            sliding.speed_m_s, sliding.force_n, sliding.direction_rad, sliding.start_x_m, sliding.start_y_m
+        )
+    )  # fmt: skip
     for effect in scene.effects_of(SlideEffect):
         speed_m_s, force_n = effect.slide(speed_m_s, force_n, rng)
     size = max(1, POINTS_AT_ONCE // points)
     for first in range(0, count, size):
         here = slice(first, first + size)
-        part = SimulatedSlide(speed_m_s[here], force_n[here], sliding.duration_s, direction[here], sliding.radius_m)
+        part = SimulatedSlide(
+            speed_m_s[here], force_n[here], sliding.duration_s, direction[here], sliding.radius_m, x_m[here], y_m[here]
+        )
         yield speed_m_s[here, None], force_n[here, None], part
 
 

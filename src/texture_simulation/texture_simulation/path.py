@@ -268,6 +268,8 @@ class SimulatedSlide:
         Direction of travel, from +x towards +y; at the start, for a circle.
     radius_m
         Of a circle, travelled anticlockwise; 0 for a straight line.
+    start_x_m, start_y_m : number or (count,)
+        Where it begins, on a sample that varies; of any other, each slide meets another place anyway.
     """
 
     speed_m_s: Number
@@ -275,6 +277,8 @@ class SimulatedSlide:
     duration_s: float
     direction_rad: Number = 0.0
     radius_m: float = 0.0
+    start_x_m: Number = 0.0
+    start_y_m: Number = 0.0
 
     def steady_path(self, speed_m_s: Array, force_n: Array, n_points: int, rate_hz: float) -> Trajectory:
         """Return the way at a constant speed, (..., n_points) points; speed and force are (..., 1).
@@ -296,7 +300,9 @@ class SimulatedSlide:
             Places in m, force in N.
         """
         time_s = np.arange(1, n_points + 1) / rate_hz
-        return trajectory_along(speed_m_s * time_s, np.broadcast_to(force_n, (*force_n.shape[:-1], n_points)), self)
+        path = trajectory_along(speed_m_s * time_s, np.broadcast_to(force_n, (*force_n.shape[:-1], n_points)), self)
+        start_x_m, start_y_m = (np.asarray(at, dtype=np.float64)[..., None] for at in (self.start_x_m, self.start_y_m))
+        return path.moved(start_x_m, start_y_m)
 
 
 def trajectory_along(travelled_m: Array, force_n: Array, sliding: SimulatedSlide) -> Trajectory:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -13,7 +14,7 @@ from texture_core.config import find, find_file, from_mapping, load_yaml, param,
 from texture_core.errors import InvalidParameter
 from texture_simulation.effects import EFFECTS
 from texture_simulation.friction import FRICTIONS
-from texture_simulation.surfaces import FLAT, KINDS, Curved, Surface
+from texture_simulation.surfaces import FLAT, KINDS, Curved, PlaceVariation, Surface
 
 # --------------------
 # Contact of a soft round finger with a texture at 1 N; how it depends on the force is an effect.
@@ -67,7 +68,7 @@ class Contact:
 DEFAULT_SENSOR = 'tsf85'
 SHAPES: Mapping[str, type] = {'curved': Curved}
 TERMS: Mapping[str, type] = {**KINDS, **FRICTIONS, **SHAPES}
-SECTIONS = ('about', 'sensor', 'contact', 'effects', 'surfaces')
+SECTIONS = ('about', 'sensor', 'contact', 'effects', 'variation', 'surfaces')
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ def _check_sections(content: Any, where: str) -> None:
 
 
 def scene_from(name: str, content: Any) -> Scene:
-    """Return the scene that a mapping with `surfaces`, and if wanted `sensor`, `contact` and `effects`, describes.
+    """Return the scene that a mapping with `surfaces`, and if wanted the other `SECTIONS`, describes.
 
     Raises
     ------
@@ -160,9 +161,16 @@ def scene_from(name: str, content: Any) -> Scene:
     """
     where = f"scene '{name}'"
     _check_sections(content, where)
+    surfaces = {str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()}
+    if 'variation' in content:
+        variation = from_mapping(PlaceVariation, content['variation'] or {}, f'{where}, variation')
+        surfaces = {
+            key: replace(surface, variation=replace(variation, seed=variation.seed + zlib.crc32(key.encode())))
+            for key, surface in surfaces.items()
+        }
     return Scene(
         name=name,
-        surfaces={str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()},
+        surfaces=surfaces,
         contact=from_mapping(Contact, content.get('contact') or {}, f'{where}, contact'),
         effects=_effects(content.get('effects') or {}, where),
         sensor=str(content.get('sensor', DEFAULT_SENSOR)),

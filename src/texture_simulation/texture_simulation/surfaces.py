@@ -39,6 +39,66 @@ FLAT = Curved(math.inf)
 
 
 # --------------------
+# No sample is the same everywhere: slow random fields over the surface change its relief and its friction.
+
+FIELD_WAVES = 8  # plane waves of each field
+FIELD_KNOT_M = 1e-3
+# Standard deviations at a strength of 1: level and blur of the relief and the friction as logarithms, and the local
+# stretch of all lengths. A larger blur makes the spectrum steeper. The strength of a scene is set by one anchor.
+LEVEL_SPREAD, BLUR_SPREAD, FRICTION_SPREAD, STRETCH_SPREAD = 0.28, 0.28, 0.14, 0.028
+
+
+@dataclass(frozen=True)
+class PlaceVariation:
+    """How the statistics of a sample vary from place to place; such a sample lies still under the surface frame.
+
+    Examples
+    --------
+    >>> places = np.linspace(0.0, 1.0, 2000)
+    >>> level, blur, friction, shift_x_m, shift_y_m = PlaceVariation(strength=0.5).at(places, np.zeros(2000))
+    >>> bool(abs(np.log(level).std() - 0.5 * LEVEL_SPREAD) < 0.03), bool(np.abs(np.diff(np.log(level))).max() < 0.02)
+    (True, True)
+    """
+
+    strength: float = param(
+        1.0, 'Strength of the variation; 0 is a sample that is the same everywhere.', low=0.0, high=5.0
+    )
+    length_m: float = param(0.04, 'Length over which the statistics of a sample change.', unit='m', low=0.005, high=1.0)
+    seed: int = param(0, 'Seed of the fields; each surface of a scene has its own.', low=0)
+
+    def at(self, x_m: Array, y_m: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return factors of level, blur and friction, and shifts of x and y in m, (..., n) each."""
+        if not x_m.shape[-1]:
+            return (np.ones_like(x_m), np.ones_like(x_m), np.ones_like(x_m), np.zeros_like(x_m), np.zeros_like(x_m))
+        waves_1_m, phases = _field_waves(self.seed, self.length_m)
+        shape = (-1, FIELD_WAVES, *[1] * max(x_m.ndim, y_m.ndim))
+
+        def fields(x_m: Array, y_m: Array) -> Array:
+            kx, ky, phase = (values.reshape(shape) for values in (waves_1_m[0], waves_1_m[1], phases))
+            waves: Array = np.cos(kx * x_m + ky * y_m + phase).sum(axis=1) * math.sqrt(2 / FIELD_WAVES)
+            return waves
+
+        level, blur, friction, shift_x, shift_y = self.strength * interpolated_field(fields, x_m, y_m, FIELD_KNOT_M)
+        # The gradient of a field of unit variance has a standard deviation of k/√2 along each axis.
+        shift_m = STRETCH_SPREAD * math.sqrt(2.0) * self.length_m / (2 * math.pi)
+        return (
+            np.exp(LEVEL_SPREAD * level),
+            np.exp(BLUR_SPREAD * blur),
+            np.exp(FRICTION_SPREAD * friction),
+            shift_m * shift_x,
+            shift_m * shift_y,
+        )
+
+
+@lru_cache(maxsize=64)
+def _field_waves(seed: int, length_m: float) -> tuple[Array, Array]:
+    """Return wave vectors, (2, 5, FIELD_WAVES) rad/m, and phases, (5, FIELD_WAVES), of five fields."""
+    angle, phase, size = np.random.default_rng(seed).uniform(0.0, 1.0, (3, 5, FIELD_WAVES))
+    k = 2 * np.pi / length_m * (0.6 + 0.8 * size)
+    return k * np.stack([np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)]), 2 * np.pi * phase
+
+
+# --------------------
 # The profile across ridges that all have the same pitch, as its Fourier series.
 
 MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this share is left out
@@ -247,20 +307,25 @@ class Term(Protocol):
 
 @dataclass(frozen=True)
 class Surface:
-    """A named sum of terms, the friction on it (`frictions.py`; without one, the skin glides), and its curvature."""
+    """A named sum of terms, the friction on it (without one, the skin glides), its curvature, and how it varies."""
 
     name: str
     terms: tuple[Term, ...]
     friction: Any = None
     shape: Curved = FLAT
+    variation: PlaceVariation | None = None
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions."""
+        level: Array | float = 1.0
+        if self.variation is not None:
+            level, blur, _, shift_x_m, shift_y_m = self.variation.at(*np.broadcast_arrays(x_m, y_m))
+            x_m, y_m, blur_m = x_m + shift_x_m, y_m + shift_y_m, blur_m * blur
         blur_m = np.clip(blur_m, MIN_BLUR_M, MAX_BLUR_M)
         height = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape, blur_m.shape))
         for term in self.terms:
             height += term.height_m(x_m, y_m, blur_m)
-        return height
+        return np.asarray(level * height)
 
 
 # --------------------
