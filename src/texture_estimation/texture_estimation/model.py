@@ -34,6 +34,7 @@ from texture_estimation.model_files import AddedSlide, read_added_slides
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.numerics import is_tied, log_softmax
 from texture_estimation.recipe import Recipe
+from texture_features.correction import CORRECTED, read_correction
 from texture_features.features import temporal as slide_onset
 
 # Names of their parts in the file.
@@ -335,7 +336,7 @@ class TextureModel:
             'format': model_files.FORMAT,
             'name': self.name,
             'labels': list(self.trained_labels),
-            'feature_set': self.feature_set,
+            'feature_set': self.feature_set.partition(CORRECTED)[0],
             'features': list(self.names),
             'tempering_exponent': self.tempering_exponent,
             'stopping_rule': asdict(self.stopping_rule),
@@ -382,6 +383,11 @@ def load_model(path: str | Path) -> TextureModel:
         raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")
     with model_files.usable(target):
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
+        correction = read_correction(target)
+        feature_set = str(card['feature_set'])
+        if correction is not None:
+            recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction, _layouts={}))
+            feature_set += f'{CORRECTED}{correction.fingerprint}'
         parameters = model_files.load_parameters(content, TRUSTED, estimators=recipe.learner_name == 'sklearn')
         examples, novelty_detector, gaussians = (
             parameters.pop(name, None) for name in (EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL)
@@ -390,7 +396,7 @@ def load_model(path: str | Path) -> TextureModel:
             name=str(card['name']),
             labels=tuple(map(str, card['labels'])),
             names=tuple(map(str, card['features'])),
-            feature_set=str(card['feature_set']),
+            feature_set=feature_set,
             recipe=recipe,
             parameters=parameters,
             tempering_exponent=float(card['tempering_exponent']),

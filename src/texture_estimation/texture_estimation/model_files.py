@@ -31,6 +31,7 @@ from texture_core.config import (
 )
 from texture_core.errors import InvalidParameter, MissingLibrary, ModelMismatch, TextureError
 from texture_core.types import Array
+from texture_features.correction import CORRECTED
 from texture_features.examples import SlideConditions
 
 # --------------------
@@ -463,7 +464,13 @@ def _read(path: Path, feature_set: str, n_features: int) -> AddedSlide:
         raise ModelMismatch(
             f"added slide '{path}' cannot be read: {type(error).__name__}: {error}; remove it and add it again"
         ) from error
-    if of != feature_set or values.ndim != 2 or values.shape[1] != n_features or not added_slide.label:
+    # Corrected or not, features mean what they meant to the finger of the training.
+    if (
+        of.partition(CORRECTED)[0] != feature_set.partition(CORRECTED)[0]
+        or values.ndim != 2
+        or values.shape[1] != n_features
+        or not added_slide.label
+    ):
         raise ModelMismatch(
             f"added slide '{path}' is of the features '{of}', the model has '{feature_set}'; "
             f"move the folder '{path.parent.name}' away, or use the model to which it was added"

@@ -16,6 +16,7 @@ from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner, extras_of
 from texture_features.augmentation import Augmentation
+from texture_features.correction import CORRECTED
 from texture_features.feature_set import FeatureSet, choose, entry_of, read_recipe
 from texture_features.windows import WindowParams
 
@@ -44,6 +45,11 @@ def fingerprint_difference(came: str, trained: str) -> str:
             return f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz"
         if channels != trained_channels:
             return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
+    if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
+        return (
+            'the correction of the finger is another; start the feature_extractor and the classifier again, both with '
+            "the model's card"
+        )
     return "features or window length are others; start the feature_extractor with the model's card as its recipe"
 
 

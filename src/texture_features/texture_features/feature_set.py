@@ -17,6 +17,7 @@ import numpy as np
 from texture_core.config import find, find_file, from_mapping, load_card, load_yaml, param, safe_repr
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_core.types import TARED, Array, FeatureVector, Window
+from texture_features.correction import CORRECTED, Correction, read_correction
 from texture_features.feature import Feature, WindowBatch
 from texture_features.features.spectral import (
     LogBands,
@@ -268,11 +269,12 @@ class FeatureSet:
 
     windows: WindowParams
     inputs: tuple[InputFeatures, ...]
+    correction: Correction | None = None  # of another finger than that of the training
     _layouts: dict[InputLayout, tuple[tuple[str, ...], str]] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
-        """Read the feature set of a recipe (YAML) or of a model's card (JSON), by name or path.
+        """Read the feature set of a recipe (YAML), or of a model's card (JSON) with the correction beside it.
 
         Raises
         ------
@@ -280,7 +282,10 @@ class FeatureSet:
             If there is no such file or it does not hold a feature set.
         """
         _, recipe = read_recipe(name_or_path)
-        return cls.from_mapping(recipe, f"recipe '{name_or_path}'")
+        feature_set = cls.from_mapping(recipe, f"recipe '{name_or_path}'")
+        if not name_or_path.endswith(('.json', '.skops')):
+            return feature_set
+        return dataclasses.replace(feature_set, correction=read_correction(name_or_path), _layouts={})
 
     @classmethod
     def from_mapping(cls, recipe: Mapping[str, Any], where: str = 'recipe') -> FeatureSet:
@@ -416,6 +421,8 @@ class FeatureSet:
         """Return the values of windows, (..., n_values)."""
         flat = (*inputs[0].samples.shape[:-2], -1)
         by_name = dict(zip(self.window_names, inputs, strict=True))
+        if self.correction is not None:
+            by_name = {name: self.correction.apply(_topic_of(name), window) for name, window in by_name.items()}
         blocks = [
             feature(windows).reshape(flat)
             for item in self.inputs
@@ -457,7 +464,8 @@ class FeatureSet:
             f'{name}={rate:.6g}Hz*{len(channels)}'
             for name, (rate, channels) in zip(self.window_names, layout, strict=True)
         ]
-        return ' '.join([digest, *met])
+        corrected = f'{CORRECTED}{self.correction.fingerprint}' if self.correction else ''
+        return ' '.join([digest, *met]) + corrected
 
 
 def _input(topic: str, section: Any, where: str) -> InputFeatures:

@@ -1,0 +1,335 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compare a finger with the one of the training by a slide over a reference plate, and correct for the difference."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.config import load_json
+from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.types import Array
+from texture_features.feature import WindowBatch
+
+# --------------------
+# What one slide over the reference plate shows of an input.
+
+BANDS = 48
+SEGMENT_S = 0.25  # of a spectrum: resolves 4 Hz
+MIN_SEGMENTS = 8  # of a slide: fewer leave the spectrum uncertain by more than 1 dB
+SATURATED_SHARE = 0.01  # samples of a channel at its lowest or highest value
+DISTINCT = 100  # a channel with fewer values is too coarse to tell
+SIGNAL_TO_REST = 2.0  # least rms of the slide over that at rest
+FLOOR = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class InputStatistics:
+    """Statistics of one input over a slide on the reference plate and over the rest before its touch.
+
+    Parameters
+    ----------
+    sensor, rate_hz, channels
+        Of the stream.
+    log_power : (n_bands, n_channels)
+        Natural logarithm of the mean power density of the slide in bands of equal width from 0 to half the rate.
+    rms, rest_rms, rest_level : (n_channels,)
+        Standard deviation while sliding, and at rest in free air, and the mean at rest; NaN where no rest was recorded.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> rest, slide = 0.1 * rng.standard_normal((500, 1)), rng.standard_normal((4000, 1))
+    >>> found = InputStatistics.of(slide, rest, 1000.0, ('pac',), 'biotac')
+    >>> bool(abs(found.rms[0] - 1.0) < 0.05), found.log_power.shape
+    (True, (48, 1))
+    """
+
+    sensor: str
+    rate_hz: float
+    channels: tuple[str, ...]
+    log_power: Array
+    rms: Array
+    rest_rms: Array
+    rest_level: Array
+
+    @classmethod
+    def of(cls, samples: Array, rest: Array, rate_hz: float, channels: Sequence[str], sensor: str) -> InputStatistics:
+        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty.
+
+        Raises
+        ------
+        InvalidData
+            If the slide is too short, the sensor is saturated, or the plate hardly shows in the signal.
+        """
+        length = round(SEGMENT_S * rate_hz)
+        if len(samples) < MIN_SEGMENTS * length:
+            raise InvalidData(
+                f'the reference slide lasts {len(samples) / rate_hz:.2f} s; slide for {MIN_SEGMENTS * SEGMENT_S:g} s '
+                'or longer'
+            )
+        for column in samples.T:
+            values, counts = np.unique(column, return_counts=True)
+            share = max(counts[0], counts[-1]) / len(column)
+            if len(values) >= DISTINCT and share > SATURATED_SHARE:
+                raise InvalidData(
+                    f'{100 * share:.0f} % of the samples of the reference slide are at the end of the range: the '
+                    'sensor is saturated; press less, or lower its gain'
+                )
+        rms = samples.std(axis=0)
+        quiet = np.full(samples.shape[1], math.nan)
+        rest_rms, rest_level = (rest.std(axis=0), rest.mean(axis=0)) if len(rest) >= length else (quiet, quiet)
+        if float(np.median(rms)) < SIGNAL_TO_REST * float(np.median(rest_rms)):
+            raise InvalidData(
+                f'the reference slide has {np.median(rms):.3g} rms and the rest before it {np.median(rest_rms):.3g}: '
+                'too little signal; see that the finger touches the plate, or slide faster or harder'
+            )
+        starts = np.arange(0, len(samples) - length + 1, length // 2)
+        pieces = np.stack([samples[start : start + length] for start in starts])
+        pieces = (pieces - pieces.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]
+        power = np.mean(np.abs(np.fft.rfft(pieces, axis=1)) ** 2, axis=0) / length / rate_hz
+        edges = np.linspace(1, len(power), min(BANDS, len(power) - 1) + 1).astype(int)  # without the mean
+        bands = np.add.reduceat(power, edges[:-1], axis=0) / np.diff(edges)[:, None]
+        return cls(sensor, rate_hz, tuple(channels), np.log(bands + FLOOR), rms, rest_rms, rest_level)
+
+    @property
+    def frequencies_hz(self) -> Array:
+        """Middle of each band, Hz, (n_bands,)."""
+        count = len(self.log_power)
+        return (np.arange(count) + 0.5) * self.rate_hz / 2 / count
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return it in the form of JSON."""
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(self).items()
+        }
+
+    @classmethod
+    def from_mapping(cls, content: Mapping[str, Any]) -> InputStatistics:
+        """Return what `as_mapping` wrote; ValueError, TypeError or KeyError if it is something else."""
+        arrays = {
+            name: np.array(content[name], dtype=np.float64) for name in ('log_power', 'rms', 'rest_rms', 'rest_level')
+        }
+        channels = tuple(map(str, content['channels']))
+        if arrays['log_power'].shape[1:] != (len(channels),) or not np.isfinite(arrays['log_power']).all():
+            raise ValueError('its spectrum does not fit its channels')
+        return cls(str(content['sensor']), float(content['rate_hz']), channels, **arrays)
+
+
+# --------------------
+# The same finger, or another: what differs, and by what its samples become those of the finger of the training.
+
+GAIN_DB, RESPONSE_DB, NOISE_RATIO, DRIFT, DEAD = 1.0, 1.0, 2.0, 3.0, 0.1  # Largest that count as trained
+STIFFNESS = 30.0  # of the curve through the differences of the bands: about 8 free numbers over 48 bands
+DB = 10.0 / math.log(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class InputComparison:
+    """How one input differs from the reference.
+
+    Parameters
+    ----------
+    gain_db : (n_channels,)
+        Mean over the bands of the difference of power, dB.
+    response_db : (n_bands, n_channels)
+        Smooth difference of power over frequency, with the gain, dB.
+    noise_ratio
+        Rms at rest over that of the reference, median over channels; NaN if unknown.
+    drift
+        Change of the level at rest over the rms of the reference slide, median over channels; NaN if unknown.
+    dead
+        Channels that hardly move any more.
+    """
+
+    frequencies_hz: Array
+    gain_db: Array
+    response_db: Array
+    noise_ratio: float
+    drift: float
+    dead: tuple[str, ...]
+
+    @property
+    def faults(self) -> list[str]:
+        """What is not as trained, each in a few words; none if all is."""
+        uneven = self.response_db - self.gain_db
+        uneven_db, gain_db = float(np.sqrt(np.mean(uneven**2))), float(np.median(self.gain_db))
+        at = np.unravel_index(np.abs(uneven).argmax(), uneven.shape)
+        found = {
+            f'the gain changed by {gain_db:+.1f} dB': abs(gain_db) > GAIN_DB,
+            f'the frequency response differs by {uneven_db:.1f} dB rms, most at {self.frequencies_hz[at[0]]:.0f} Hz '
+            f'({uneven[at]:+.1f} dB)': uneven_db > RESPONSE_DB,
+            f'the noise at rest is {self.noise_ratio:.1f} times as strong': self.noise_ratio > NOISE_RATIO,
+            f'the level at rest drifted by {self.drift:.1f} times the rms of the slide': self.drift > DRIFT,
+            f'dead: {", ".join(self.dead)}': bool(self.dead),
+        }
+        return [fault for fault, is_there in found.items() if is_there]
+
+
+def compare(reference: InputStatistics, today: InputStatistics) -> InputComparison:
+    """Return how a finger differs from the one of the training.
+
+    Raises
+    ------
+    InvalidData
+        If they are of different sensors.
+    """
+    ours, theirs = ((one.sensor, f'{one.rate_hz:g} Hz', f'{len(one.channels)} channels') for one in (today, reference))
+    if ours != theirs:
+        raise InvalidData(
+            f'the reference is of the sensor {", ".join(theirs)}, and this one is {", ".join(ours)}; check the sensor '
+            'that the model was trained with, or store a reference of this one'
+        )
+    difference_db = DB * (today.log_power - reference.log_power)
+    ratio = today.rms / np.maximum(reference.rms, FLOOR)
+    dead = ratio < DEAD * float(np.median(ratio))
+    count = len(difference_db)
+    bend = np.diff(np.eye(count), n=2, axis=0)
+    smoother = np.linalg.inv(np.eye(count) + STIFFNESS * bend.T @ bend)
+    with np.errstate(invalid='ignore'):
+        noise = today.rest_rms / np.maximum(reference.rest_rms, FLOOR)
+        drift = np.abs(today.rest_level - reference.rest_level) / np.maximum(reference.rms, FLOOR)
+    return InputComparison(
+        frequencies_hz=reference.frequencies_hz,
+        gain_db=difference_db.mean(axis=0),
+        response_db=smoother @ np.where(dead, 0.0, difference_db),
+        noise_ratio=float(np.median(noise)),
+        drift=float(np.median(drift)),
+        dead=tuple(name for name, is_dead in zip(today.channels, dead, strict=True) if is_dead),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """By topic, the frequency response that is taken out of the samples of each window; levels stay.
+
+    Parameters
+    ----------
+    frequencies_hz
+        (n,) by topic.
+    response_db
+        (n, n_channels) by topic.
+
+    Examples
+    --------
+    >>> twice = Correction({'signal': np.array([0.0, 500.0])}, {'signal': np.full((2, 1), 20 * np.log10(2.0))})
+    >>> waves = 5.0 + np.sin(np.arange(1000.0))[:, None]
+    >>> corrected = twice.apply('signal', WindowBatch(waves, rate_hz=1000.0)).samples
+    >>> bool(np.allclose(corrected - corrected.mean(), (waves - waves.mean()) / 2)), round(float(corrected.mean()), 1)
+    (True, 5.0)
+    """
+
+    frequencies_hz: Mapping[str, Array]
+    response_db: Mapping[str, Array]
+
+    @property
+    def fingerprint(self) -> str:
+        """What tells it from other corrections."""
+        return hashlib.sha256(json.dumps(self.as_mapping(), sort_keys=True).encode()).hexdigest()[:8]
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return it in the form of JSON."""
+        return {
+            topic: {'frequencies_hz': self.frequencies_hz[topic].tolist(), 'response_db': response.tolist()}
+            for topic, response in self.response_db.items()
+        }
+
+    def apply(self, topic: str, window: WindowBatch) -> WindowBatch:
+        """Return a window as the finger of the training would have measured it."""
+        if topic not in self.response_db:
+            return window
+        response_db = self.response_db[topic]
+        if response_db.shape[1] != window.samples.shape[-1]:
+            raise InvalidData(
+                f"the correction of '{topic}' is for {response_db.shape[1]} channels, and a window has "
+                f'{window.samples.shape[-1]}; check the finger again'
+            )
+        count = window.samples.shape[-2]
+        hertz = np.fft.rfftfreq(count, 1.0 / window.rate_hz)
+        factors = 10.0 ** (
+            -np.stack([np.interp(hertz, self.frequencies_hz[topic], column) for column in response_db.T], axis=1) / 20.0
+        )
+        factors[0] = 1.0
+        samples = np.fft.irfft(np.fft.rfft(window.samples, axis=-2) * factors, count, axis=-2)
+        return replace(window, samples=samples, _memo={})
+
+    @classmethod
+    def of(cls, found: Mapping[str, InputComparison]) -> Correction:
+        """Return what takes out the differences that were found, by topic."""
+        return cls(
+            {topic: one.frequencies_hz for topic, one in found.items()},
+            {topic: one.response_db for topic, one in found.items()},
+        )
+
+
+# --------------------
+# The files beside a model: what the finger of the training showed, and by what another one is corrected.
+
+CORRECTION, REFERENCE = 'correction', 'reference'
+MOST_BYTES = 4_000_000
+MOST_DB = 60.0  # of a response that can be taken out
+CORRECTED = ' corrected='  # before the fingerprint of a correction, in that of features
+
+
+def file_beside(model: str | Path, kind: str) -> Path:
+    """Return the path NAME.reference.json or NAME.correction.json of a model, by the path of any of its files."""
+    path = Path(model)
+    name = path.name.removesuffix('.skops').removesuffix('.json')
+    return path.with_name(f'{name}.{kind}.json')
+
+
+def read_correction(model: str | Path) -> Correction | None:
+    """Return the correction beside a model; None if there is none.
+
+    Raises
+    ------
+    ModelMismatch
+        If the file is damaged.
+    """
+    path = file_beside(model, CORRECTION)
+    if not path.exists():
+        return None
+    try:
+        content = load_json(path, MOST_BYTES)
+        frequencies_hz, response_db = (
+            {str(topic): np.array(one[key], dtype=np.float64) for topic, one in content.items()}
+            for key in ('frequencies_hz', 'response_db')
+        )
+        for topic, response in response_db.items():
+            hertz = frequencies_hz[topic]
+            if response.ndim != 2 or len(response) != len(hertz) or not (np.diff(hertz) > 0).all():
+                raise ValueError(f"the response of '{topic}' does not fit its frequencies")
+            if not (np.abs(response) <= MOST_DB).all():
+                raise ValueError(f"the response of '{topic}' is beyond {MOST_DB:g} dB")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ModelMismatch(
+            f"correction '{path}' cannot be used: {error}; remove it, and check the finger again"
+        ) from error
+    return Correction(frequencies_hz, response_db)
+
+
+def read_reference(model: str | Path) -> dict[str, InputStatistics]:
+    """Return what the finger of the training showed on the reference plate, by topic.
+
+    Raises
+    ------
+    ModelMismatch
+        If no reference is stored, or the file is damaged.
+    """
+    path = file_beside(model, REFERENCE)
+    if not path.exists():
+        raise ModelMismatch(
+            f"no reference is stored: '{path}' does not exist; slide over the reference plate with the finger that the "
+            'model was trained with, and store that slide by --store'
+        )
+    try:
+        return {str(topic): InputStatistics.from_mapping(one) for topic, one in load_json(path, MOST_BYTES).items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ModelMismatch(f"reference '{path}' cannot be used: {error}; store it again by --store") from error
