@@ -13,6 +13,7 @@ from pathlib import Path
 
 from texture_benchmarks import (
     borders,
+    finger_check,
     frontier,
     latency,
     learning,
@@ -41,6 +42,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'borders': borders.run,  # at another place, on another day, with another finger
     'places': places.run,  # trained at six places against six slides of one track, simulated samples that vary
+    'finger_check': finger_check.run,  # another finger and another day, before and after `texture check`
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'roughness': latency.run_roughness,  # from window to grade
@@ -54,7 +56,9 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
 # Where accuracy counts: they run side by side, one on each core, the longest first.
 SIDE_BY_SIDE = ('trust', 'learning', 'robustness', 'next_motion', 'next_motion_recorded')
 # What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes or more.
-LONG = frozenset({'borders', 'frontier', 'motion', 'peers', 'recipes', 'robustness', 'scale', 'scenes', 'trust'})
+LONG = frozenset(
+    {'borders', 'finger_check', 'frontier', 'motion', 'peers', 'recipes', 'robustness', 'scale', 'scenes', 'trust'}
+)
 
 Act = Callable[[str], int]  # runs a study by its name and returns the exit code of its process
 

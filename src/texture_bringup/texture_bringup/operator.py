@@ -480,6 +480,17 @@ class Operator:
         client = self._parameters_of(node, deadline_s)
         self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
 
+    def parameters(self, node: str, names: Sequence[str], deadline_s: float = 10.0) -> list[float]:
+        """Return numbers that a node holds as parameters, in the order of their names.
+
+        Raises
+        ------
+        LaunchFailed
+            If the node does not answer.
+        """
+        client = self._parameters_of(node, deadline_s)
+        return [one.double_value for one in self._answer(node, client.get_parameters(list(names))).values]
+
     def set_from_texts(self, node: str, texts: Mapping[str, str], deadline_s: float = 10.0) -> None:
         """Set parameters of a node from texts, which are read as the types that the node has declared.
 

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import math
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_recordings.bags import BagWriter, Continuity
-from texture_recordings.dataset import STREAMS, find_slides, parse_selection
+from texture_recordings.dataset import STREAMS, LabelledSlide, find_slides, parse_selection, with_places
 from texture_recordings.nodes.replay import Schedule
 
 pytestmark = pytest.mark.ros
@@ -93,3 +94,14 @@ def test_losses_and_restarts_of_each_stream_are_counted() -> None:
         continuity.update(stream, TactileSignal(0, 's', ('c',), (), 1.0, first, np.zeros((4, 1), dtype=np.float32)))
     assert (continuity.lost['a'], continuity.restarts['a'], continuity.samples['a']) == (2, 1, 16)
     assert (continuity.lost['b'], continuity.restarts['b'], continuity.samples['b']) == (0, 0, 8)
+
+
+def test_slides_that_touched_at_several_places_of_a_surface_know_theirs():
+    def slide(surface, number, x_m):
+        states = [ExplorationState(0, 'one', 'linear_slide', Phase.CONTACT, surface=surface, x_m=x_m, y_m=0.001)]
+        return LabelledSlide(Path('bag'), 'one', surface, number, 0, None, states=states)
+
+    touched = [('oak', 0.01), ('oak', 0.012), ('oak', -0.03), ('felt', 0.01), ('felt', 0.011), ('cork', math.nan)]
+    found = with_places([slide(name, number, x_m) for number, (name, x_m) in enumerate(touched)])
+    assert [one.place for one in found] == ['at 10,1 mm', 'at 10,1 mm', 'at -30,1 mm', '', '', '']
+    assert (found[0].name, found[0].is_part) == ('oak/0', False)

@@ -73,7 +73,8 @@ class LabelledSlide:
     states
         Exploration states, in the order of time.
     place
-        Which part of the path it covers, such as '1/2'; '' for a whole slide. See `SlideDataset.in_parts`.
+        Which part of the path it covers, such as '1/2' (see `SlideDataset.in_parts`), or where a whole slide touched,
+        'at -12,8 mm', if slides of its surface touched at several places; else ''.
 
     Examples
     --------
@@ -97,7 +98,12 @@ class LabelledSlide:
     @property
     def name(self) -> str:
         """Surface and number, such as 'cork/3', and the part if it is one: unique over all bags."""
-        return f'{self.whole_name} part {self.place}' if self.place else self.whole_name
+        return f'{self.whole_name} part {self.place}' if self.is_part else self.whole_name
+
+    @property
+    def is_part(self) -> bool:
+        """Whether it is a part of a slide."""
+        return '/' in self.place
 
     @property
     def whole_name(self) -> str:
@@ -340,7 +346,7 @@ def find_slides(
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
         )
-    numbered = number_slides(labelled)
+    numbered = with_places(number_slides(labelled))
     found = [slide for slide in numbered if wanted is None or slide.number in wanted]
     if not found:
         most = max(slide.number for slide in numbered)
@@ -399,6 +405,37 @@ def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
         for number, slide in enumerate(sorted(group, key=lambda slide: slide.start_ns), 1)
     }
     return [replace(slide, number=numbers[id(slide)]) for slide in slides]
+
+
+PLACE_M = 0.005  # touches that are nearer count as one place: arms and surfaces are not exact
+TOUCHING = (Phase.CONTACT, Phase.SLIDE)
+
+
+def with_places(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
+    """Return slides with the place of their touch, where slides of one surface touched at several.
+
+    Parameters
+    ----------
+    slides
+        Whole slides; without reported positions they keep no place.
+    """
+    touched: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    found: list[tuple[float, float] | None] = []
+    for slide in slides:
+        touch = next(((s.x_m, s.y_m) for s in slide.states if s.phase in TOUCHING), (math.nan, math.nan))
+        if math.isnan(touch[0] + touch[1]):
+            found.append(None)
+            continue
+        places = touched[slide.surface]
+        near = next((place for place in places if math.dist(place, touch) < PLACE_M), None)
+        places += [touch] if near is None else []
+        found.append(near or touch)
+    return [
+        replace(slide, place=f'at {1e3 * place[0]:.0f},{1e3 * place[1]:.0f} mm')
+        if place is not None and len(touched[slide.surface]) > 1
+        else slide
+        for slide, place in zip(slides, found, strict=True)
+    ]
 
 
 def _named(paths: Sequence[Path]) -> str:
@@ -692,8 +729,8 @@ class SlideDataset:
         """
         if count < 2:
             raise InvalidData(f'slides are to be cut into {count} parts; 2 or more are needed')
-        if cut := next((slide for slide in self.slides if slide.place or not slide.sliding), None):
-            why = 'is a part already' if cut.place else 'tells no time of sliding'
+        if cut := next((slide for slide in self.slides if slide.is_part or not slide.sliding), None):
+            why = 'is a part already' if cut.is_part else 'tells no time of sliding'
             raise InvalidData(f"slide '{cut.name}' in '{cut.bag}' {why}; cut whole slides with their states")
         stretches: dict[str, list[_Stretch]] = {}
         for surface in dict.fromkeys(slide.surface for slide in self.slides):

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`texture collect` and `texture check` on the emulated rig, over a sample that varies."""
+
+import os
+
+import pytest
+
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup.command import main
+from texture_bringup.demo import free_port
+from texture_bringup.launcher import ChildLauncher
+from texture_bringup.nodes.collector import collect_surface
+from texture_bringup.operator import Operator
+from texture_core.errors import InvalidData
+from texture_evaluation.collection import CollectionParams
+from texture_evaluation.train import train_from_bags
+from texture_recordings.dataset import SlideDataset
+
+DOMAIN = 99
+PATIENT = 'estimate_timeout_s: 1.0, signal_timeout_s: 3.0, state_timeout_s: 1.0'  # this machine may be busy
+PATCH = 'patch_x_low_m: -0.05, patch_x_high_m: 0.05, patch_y_low_m: -0.04, patch_y_high_m: 0.04'
+QUICK = CollectionParams(
+    places=2, most_places=3, distance_m=0.03, speed_low_m_s=0.04, speed_high_m_s=0.05, bound=0.1
+)  # fmt: skip
+DEADLINE_S = 60.0
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('collect')
+
+
+@pytest.fixture(scope='module')
+def operator(folder):
+    params = folder / 'patient.yaml'
+    params.write_text(f'/**: {{ros__parameters: {{{PATIENT}, {PATCH}}}}}')
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
+    given = {
+        'device': folder / 'tsf85', 'finger_port': free_port(), 'scene': 'varying', 'surface': 'cork',
+        'recipe': 'fast', 'explorer_params': params,
+    }  # fmt: skip
+    before = os.environ.get('ROS_DOMAIN_ID')
+    os.environ['ROS_DOMAIN_ID'] = str(DOMAIN)  # of the recorder and the commands
+    with (
+        ChildLauncher('emulator', given, environment, folder / 'nodes.log') as launcher,
+        Operator('', DOMAIN, launcher.check) as operator,
+    ):
+        operator.wait_for_explorer(DEADLINE_S)
+        operator.wait_for_signal(DEADLINE_S)
+        yield operator
+    if before is None:
+        del os.environ['ROS_DOMAIN_ID']
+    else:
+        os.environ['ROS_DOMAIN_ID'] = before
+
+
+def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, folder):
+    told = []
+    end, bag = collect_surface(operator, 'cork', folder / 'bags', QUICK, lambda text, slides: told.append(text))
+    assert end.success, end.message
+    assert 'no other surface' in end.message
+    dataset = SlideDataset.from_bags([bag])
+    assert len(dataset) == end.slides >= 2
+    assert len(set(dataset.condition('place'))) == len(dataset)
+    touched = [next(one for one in slide.sliding) for slide in dataset]
+    assert all(abs(one.x_m) < 0.05 and abs(one.y_m) < 0.04 for one in touched)
+
+    operator.set_parameters('emulator', {'surface': 'sandpaper_240'})
+    end, other = collect_surface(operator, 'sandpaper', folder / 'bags', QUICK, lambda text, slides: told.append(text))
+    assert 'left-out places right' in end.message, end.message
+    train_from_bags('fast', [bag, other], out=folder / 'two')
+
+
+def test_a_patch_that_was_never_taught_is_named(operator, folder):
+    operator.set_parameters('explorer', {'patch_x_high_m': -0.05})
+    with pytest.raises(InvalidData, match='no surface is taught: touch the corners'):
+        collect_surface(operator, 'cork', folder / 'bags', QUICK, lambda _text, _slides: None)
+    operator.set_parameters('explorer', {'patch_x_high_m': 0.05})
+
+
+def test_the_finger_is_checked_by_a_slide_over_the_plate(operator, folder, capsys):
+    model = str(folder / 'two')
+    assert main(['check', model, '--store', '--force', '1']) == 0
+    assert 'is stored as the reference of the finger' in capsys.readouterr().out
+    assert main(['check', model, '--force', '1']) == 0
+    assert 'the finger is as trained' in capsys.readouterr().out

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Collect labelled slides of a surface at many places of the taught patch into a bag, as a service or as an action."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from texture_msgs import action, srv
+
+from texture_bringup.operator import Operator
+from texture_core.errors import InvalidData, MotionAborted, MotionRefused, TextureError
+from texture_core.ros import WaitingExecutor, run
+from texture_core.types import ExplorationRequest
+from texture_evaluation.collection import (
+    CollectionEnd,
+    CollectionParams,
+    Judgement,
+    Patch,
+    PlacePlan,
+    collect,
+    judge,
+    next_bag,
+)
+from texture_features.feature_set import FeatureSet
+from texture_recordings.dataset import SlideDataset
+
+RECIPE = 'fast'  # whose features judge the places
+RECORDER_S = 30.0  # to start, and to complete the bag
+FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
+PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
+Tell = Callable[[str, int], None]
+
+
+def collect_surface(
+    operator: Operator, surface: str, folder: Path, params: CollectionParams, tell: Tell, *, namespace: str = ''
+) -> tuple[CollectionEnd, Path]:
+    """Collect a surface; return how it ended, and the bag, which is complete however it ended.
+
+    Parameters
+    ----------
+    operator
+        Client of the explorer.
+    surface
+        Label of the slides.
+    folder
+        Folder of the bags of all surfaces; made if missing.
+    params
+        How many places, how fast and how hard.
+    tell
+        Called with a sentence and the number of slides.
+    namespace
+        Namespace of the finger.
+
+    Raises
+    ------
+    InvalidData
+        If no surface is taught, or no slide lies on the patch.
+    KeyboardInterrupt
+        If it was stopped; its sentence says what is kept.
+    """
+    low_x, high_x, low_y, high_y = operator.parameters('explorer', PATCH)
+    if not (low_x < high_x and low_y < high_y):
+        raise InvalidData(
+            'no surface is taught: touch the corners of the surface by `texture touch-surface`, or give the explorer '
+            f'{", ".join(PATCH)}'
+        )
+    plan = PlacePlan(surface, params, Patch(low_x, high_x, low_y, high_y))
+    folder.mkdir(parents=True, exist_ok=True)
+    bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
+    count = 0
+
+    def told(sentence: str, slides: int) -> None:
+        nonlocal count
+        count = slides
+        tell(sentence, slides)
+
+    with recorder(bag, namespace) as check:
+        operator.wait_for_listeners(('signal', 'exploration'), 2, check)
+
+        def explore(request: ExplorationRequest) -> str:
+            nonlocal count
+            check()
+            try:
+                explored = operator.explore(request)
+            except (MotionRefused, MotionAborted) as error:
+                return str(error)
+            count += explored.success
+            return '' if explored.success else explored.message
+
+        try:
+            end = collect(plan, params, explore, lambda: _judge(bag, surface, count), told)
+        except KeyboardInterrupt as stop:
+            raise KeyboardInterrupt(f"stopped: {stop}; {count} slides are kept in '{bag}'") from None
+        except TextureError as error:
+            raise InvalidData(f"{error}; {count} slides are kept in '{bag}'") from error
+    return end, bag
+
+
+def _judge(bag: Path, surface: str, slides: int) -> Judgement:
+    """Judge all bags of the folder, once the newest one shows so many slides on the disk."""
+    feature_set = FeatureSet.load(RECIPE)
+    deadline_s = time.monotonic() + FLUSHED_S
+    while True:
+        time.sleep(1.0)
+        dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        written = sum(one.bag == bag for one in dataset)
+        if written >= slides or time.monotonic() > deadline_s:
+            return judge(dataset.features(feature_set), surface)
+
+
+@contextmanager
+def recorder(bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
+    """Record into a bag by a process of its own; the function raises InvalidData, with what it said, if that ended."""
+    command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
+    with tempfile.TemporaryFile('w+') as output:
+        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
+
+        def said() -> str:
+            output.seek(0)
+            return output.read().strip().rpartition('\n')[2]
+
+        def check() -> None:
+            if process.poll() is not None:
+                raise InvalidData(f'the recorder ended: {said()}')
+
+        try:
+            yield check
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            try:
+                process.wait(RECORDER_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+class Collector(Node):
+    """Offer `collect` as a service and as an action; one collection at a time."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('collector', **kwargs)
+        self._busy = threading.Lock()
+        self._closing = False
+        group = ReentrantCallbackGroup()
+        self.create_service(srv.Collect, 'collect', self._on_service, callback_group=group)
+        ActionServer(
+            self,
+            action.Collect,
+            'collect',
+            self._on_goal,
+            callback_group=group,
+            cancel_callback=lambda _goal: CancelResponse.ACCEPT,
+        )
+
+    def shutdown(self) -> None:
+        """End the collection that runs; its finger is lifted and its bag completed."""
+        self._closing = True
+        with self._busy:
+            pass
+
+    def _on_service(self, request: srv.Collect.Request, response: srv.Collect.Response) -> srv.Collect.Response:
+        return self._collect(request, response, lambda _sentence, _slides: None, lambda: False)
+
+    def _on_goal(self, goal: Any) -> action.Collect.Result:
+        def tell(sentence: str, slides: int) -> None:
+            goal.publish_feedback(action.Collect.Feedback(message=sentence, slides=slides))
+
+        result = self._collect(goal.request, action.Collect.Result(), tell, lambda: bool(goal.is_cancel_requested))
+        if goal.is_cancel_requested:
+            goal.canceled()
+        elif result.success:
+            goal.succeed()
+        else:
+            goal.abort()
+        return result
+
+    def _collect(self, request: Any, result: Any, tell: Tell, cancelled: Callable[[], bool]) -> Any:
+        if not self._busy.acquire(blocking=False):
+            result.message = 'another collection is running; wait for its end, or cancel it'
+            return result
+
+        def guard() -> None:
+            if cancelled() or self._closing:
+                raise KeyboardInterrupt('cancelled')
+
+        namespace = self.get_namespace().strip('/')
+        try:
+            with Operator(namespace, guard=guard) as operator:
+                operator.wait_for_explorer(10.0)
+                params = params_from(request)
+                end, bag = collect_surface(
+                    operator, request.surface, Path(request.folder), params, tell, namespace=namespace
+                )
+        except (TextureError, OSError, KeyboardInterrupt) as error:
+            result.message = str(error)
+        else:
+            result.success, result.message, result.bag = end.success, end.message, str(bag)
+            result.slides, result.places, result.right = end.slides, end.judgement.places, end.judgement.right
+        finally:
+            self._busy.release()
+        self.get_logger().info(f'collect: {result.message}')
+        return result
+
+
+def params_from(request: Any) -> CollectionParams:
+    """Return the parameters of a request; 0 takes the default of a number."""
+    given = {one.name: getattr(request, one.name) for one in fields(CollectionParams) if hasattr(request, one.name)}
+    return CollectionParams(**{name: value for name, value in given.items() if value})
+
+
+def main() -> None:
+    """Run the node."""
+    run(Collector, make_executor=WaitingExecutor)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The daily check from bags of simulated slides: a finger with another gain, and one that is as trained."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from texture_core.errors import ModelMismatch
+from texture_estimation.model import load_model
+from texture_evaluation.check import check_finger
+from texture_evaluation.train import train_from_bags
+from texture_features.feature_set import FeatureSet
+from texture_recordings.dataset import SlideDataset
+from texture_simulation.offline import SlidePlan, write_simulated
+
+
+@pytest.fixture(scope='module')
+def trained(tmp_path_factory):
+    """A model of three surfaces, and six slides over one of them, its reference plate."""
+    folder = tmp_path_factory.mktemp('check')
+    plan = SlidePlan(slides=6, speed_m_s=0.05, force_n=1.0, slide_s=3.0)
+    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'leather', 'cardboard'))
+    train_from_bags('fast', bags, out=folder / 'three')
+    return folder / 'three', SlideDataset.from_bags([folder / 'bags' / 'leather'])
+
+
+def louder(slide, factor):
+    signals = {
+        topic: [replace(one, samples=one.samples * np.float32(factor)) for one in batches]
+        for topic, batches in slide.signals.items()
+    }
+    return replace(slide, signals=signals)
+
+
+def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
+    model, slides = trained
+    with pytest.raises(ModelMismatch, match=r'no reference is stored.*--store'):
+        check_finger(model, slides[0])
+    assert check_finger(model, slides[0], store=True)[0]
+    as_trained, sentence = check_finger(model, slides[1])
+    assert as_trained and sentence.startswith('the finger is as trained: signal gain ')
+
+    as_trained, sentence = check_finger(model, louder(slides[2], 2.0))
+    assert not as_trained
+    assert 'the gain changed by +6.' in sentence or 'the gain changed by +5.' in sentence
+    assert sentence.endswith('correct the model by --correct')
+
+    check_finger(model, louder(slides[2], 2.0), correct=True)
+    corrected = load_model(model)
+    of_extractor = FeatureSet.load(f'{model}.json')  # what the node loads
+    for feature_set in (corrected.recipe.feature_set, of_extractor):
+        dataset = SlideDataset((louder(slides[3], 2.0),)).features(feature_set)
+        assert dataset.feature_set == corrected.feature_set
+        assert set(corrected.decide(dataset.values)) == {'leather'}
+    plain = SlideDataset((slides[3],)).features(FeatureSet.load('fast'))
+    assert plain.feature_set != corrected.feature_set
+
+    as_trained, sentence = check_finger(model, slides[4], correct=True)  # the old finger is back
+    assert as_trained and sentence.endswith('its correction is removed')
+    assert load_model(model).feature_set == plain.feature_set

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+import math
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_evaluation.collection import (
+    CollectionParams,
+    Judgement,
+    Patch,
+    PlacePlan,
+    collect,
+    judge,
+    next_bag,
+)
+from texture_features.examples import LabelledFeatures, SlideConditions
+
+PATCH = Patch(-0.05, 0.05, 0.0, 0.06)
+PARAMS = CollectionParams(places=4, most_places=9, distance_m=0.02, speed_high_m_s=0.03)
+
+
+def test_the_touches_lie_on_the_patch_and_spread_over_places_directions_speeds_and_forces():
+    plan = PlacePlan('oak', PARAMS, PATCH)
+    touches = [plan.next() for _ in range(9)]
+    for one in touches:
+        ends = [
+            (one.start_x_m + way * math.cos(one.direction_rad), one.start_y_m + way * math.sin(one.direction_rad))
+            for way in (0.0, 0.03)  # with the ramps
+        ]
+        assert all(-0.05 <= x <= 0.05 and 0.0 <= y <= 0.06 for x, y in ends)
+        assert (one.surface, one.use_start, one.motion) == ('oak', True, 'linear_slide')
+    middles = np.array([[one.start_x_m, one.start_y_m] for one in touches]) + [
+        [0.015 * math.cos(one.direction_rad), 0.015 * math.sin(one.direction_rad)] for one in touches
+    ]
+    apart = [math.dist(a, b) for i, a in enumerate(middles) for b in middles[:i]]
+    assert min(apart) > 0.015
+    angles = np.array([one.direction_rad for one in touches])
+    assert np.abs(np.exp(1j * angles).mean()) < 0.6  # in all directions
+    for name, low, high in (('speed_m_s', 0.02, 0.03), ('force_n', 1.0, 2.0)):
+        values = [getattr(one, name) for one in touches]
+        assert low <= min(values) < low * 1.2 and high / 1.2 < max(values) <= high
+
+
+def test_a_patch_that_is_too_small_and_a_nameless_surface_are_refused():
+    with pytest.raises(InvalidData, match=r'0\.01 m by 0\.01 m; ask for shorter slides, or teach a larger patch'):
+        PlacePlan('oak', PARAMS, Patch(0.0, 0.01, 0.0, 0.01))
+    with pytest.raises(InvalidData, match='no surface was named'):
+        PlacePlan(' ', PARAMS, PATCH)
+    with pytest.raises(InvalidParameter, match="'places' is 9; it must not be above 'most_places', 3"):
+        CollectionParams(places=9, most_places=3)
+    with pytest.raises(InvalidParameter, match=r'lasts 0\.20 s at .*; 0\.6 s are needed'):
+        CollectionParams(distance_m=0.01)
+
+
+def features(shift_of_place, n_places=6):
+    """Two surfaces at 0 and 1; a place of oak shifts its feature by some multiple of the distance of the surfaces."""
+    rng = np.random.default_rng(0)
+    values, labels, groups, conditions = [], [], [], {}
+    for surface, centre in (('oak', 0.0), ('felt', 1.0)):
+        for place in range(n_places):
+            shift = shift_of_place(place) if surface == 'oak' else 0.0
+            name = f'{surface}/{place}'
+            values += (centre + shift + 0.1 * rng.standard_normal((10, 1))).tolist()
+            labels += [surface] * 10
+            groups += [name] * 10
+            conditions[name] = SlideConditions(place=f'at {place},0 mm')
+    return LabelledFeatures(
+        np.array(values), np.array(labels), np.array(groups), ('one',), 'a1', 0.5, 0.1, conditions=conditions
+    )
+
+
+def test_left_out_places_are_told_right_or_taken_for_another_surface():
+    assert judge(features(lambda place: 0.0), 'oak') == Judgement(6, 6, '', 1)
+    # One place of six is like felt: trained on the others it is taken for that.
+    assert judge(features(lambda place: float(place == 2)), 'oak') == Judgement(6, 5, 'felt', 1)
+    # Clopper and Pearson: 6 of 6 show 0.1^(1/6) at 90 %.
+    assert Judgement(6, 6, '', 1).bound == pytest.approx(0.1 ** (1 / 6))
+    assert Judgement(6, 6, '', 0).bound == 0.0
+
+
+def run(judgements, faults=(), params=PARAMS):
+    given, failing, told = iter(judgements), iter(faults), []
+    end = collect(
+        PlacePlan('oak', params, PATCH),
+        params,
+        lambda _request: next(failing, ''),
+        lambda: next(given),
+        lambda sentence, slides: told.append((slides, sentence)),
+    )
+    return end, told
+
+
+def test_it_ends_at_the_bound_not_before_the_fewest_places():
+    end, told = run([Judgement(3, 3, '', 2), Judgement(4, 3, 'felt', 2), Judgement(6, 6, '', 2)])
+    assert (end.success, end.slides) == (True, 6)
+    assert [slides for slides, _ in told] == [3, 4, 6]
+    assert end.message.startswith('6 of 6 left-out places right; at new places at least 68 %')
+
+
+def test_a_bound_that_is_not_met_says_what_is_missing():
+    end, _ = run([Judgement(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
+    assert (end.success, end.slides) == (False, 9)
+    assert 'mostly taken for felt' in end.message and 'collect felt at more places, too' in end.message
+
+
+def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
+    end, _ = run([Judgement(3, 0), Judgement(4, 0)])
+    assert (end.success, end.slides) == (True, 4)
+    assert 'no other surface is in the folder yet' in end.message
+
+
+def test_three_failures_in_a_row_end_it_and_two_do_not():
+    end, told = run([Judgement(3, 3, '', 1)] * 3, ['', 'off the patch', 'stopped', '', '', 'a', 'b', 'c'])
+    assert (end.success, end.slides) == (False, 3)
+    assert end.message == '3 touches in a row failed, the last: c'
+    assert (1, 'a touch failed: off the patch') in told
+
+
+def test_bags_of_a_surface_are_counted():
+    assert next_bag(['oak', 'oak-2', 'felt'], 'oak') == 'oak-3'

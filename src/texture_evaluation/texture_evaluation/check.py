@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check a finger by a slide over one reference plate: store, compare, correct; adapt a model to a day."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.config import writing
+from texture_core.errors import InvalidData
+from texture_core.types import Array, Phase
+from texture_estimation.few_shot import DAY_SUFFIX, adapted
+from texture_estimation.model import load_model
+from texture_estimation.model_files import model_stem
+from texture_evaluation.train import training_examples
+from texture_features.correction import (
+    CORRECTION,
+    REFERENCE,
+    Correction,
+    InputComparison,
+    InputStatistics,
+    compare,
+    file_beside,
+    read_reference,
+)
+from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
+
+
+def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
+    """Return what a slide over the reference plate shows of each input.
+
+    Raises
+    ------
+    InvalidData
+        If an input is missing or lost samples, or the slide proves nothing.
+    """
+    found = {}
+    for topic in topics:
+        samples = SlideSamples.of(slide, topic)
+        sensor = slide.signals[topic][0].sensor
+        rest = _at_rest(slide, topic)
+        found[topic] = InputStatistics.of(samples.samples, rest, samples.rate_hz, samples.channels, sensor)
+    return found
+
+
+def _at_rest(slide: LabelledSlide, topic: str) -> Array:
+    """Return the samples before the touch, (n, n_channels); none where the approach was not recorded."""
+    approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
+    touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
+    batches = slide.signals[topic]
+    until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0)
+    rest = [one.samples for one in batches if one.end_ns <= until_ns]
+    return np.concatenate(rest).astype(np.float64) if rest else np.empty((0, len(batches[0].channels)))
+
+
+def check_finger(
+    model: str | Path, slide: LabelledSlide, *, store: bool = False, correct: bool = False
+) -> tuple[bool, str]:
+    """Compare the finger with the one of the training by a slide over the plate; return whether it is, and a sentence.
+
+    Parameters
+    ----------
+    model
+        Path of the model, beside which reference and correction lie.
+    slide
+        Over the reference plate.
+    store
+        Take this slide as the reference instead: the finger is the one of the training.
+    correct
+        Write the correction, or remove one that is needed no more.
+
+    Raises
+    ------
+    ModelMismatch, InvalidData
+        If no reference is stored, the sensor is another, or the slide proves nothing.
+    """
+    topics = load_model(model).recipe.feature_set.topics
+    today = statistics_of(slide, topics)
+    path = file_beside(model, REFERENCE)
+    if store:
+        _write(path, {topic: one.as_mapping() for topic, one in today.items()})
+        return True, f"the slide is stored as the reference of the finger, '{path}'"
+    reference = read_reference(model)
+    if missing := sorted(set(topics) - set(reference)):
+        raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
+    found = {topic: compare(reference[topic], today[topic]) for topic in topics}
+    faults = [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
+    correction = file_beside(model, CORRECTION)
+    if not faults:
+        removed = correct and correction.exists()
+        if removed:
+            correction.unlink()
+        return True, f'the finger is as trained: {_numbers(found)}{"; its correction is removed" if removed else ""}'
+    sentence = f'the finger is not as trained: {"; ".join(faults)}'
+    if not correct:
+        return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
+    _write(correction, Correction.of(found).as_mapping())
+    return False, f"{sentence}. The model is corrected, '{correction}': start it again, with its card as the recipe"
+
+
+def _numbers(found: Mapping[str, InputComparison]) -> str:
+    return ', '.join(
+        f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB, noise '
+        f'× {one.noise_ratio:.1f}, drift {one.drift:.1f} rms'
+        for topic, one in found.items()
+    )
+
+
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    with writing(path):
+        path.write_text(json.dumps(content), encoding='utf-8')
+
+
+def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> tuple[Path, str]:
+    """Save MODEL-today, adapted by the labelled slides of today; return its path, and in a sentence what it is.
+
+    Parameters
+    ----------
+    model
+        Path of the model.
+    bags
+        Bags that it was trained on, of several days.
+    today
+        Bags of today, with one or more labelled slides of each surface.
+    """
+    trained = load_model(model)
+    features = trained.recipe.feature_set
+    shots = SlideDataset.from_bags(today, topics=features.topics)
+    examples = training_examples(trained.recipe, SlideDataset.from_bags(bags, topics=features.topics))
+    stem = model_stem(model)
+    out = stem.with_name(f'{stem.name}{DAY_SUFFIX}')
+    adapted(trained, examples, shots.features(features)).save(out)
+    missing = sorted(set(trained.trained_labels) - set(shots.labels.tolist()))
+    without = f'; without a slide of today: {", ".join(missing)}' if missing else ''
+    return out, (
+        f"'{out}' is adapted to {len(shots)} slides of today{without}. It names surfaces and says of none that it is "
+        'known'
+    )

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Collect slides of a surface at many places: where to touch next, how well left-out places are told, when to end."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import beta
+
+from texture_core.config import param
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import Array, ExplorationRequest, checked_label
+from texture_estimation.learners.discriminant import linear_discriminant
+from texture_features.examples import LabelledFeatures, SlideConditions
+
+# --------------------
+# What is asked for.
+
+
+SHORTEST_S = 0.6  # of a slide: one window, and what starts late
+
+
+@dataclass(frozen=True)
+class CollectionParams:
+    """How a surface is collected; the places lie on the taught patch."""
+
+    places: int = param(6, 'Fewest places that are touched.', low=2, high=1000)
+    most_places: int = param(18, 'Most places that are touched.', low=2, high=1000)
+    distance_m: float = param(0.04, 'Length of each slide.', unit='m', low=0.002, high=1.0)
+    speed_low_m_s: float = param(0.02, 'Lowest speed of the slides.', unit='m/s', low=0.002, high=1.0)
+    speed_high_m_s: float = param(0.05, 'Highest speed of the slides.', unit='m/s', low=0.002, high=1.0)
+    force_low_n: float = param(1.0, 'Lowest normal force of the slides.', unit='N', low=0.1, high=50.0)
+    force_high_n: float = param(2.0, 'Highest normal force of the slides.', unit='N', low=0.1, high=50.0)
+    bound: float = param(
+        0.6, 'Fraction of new places right that must be shown, as a lower 90 % bound.', low=0.0, high=0.99
+    )
+    seed: int = param(0, 'Seed of places and directions.', low=0)
+
+    def __post_init__(self) -> None:
+        for low, high in (
+            ('places', 'most_places'),
+            ('speed_low_m_s', 'speed_high_m_s'),
+            ('force_low_n', 'force_high_n'),
+        ):
+            if getattr(self, low) > getattr(self, high):
+                raise InvalidParameter(
+                    f"'{low}' is {getattr(self, low):g}; it must not be above '{high}', {getattr(self, high):g}"
+                )
+        shortest_s = self.distance_m / self.speed_high_m_s
+        if shortest_s < SHORTEST_S:
+            raise InvalidParameter(
+                f"a slide of 'distance_m' {self.distance_m:g} m lasts {shortest_s:.2f} s at 'speed_high_m_s' "
+                f'{self.speed_high_m_s:g} m/s; {SHORTEST_S:g} s are needed to judge it'
+            )
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A rectangle in the surface frame, m."""
+
+    x_low_m: float
+    x_high_m: float
+    y_low_m: float
+    y_high_m: float
+
+
+# --------------------
+# Which place, direction, speed and force comes next.
+
+CANDIDATES = 200
+EDGE = 0.5  # of a slide beyond its end, for the ramps before and after it
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+PLASTIC = 0.7548776662466927  # the same for a second sequence beside it (Roberts 2018)
+
+
+class PlacePlan:
+    """Choose touches one by one, each far from those before; speeds and forces fill their ranges evenly.
+
+    Raises
+    ------
+    InvalidData
+        If no slide of this length lies on the patch.
+
+    Examples
+    --------
+    >>> plan = PlacePlan('oak', CollectionParams(), Patch(0.0, 0.1, 0.0, 0.1))
+    >>> first, second = plan.next(), plan.next()
+    >>> first.use_start, math.dist((first.start_x_m, first.start_y_m), (second.start_x_m, second.start_y_m)) > 0.03
+    (True, True)
+    """
+
+    def __init__(self, surface: str, params: CollectionParams, patch: Patch) -> None:
+        self._surface, self._params, self._patch = checked_label(surface), params, patch
+        if not self._surface:
+            raise InvalidData('no surface was named; give the label of what is collected')
+        self._rng = np.random.default_rng(params.seed)
+        self._middles: list[Array] = []
+        if not self._candidates(CANDIDATES):
+            raise InvalidData(
+                f'no slide of {params.distance_m:g} m with its ramps lies on the patch, which is '
+                f'{patch.x_high_m - patch.x_low_m:g} m by {patch.y_high_m - patch.y_low_m:g} m; ask for shorter '
+                'slides, or teach a larger patch'
+            )
+
+    def next(self) -> ExplorationRequest:
+        """Return the next touch."""
+        number, params = len(self._middles), self._params
+        found = self._candidates(CANDIDATES)
+        while not found:
+            found = self._candidates(CANDIDATES)
+        best = max(found, key=lambda one: min((math.dist(one[3], other) for other in self._middles), default=0.0))
+        x_m, y_m, direction_rad, middle = best
+        self._middles.append(middle)
+        return ExplorationRequest(
+            'linear_slide',
+            speed_m_s=_between(params.speed_low_m_s, params.speed_high_m_s, (number * GOLDEN) % 1.0),
+            force_n=_between(params.force_low_n, params.force_high_n, (number * PLASTIC) % 1.0),
+            distance_m=params.distance_m,
+            direction_rad=direction_rad,
+            surface=self._surface,
+            use_start=True,
+            start_x_m=x_m,
+            start_y_m=y_m,
+        )
+
+    def _candidates(self, count: int) -> list[tuple[float, float, float, Array]]:
+        """Return places, directions and middles of slides that lie on the patch with their ramps."""
+        patch, reach_m = self._patch, (1.0 + EDGE) * self._params.distance_m
+        low, high = np.array([patch.x_low_m, patch.y_low_m]), np.array([patch.x_high_m, patch.y_high_m])
+        starts = self._rng.uniform(low, high, (count, 2))
+        angles = self._rng.uniform(-math.pi, math.pi, count)
+        ways = reach_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        fits = np.all((starts + ways >= low) & (starts + ways <= high), axis=1)
+        return [
+            (float(start[0]), float(start[1]), float(angle), start + way / 2)
+            for start, way, angle in zip(starts[fits], ways[fits], angles[fits], strict=True)
+        ]
+
+
+def _between(low: float, high: float, share: float) -> float:
+    return float(low * (high / low) ** share)
+
+
+# --------------------
+# How well places are told that were left out of a training on all others.
+
+SHRINKAGE = 0.5  # few slides tell no correlations
+CONFIDENCE = 0.9
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What a quick classifier says of places that it was not trained at.
+
+    Parameters
+    ----------
+    places, right
+        Places that were left out in turn, and those of them of which most windows were told right.
+    confused
+        The surface taken for it most often, '' if none.
+    others
+        Number of other surfaces.
+    """
+
+    places: int
+    right: int
+    confused: str = ''
+    others: int = 0
+
+    @property
+    def bound(self) -> float:
+        """Lower 90 % bound of the fraction of new places right; 0 without other surfaces. Clopper & Pearson 1934."""
+        if not self.others or not self.right:
+            return 0.0
+        return float(beta.ppf(1.0 - CONFIDENCE, self.right, self.places - self.right + 1))
+
+    @property
+    def sentence(self) -> str:
+        """What is known so far."""
+        if not self.others:
+            return f'{self.places} places; no other surface is in the folder yet to tell it from'
+        taken = f', mostly taken for {self.confused}' if self.confused else ''
+        return (
+            f'{self.right} of {self.places} left-out places right{taken}; at new places at least '
+            f'{100 * self.bound:.0f} % (90 % bound), against {self.others} other surfaces'
+        )
+
+
+def judge(features: LabelledFeatures, surface: str) -> Judgement:
+    """Return how a discriminant tells the places of a surface, each left out in turn, from all other surfaces.
+
+    Parameters
+    ----------
+    features
+        Windows of all slides of the folder, with their places; a slide without a place counts as one.
+    surface
+        The one that is collected.
+    """
+    own = features.labels == surface
+    made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
+    places = np.array([made[name].place or name for name in features.groups.tolist()])
+    names = np.unique(np.append(features.labels, surface))
+    codes = np.searchsorted(names, features.labels)
+    where = np.unique(places[own])
+    if len(names) < 2 or len(where) < 2:
+        return Judgement(len(where), 0, others=len(names) - 1)
+    taken: Counter[str] = Counter()
+    for place in where:
+        left = own & (places == place)
+        weights, offsets = linear_discriminant(features.values[~left], codes[~left], len(names), SHRINKAGE)
+        scores = (features.values[left] @ weights + offsets).mean(axis=0)
+        taken[str(names[int(scores.argmax())])] += 1
+    right = taken.pop(surface, 0)
+    return Judgement(len(where), right, taken.most_common(1)[0][0] if taken else '', len(names) - 1)
+
+
+# --------------------
+# The collection itself.
+
+EVERY = 3  # places after which it is judged
+FAILURES = 3  # in a row end it
+
+
+@dataclass(frozen=True)
+class CollectionEnd:
+    """How it ended: whether the bound was met, in a sentence, the number of slides, and the last judgement."""
+
+    success: bool
+    message: str
+    slides: int
+    judgement: Judgement = Judgement(0, 0)
+
+
+def collect(
+    plan: PlacePlan,
+    params: CollectionParams,
+    explore: Callable[[ExplorationRequest], str],
+    judge_all: Callable[[], Judgement],
+    tell: Callable[[str, int], None],
+) -> CollectionEnd:
+    """Touch place after place until the bound is met, the places are used up, or the finger cannot go on.
+
+    Parameters
+    ----------
+    plan, params
+        Where to touch, and when to end.
+    explore
+        Makes one slide; returns why it failed, '' if it did not.
+    judge_all
+        Judges what has been recorded so far.
+    tell
+        Called with a sentence and the number of slides after each judgement and each failure.
+    """
+    slides, failures, judgement = 0, 0, Judgement(0, 0)
+    while slides < params.most_places:
+        fault = explore(plan.next())
+        if fault:
+            failures += 1
+            tell(f'a touch failed: {fault}', slides)
+            if failures == FAILURES:
+                return CollectionEnd(False, f'{FAILURES} touches in a row failed, the last: {fault}', slides, judgement)
+            continue
+        slides, failures = slides + 1, 0
+        if slides % EVERY and slides not in (params.places, params.most_places):
+            continue
+        judgement = judge_all()
+        tell(judgement.sentence, slides)
+        met = judgement.bound >= params.bound if judgement.others else True
+        if slides >= params.places and met:
+            return CollectionEnd(True, judgement.sentence, slides, judgement)
+    missing = f'; the bound of {100 * params.bound:.0f} % is not met: '
+    missing += (
+        f'collect {judgement.confused} at more places, too, or other speeds and forces, or add slow channels'
+        if judgement.confused
+        else 'allow more places'
+    )
+    return CollectionEnd(False, judgement.sentence + missing, slides, judgement)
+
+
+def next_bag(existing: Sequence[str], surface: str) -> str:
+    """Return the name of the next bag of a surface: 'oak', 'oak-2', 'oak-3' and so on.
+
+    Examples
+    --------
+    >>> next_bag(['oak', 'felt'], 'oak')
+    'oak-2'
+    """
+    number = 1
+    while (name := surface if number == 1 else f'{surface}-{number}') in existing:
+        number += 1
+    return name
