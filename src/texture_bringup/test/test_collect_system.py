@@ -18,11 +18,11 @@ from texture_evaluation.collection import CollectionParams
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
 
-DOMAIN = 99
+DOMAIN = 83
 PATIENT = 'estimate_timeout_s: 1.0, signal_timeout_s: 3.0, state_timeout_s: 1.0'  # this machine may be busy
 PATCH = 'patch_x_low_m: -0.05, patch_x_high_m: 0.05, patch_y_low_m: -0.04, patch_y_high_m: 0.04'
 QUICK = CollectionParams(
-    places=2, most_places=3, distance_m=0.03, speed_low_m_s=0.04, speed_high_m_s=0.05, bound=0.1
+    places=2, most_places=2, distance_m=0.03, speed_low_m_s=0.04, speed_high_m_s=0.05, bound=0.1
 )  # fmt: skip
 DEADLINE_S = 60.0
 

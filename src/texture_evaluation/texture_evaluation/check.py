@@ -30,6 +30,9 @@ from texture_features.correction import (
 from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
 
 
+TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
+
+
 def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
     """Return what a slide over the reference plate shows of each input.
 
@@ -52,7 +55,7 @@ def _at_rest(slide: LabelledSlide, topic: str) -> Array:
     approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
     touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
     batches = slide.signals[topic]
-    until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0)
+    until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
     rest = [one.samples for one in batches if one.end_ns <= until_ns]
     return np.concatenate(rest).astype(np.float64) if rest else np.empty((0, len(batches[0].channels)))
 

@@ -85,7 +85,11 @@ class InputStatistics:
                 )
         rms = samples.std(axis=0)
         quiet = np.full(samples.shape[1], math.nan)
-        rest_rms, rest_level = (rest.std(axis=0), rest.mean(axis=0)) if len(rest) >= length else (quiet, quiet)
+        rest_rms, rest_level = quiet, quiet
+        if len(rest) >= length:
+            # Of the typical stretch: the arm may set off, or the level settle, in some.
+            stretches = rest[: len(rest) // length * length].reshape(-1, length, rest.shape[1])
+            rest_rms, rest_level = np.median(stretches.std(axis=1), axis=0), np.median(rest, axis=0)
         if float(np.median(rms)) < SIGNAL_TO_REST * float(np.median(rest_rms)):
             raise InvalidData(
                 f'the reference slide has {np.median(rms):.3g} rms and the rest before it {np.median(rest_rms):.3g}: '
