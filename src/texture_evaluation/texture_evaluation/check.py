@@ -29,7 +29,6 @@ from texture_features.correction import (
 )
 from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
 
-
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
 
 
