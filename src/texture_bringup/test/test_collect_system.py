@@ -18,7 +18,7 @@ from texture_evaluation.collection import CollectionParams
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
 
-DOMAIN = 83
+DOMAIN = 88
 PATIENT = 'estimate_timeout_s: 1.0, signal_timeout_s: 3.0, state_timeout_s: 1.0'  # this machine may be busy
 PATCH = 'patch_x_low_m: -0.05, patch_x_high_m: 0.05, patch_y_low_m: -0.04, patch_y_high_m: 0.04'
 QUICK = CollectionParams(
