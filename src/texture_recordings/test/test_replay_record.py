@@ -126,11 +126,8 @@ def test_streams_of_other_names_transforms_logs_and_parameters_are_recorded_and_
             for c, _, data in reader.messages()
             if c.topic == '/parameter_events'
         ]
-    assert {name for name, durability in offered.items() if durability == 'TRANSIENT_LOCAL'} >= {
-        '/signal_baseline',
-        '/tf_static',
-        '/exploration',
-    }
+    assert {offered[name] for name in ('/signal_baseline', '/tf_static', '/rosout')} == {'TRANSIENT_LOCAL'}
+    assert {offered[name] for name in ('/imu', '/words', '/parameter_events')} == {'VOLATILE'}
     given = {p.name: p.value.double_value for event in events if event.node == '/peer' for p in event.new_parameters}
     assert given['rate'] == 2.5
     assert {topic for topic, _, _ in read_bag(out)} >= {'imu', 'signal_baseline'}
