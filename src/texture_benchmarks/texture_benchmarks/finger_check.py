@@ -22,7 +22,7 @@ from texture_estimation.training import train
 from texture_evaluation.check import statistics_of
 from texture_evaluation.cross_validation import interval, predict_slides
 from texture_evaluation.train import training_examples
-from texture_features.correction import Correction, compare
+from texture_features.correction import CORRECTED, Correction, compare
 from texture_recordings.dataset import LabelledSlide, SlideDataset
 
 FINGER, RESPONSE_DB = ROWS['another finger'], 2.0
@@ -91,9 +91,10 @@ def _corrected(
 
 
 def corrected(model: TextureModel, correction: Correction) -> TextureModel:
-    """Return a model whose features are those of a corrected finger; the fingerprints of features are not compared."""
+    """Return a model whose features are those of a corrected finger."""
     feature_set = replace(model.recipe.feature_set, correction=correction, _layouts={})
-    return replace(model, recipe=replace(model.recipe, feature_set=feature_set))
+    fingerprint = f'{model.feature_set}{CORRECTED}{correction.fingerprint}'
+    return replace(model, feature_set=fingerprint, recipe=replace(model.recipe, feature_set=feature_set))
 
 
 def _counts(outcome: Outcome) -> dict[str, int]:
