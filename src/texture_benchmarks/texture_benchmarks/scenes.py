@@ -27,7 +27,6 @@ from texture_simulation.effects import (
     EFFECTS,
     FingerSpread,
     ForceGain,
-    GrowthEffect,
     PatchGrowth,
     SlideError,
     Unevenness,
@@ -134,11 +133,12 @@ def _without(scene: Scene, name: str) -> Scene:
 
 def _grown(contact: Contact, effect: Any, touch_protocol: TouchProtocol, sign: int) -> Contact:
     """Return the contact with the growth of an effect at the mean force in it (sign 1), or taken out of it (-1)."""
-    if not isinstance(effect, GrowthEffect):
-        return contact
     force_n = np.array([np.mean(touch_protocol.forces_n)])
-    blur, gain = (float(np.max(growth(force_n))) ** sign for growth in (effect.blur_growth, effect.gain_growth))
-    return replace(contact, blur_m=contact.blur_m * blur, stiffness_n_m=contact.stiffness_n_m * gain)
+    if isinstance(effect, PatchGrowth):
+        return replace(contact, blur_m=contact.blur_m * float(effect.blur_growth(force_n)[0]) ** sign)
+    if isinstance(effect, ForceGain):
+        return replace(contact, stiffness_n_m=contact.stiffness_n_m * float(effect.gain_growth(force_n)[0]) ** sign)
+    return contact
 
 
 def with_one_more(scene: Scene) -> dict[str, Scene]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +16,13 @@ from texture_core.config import param
 from texture_core.types import TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import SerialSensor
+from texture_drivers.serial_line import Decoder, SerialSensor
 from texture_drivers.timing import PPM, SLOW_CLOCK, ArrivalNumbering, RateMeter
 
 # --------------------
 # Numbers of the AnySkin's protocol and streams.
 #
-# Source: raunaqbhirangi/anyskin @4e5bd4f `arduino/5X_binary_burst_stream/5X_binary_burst_stream.ino`: each turn of
-# the
+# Source: raunaqbhirangi/anyskin @4e5bd4f `arduino/5X_binary_burst_stream/5X_binary_burst_stream.ino`: each turn of the
 # loop reads the five magnetometers, sends the four float32 of each, then CR and LF.
 
 MAGNETOMETERS = 5  # of the 5X board
@@ -216,7 +216,7 @@ class AnySkinSettings:
     temperature: bool = param(False, "Publishes the temperature of each magnetometer on the topic 'temperature'.")
 
 
-class AnySkinDecoder:
+class AnySkinDecoder(Decoder):
     """Decode the frames of an AnySkin; see `texture_drivers.serial_line.Decoder`.
 
     Parameters
@@ -232,7 +232,7 @@ class AnySkinDecoder:
     def __init__(self, settings: AnySkinSettings, batch_s: float, frame_id: str = '') -> None:
         self._settings = settings
         self._batch_s = batch_s
-        self._frame_id = frame_id
+        self._signal = partial(TactileSignal, frame_id=frame_id)
         self._parser = FrameParser(settings.magnetometers)
         self._channels = field_channels(settings.magnetometers)
         self._meter = RateMeter()
@@ -315,29 +315,19 @@ class AnySkinDecoder:
         return topics
 
     def _field(self, stamp_ns: int, index: int, values: Values) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=stamp_ns,
-            sensor=FIELD_SENSOR,
-            channels=self._channels,
-            units=(FIELD_UNIT,) * len(self._channels),
-            sampling_rate_hz=self._rate_hz,
-            first_sample=index,
-            samples=values[..., 1:].reshape(len(values), -1).astype(np.float32),
-            frame_id=self._frame_id,
-        )
+        samples = values[..., 1:].reshape(len(values), -1).astype(np.float32)
+        return self._signal(
+            sensor=FIELD_SENSOR, channels=self._channels, units=(FIELD_UNIT,) * len(self._channels),
+            sampling_rate_hz=self._rate_hz, stamp_ns=stamp_ns, first_sample=index, samples=samples,
+        )  # fmt: skip
 
     def _temperature(self, stamp_ns: int, index: int, values: Values) -> TactileSignal:
         channels = tuple(f'm{number}' for number in range(self._settings.magnetometers))
-        return TactileSignal(
-            stamp_ns=stamp_ns,
-            sensor=TEMPERATURE_SENSOR,
-            channels=channels,
-            units=(TEMPERATURE_UNIT,) * len(channels),
-            sampling_rate_hz=self._rate_hz,
-            first_sample=index,
+        return self._signal(
+            sensor=TEMPERATURE_SENSOR, channels=channels, units=(TEMPERATURE_UNIT,) * len(channels),
+            sampling_rate_hz=self._rate_hz, stamp_ns=stamp_ns, first_sample=index,
             samples=values[..., 0].astype(np.float32),
-            frame_id=self._frame_id,
-        )
+        )  # fmt: skip
 
 
 def anyskin(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SynTouch BioTac: protocol over a Cheetah adapter, units, messages of the vendor's driver, the sensor."""
+"""SynTouch BioTac: protocol over a Cheetah adapter, messages of the vendor's driver, the sensor."""
 
 from __future__ import annotations
 
@@ -7,21 +7,20 @@ import importlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidData
 from texture_core.framing import SEQUENCE_BITS, TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
-from texture_core.types import NANOSECONDS, Samples, TactileSignal
+from texture_core.types import NANOSECONDS, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams
 from texture_drivers.serial_line import SerialPort
-from texture_drivers.timing import PacketNumbering, StreamClock
+from texture_drivers.timing import PPM, SLOW_CLOCK, PacketNumbering, StreamClock
 
 # --------------------
 # How the replies of a BioTac board reach this computer: what every link offers.
@@ -51,33 +50,34 @@ class SpiFrame(NamedTuple):
     reply: bytes
 
 
-class SpiLink(Protocol):
+class SpiLink:
     """The way to a board; `counts` are totals kept over reopening."""
 
     max_drift: float  # by what share its clock may be wrong
-    serials: tuple[str, ...]  # serial number of the BioTac at each place, '' where there is none; () if not known
+    serials: tuple[str, ...] = ()  # serial number of the BioTac at each place, '' where there is none; () if not known
 
     def open(self) -> None:
         """Open the way and start sampling; DeviceError if it is not there."""
+        raise NotImplementedError
 
     def read(self) -> Sequence[SpiFrame]:
         """Wait for about one frame and return those that came, in order; DeviceError if the device is gone."""
-        ...
+        raise NotImplementedError
 
     def close(self) -> None:
         """Stop; never raises, may be called twice."""
+        raise NotImplementedError
 
     @property
     def counts(self) -> Mapping[str, int]:
         """Return what went wrong on the way."""
-        ...
+        raise NotImplementedError
 
 
 # --------------------
 # Numbers of the BioTac's protocol and streams.
 #
-# Sources: "BioTac C Library Manual for Cheetah" v1.1.0 (frame, slot time, adapter settings), "BioTac QuickStart
-# Guide"
+# Sources: "BioTac C Library Manual for Cheetah" v1.1.0 (frame, slot time, adapter settings), "BioTac QuickStart Guide"
 # (meaning of the channels); kth-ros-pkg/biotac_driver @6fb8e33 `biotac_sensors/include/biotac_sensors/biotac.h`
 # (commands, error words, chip selects); for the BioTac SP CNCR-NTU/biotac_sp_ros @e9f69b9.
 
@@ -171,6 +171,18 @@ class BioTacLayout:
         return len(self.slots) * (ECHO_BYTES + WORD_BYTES * fingers)
 
 
+def signal_makers(
+    layout: BioTacLayout, pac_rate_hz: float, slow_rate_hz: float, frame_id: str
+) -> tuple[Callable[..., TactileSignal], Callable[..., TactileSignal]]:
+    """Return what makes the batches of PAC and of the slow channels, out of stamp, first sample and samples."""
+    slow = {'channels': layout.slow_channels, 'units': (UNIT,) * len(layout.slow_channels)}
+    signal = partial(TactileSignal, frame_id=frame_id)
+    return (
+        partial(signal, sensor=PAC_SENSOR, channels=(PAC,), units=(UNIT,), sampling_rate_hz=pac_rate_hz),
+        partial(signal, sensor=SLOW_SENSOR, sampling_rate_hz=slow_rate_hz, **slow),
+    )
+
+
 LAYOUTS: Mapping[str, BioTacLayout] = {
     'biotac': BioTacLayout(electrodes=19),  # 44 slots, 100 frames/s
     'biotac_sp': BioTacLayout(electrodes=24),  # 54 slots, 81.5 frames/s
@@ -181,9 +193,8 @@ FINGERS = 5  # most that one board holds
 # --------------------
 # A microcontroller that samples a BioTac board over SPI and streams the replies over a serial line.
 #
-# Our own design, for whoever has no Cheetah adapter: see docs/sensors.md. It sends without being asked, framed
-# as
-# in `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
+# Our own design, for whoever has no Cheetah adapter: see docs/sensors.md. It sends without being asked, framed as in
+# `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
 
 VERSION = 1
 REPLY, SERIALS = 0x42, 0x53  # kinds of frames: 'B' and 'S'
@@ -193,7 +204,7 @@ RATE_CHECK_S = 1.0
 RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
 
 
-class SerialBridge:
+class SerialBridge(SpiLink):
     """The replies that a bridge sends, in order and each once. See `SpiLink`.
 
     Parameters
@@ -209,7 +220,6 @@ class SerialBridge:
     max_drift = 5e-3  # the internal oscillator of a microcontroller on USB is right to 0.25 %
 
     def __init__(self, device: str, layout: BioTacLayout, wait_s: float = 0.01) -> None:
-        self.serials: tuple[str, ...] = ()
         self._device = device
         self._layout = layout
         self._wait_s = wait_s
@@ -334,11 +344,9 @@ class FrameTracker:
 # --------------------
 # The Total Phase Cheetah SPI adapter, through the vendor's own Python module `cheetah_py`.
 #
-# That module and its library are not free and not part of this project; who owns the adapter has them from the
-# vendor.
+# That module and its library are not free and not part of this project; who owns the adapter has them from the vendor.
 # The calls and their values are those of kth-ros-pkg/biotac_driver @6fb8e33 `biotac_sensors/src/biotac.c`. This file
-# has
-# never met the hardware; its tests run against a stand-in.
+# has never met the hardware; its tests run against a stand-in.
 
 MODULE = 'cheetah_py'
 BITRATE_KHZ = 4400
@@ -354,7 +362,7 @@ QUEUED_FRAMES = 16  # submitted ahead: the adapter samples on while the host is 
 ADAPTERS = 16
 
 
-class Cheetah:
+class Cheetah(SpiLink):
     """Frames sampled back to back by a Cheetah adapter. See `SpiLink`.
 
     Parameters
@@ -368,7 +376,6 @@ class Cheetah:
     max_drift = 2e-2  # the slots are made of delays, whose sum is nominal
 
     def __init__(self, layout: BioTacLayout, now_s: Callable[[], float] = time.monotonic) -> None:
-        self.serials: tuple[str, ...] = ()
         self._layout = layout
         self._now_s = now_s
         self._api: Any = None
@@ -514,12 +521,10 @@ class Cheetah:
 # BioTac data as other people's ROS drivers publish it, made into the suite's signals. Knows no ROS.
 #
 # `biotac_sensors/BioTacHand` (kth-ros-pkg/biotac_driver @6fb8e33): one frame of 44 slots a message, stamped with the
-# host's time at the end of the frame. The ns_offset fields are wrong in that driver (it adds milliseconds to
-# seconds), so
-# the times of the samples come from the slot table here.
+# host's time at the end of the frame. The ns_offset fields are wrong in that driver (it adds milliseconds to seconds),
+# so the times of the samples come from the slot table here.
 #
-# `sr_robot_msgs/BiotacAll` (shadow-robot/sr_common @efa7d38): PAC since the last message, as many as there were, two
-# in
+# `sr_robot_msgs/BiotacAll` (shadow-robot/sr_common @efa7d38): PAC since the last message, as many as there were, two in
 # each millisecond of EtherCAT; the other channels are the newest values, stamped with the time of publishing.
 #
 # The functions work on any objects with the attributes of those messages.
@@ -527,8 +532,7 @@ class Cheetah:
 LATE_S = 0.015  # host stamps jitter by some ms; what is later than that has gaps before it
 
 
-@dataclass(frozen=True, eq=False)
-class BioTacReading:
+class BioTacReading(NamedTuple):
     """What one message holds about one finger.
 
     Parameters
@@ -548,8 +552,7 @@ class BioTacReading:
     serial: str = ''
 
 
-@dataclass(frozen=True)
-class MessageLayout:
+class MessageLayout(NamedTuple):
     """How one type of message is read, and when its samples were taken.
 
     Parameters
@@ -656,7 +659,7 @@ class BioTacMessageConverter:
         self.samples = 0
         self._layout = layout
         self._finger = finger
-        self._frame_id = frame_id
+        self._signals = signal_makers(BIOTAC, layout.pac_rate_hz, layout.message_rate_hz, frame_id)
         self._clock = StreamClock(layout.pac_rate_hz)
         self._next_index = 0
         self._next_row = 0
@@ -676,15 +679,19 @@ class BioTacMessageConverter:
         if not self._clock.settled:
             return {}
         self.samples += len(reading.pac)
-        start_ns = self._clock.time_ns(first)
+        start_ns, (pac, slow) = self._clock.time_ns(first), self._signals
+        pac_ns, slow_ns = (
+            round(delay_s * NANOSECONDS) for delay_s in (self._layout.pac_delay_s, self._layout.slow_delay_s)
+        )
         return {
-            'signal': self._pac(reading, first, start_ns),
-            'signal_static': self._slow(reading, row, start_ns),
+            'signal': pac(stamp_ns=start_ns + pac_ns, first_sample=first, samples=reading.pac[:, None]),
+            'signal_static': slow(stamp_ns=start_ns + slow_ns, first_sample=row, samples=reading.slow[None, :]),
         }
 
     def _place(self, n_samples: int, end_ns: int) -> tuple[int, int]:
         """Return the index of the first PAC sample and of the row of slow channels."""
-        late_ns = 0 if self._next_ns is None else end_ns - self._next_ns - self._length_ns(n_samples)
+        length_ns = round(n_samples / self._layout.pac_rate_hz * NANOSECONDS)
+        late_ns = 0 if self._next_ns is None else end_ns - self._next_ns - length_ns
         if late_ns > LATE_S * NANOSECONDS:
             missing = round(late_ns * self._layout.pac_rate_hz / NANOSECONDS)
             self.lost += missing
@@ -695,33 +702,6 @@ class BioTacMessageConverter:
         self._clock.observe(self._next_index, end_ns)
         return first, row
 
-    def _length_ns(self, n_samples: int) -> int:
-        return round(n_samples / self._layout.pac_rate_hz * NANOSECONDS)
-
-    def _pac(self, reading: BioTacReading, first: int, start_ns: int) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=start_ns + round(self._layout.pac_delay_s * NANOSECONDS),
-            sensor=PAC_SENSOR,
-            channels=(PAC,),
-            units=(UNIT,),
-            sampling_rate_hz=self._layout.pac_rate_hz,
-            first_sample=first,
-            samples=reading.pac[:, None],
-            frame_id=self._frame_id,
-        )
-
-    def _slow(self, reading: BioTacReading, row: int, start_ns: int) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=start_ns + round(self._layout.slow_delay_s * NANOSECONDS),
-            sensor=SLOW_SENSOR,
-            channels=BIOTAC.slow_channels,
-            units=(UNIT,) * len(BIOTAC.slow_channels),
-            sampling_rate_hz=self._layout.message_rate_hz,
-            first_sample=row,
-            samples=reading.slow[None, :],
-            frame_id=self._frame_id,
-        )
-
 
 # --------------------
 # What BioTacs answer to the sampling commands of whole frames: bytes to counts. Knows no link and no clock.
@@ -729,8 +709,7 @@ class BioTacMessageConverter:
 ODD_PARITY = np.array([byte.bit_count() % 2 == 1 for byte in range(256)])
 
 
-@dataclass(frozen=True, eq=False)
-class Replies:
+class Replies(NamedTuple):
     """Some frames of all BioTacs of a board, in counts; NaN where a word was damaged.
 
     Parameters
@@ -803,7 +782,6 @@ def decode(frames: bytes, layout: BioTacLayout, fingers: int) -> Replies:
 
 SILENCE_S = 1.0  # without a whole frame, or without a good word, the board or the finger is not there
 MICROSECONDS_PER_S = 1e6
-PPM = 1e6
 CHEETAH = 'cheetah'
 Topics = dict[str, list[TactileSignal]]
 
@@ -843,8 +821,10 @@ class BioTac:
         self._params = params
         self._now_ns = now_ns
         self._layout = layout
+        self._signals = signal_makers(layout, layout.pac_rate_hz, layout.frame_rate_hz, params.frame_id)
         self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        self._link = link or make_link(params, layout)
+        board = Cheetah(layout) if params.device == CHEETAH else SerialBridge(params.device, layout, params.batch_s)
+        self._link = link or board
         self._clock = StreamClock(MICROSECONDS_PER_S, max_drift=self._link.max_drift)
         self._numbers = PacketNumbering(layout.frame_rate_hz)
         self._epoch: int | None = None
@@ -888,7 +868,7 @@ class BioTac:
     def details(self) -> Mapping[str, str | float]:
         """Serial number of each BioTac that reported it, and how much the device's clock is slow."""
         serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._link.serials) if serial}
-        return {**serials, 'device clock slow by [ppm]': PPM * self._clock.drift}
+        return {**serials, SLOW_CLOCK: PPM * self._clock.drift}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:
@@ -903,19 +883,19 @@ class BioTac:
 
     def _process(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
         """Make batches of consecutive frames, once their times are certain."""
-        first, last = run[0], run[-1]
+        first_frame, last = run[0], run[-1]
         self._check_places(last.fingers)
         self._last_received_ns[-1] = now_ns
-        if first.epoch != self._epoch:
-            self._epoch = first.epoch
+        if first_frame.epoch != self._epoch:
+            self._epoch = first_frame.epoch
             self._numbers.interrupt()
             self._clock.restart()
         # A frame is sent when its last slot has been sampled.
         self._clock.observe(last.time_us + round(self._layout.frame_s * MICROSECONDS_PER_S), now_ns)
         if not self._clock.settled:
             return
-        start_ns = self._clock.time_ns(first.time_us)
-        index = self._numbers.place(first.number, len(run), start_ns)
+        start_ns = self._clock.time_ns(first_frame.time_us)
+        index = self._numbers.place(first_frame.number, len(run), start_ns)
         replies = decode(b''.join(frame.reply for frame in run), self._layout, last.fingers)
         self._samples += len(replies.pac)
         for finger, prefix in self._prefixes.items():
@@ -924,32 +904,12 @@ class BioTac:
             if replies.damaged[finger] == len(run) * len(self._layout.slots):
                 continue  # nobody there
             self._last_received_ns[finger] = now_ns
-            topics[f'{prefix}signal'].append(self._pac(start_ns, index, replies, finger))
-            topics[f'{prefix}signal_static'].append(self._slow(start_ns, index, replies, finger))
-
-    def _pac(self, start_ns: int, index: int, replies: Replies, finger: int) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=start_ns + self._layout.slot_time_ns(1),
-            sensor=PAC_SENSOR,
-            channels=(PAC,),
-            units=(UNIT,),
-            sampling_rate_hz=self._layout.pac_rate_hz,
-            first_sample=index * self._layout.pac_per_frame,
-            samples=replies.pac[:, finger : finger + 1],
-            frame_id=self._params.frame_id,
-        )
-
-    def _slow(self, start_ns: int, index: int, replies: Replies, finger: int) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=start_ns,
-            sensor=SLOW_SENSOR,
-            channels=self._layout.slow_channels,
-            units=(UNIT,) * len(self._layout.slow_channels),
-            sampling_rate_hz=self._layout.frame_rate_hz,
-            first_sample=index,
-            samples=replies.slow[:, :, finger],
-            frame_id=self._params.frame_id,
-        )
+            pac, slow = self._signals
+            stamp_ns, first = start_ns + self._layout.slot_time_ns(1), index * self._layout.pac_per_frame
+            samples = replies.pac[:, finger : finger + 1]
+            topics[f'{prefix}signal'].append(pac(stamp_ns=stamp_ns, first_sample=first, samples=samples))
+            samples = replies.slow[:, :, finger]
+            topics[f'{prefix}signal_static'].append(slow(stamp_ns=start_ns, first_sample=index, samples=samples))
 
     def _check_places(self, places: int) -> None:
         missing = [finger for finger in self._prefixes if finger >= places]
@@ -980,86 +940,3 @@ def consecutive(frames: Sequence[SpiFrame]) -> Iterator[list[SpiFrame]]:
     numbered = enumerate(frames)
     for _, run in groupby(numbered, key=lambda item: (item[1].epoch, item[1].fingers, item[1].number - item[0])):
         yield [frame for _, frame in run]
-
-
-def make_link(params: SensorParams, layout: BioTacLayout) -> SpiLink:
-    """Return the link that a device's name means: 'cheetah', or the path of a serial bridge."""
-    if params.device == CHEETAH:
-        return Cheetah(layout)
-    return SerialBridge(params.device, layout, params.batch_s)
-
-
-# --------------------
-# BioTac counts in pascals and volts, by nominal scales: good for orders of magnitude, not for metrology.
-#
-# Sources: BioTac Product Manual V20/V21 for the pressures, as quoted in the literature (not seen by us); 12 bits over
-# the
-# 0 to 3.3 V of the 2011 leaflet for the electrodes (its resolution of 3.2 mV would be that of 10 bits). Temperatures
-# stay
-# in counts: the thermistor is not linear.
-
-
-@dataclass(frozen=True)
-class BioTacScales:
-    """Parameters that convert the counts of a BioTac to units."""
-
-    pac_pa: float = param(
-        0.37,
-        'Sets the dynamic pressure (PAC) of one count; a larger value scales the pressures up.',
-        unit='Pa',
-        low=1e-3,
-        high=10.0,
-    )
-    pac_baseline: float = param(
-        2030.0,
-        'Sets the PAC count without vibration, which is subtracted before scaling.',
-        unit='count',
-        low=0.0,
-        high=FULL_SCALE,
-    )
-    pdc_pa: float = param(
-        36.5,
-        'Sets the static pressure (PDC) of one count; a larger value scales the pressures up.',
-        unit='Pa',
-        low=1.0,
-        high=1000.0,
-    )
-    pdc_baseline: float = param(
-        0.0,
-        'Sets the PDC count without load, which is subtracted before scaling; measure it on your own sensor.',
-        unit='count',
-        low=0.0,
-        high=FULL_SCALE,
-    )
-    electrode_v: float = param(
-        3.3 / FULL_SCALE,
-        'Sets the electrode voltage of one count; a larger value scales the voltages up.',
-        unit='V',
-        low=1e-5,
-        high=0.1,
-    )
-
-
-def to_physical(
-    samples: Samples, channels: Sequence[str], scales: BioTacScales | None = None
-) -> tuple[Samples, list[str]]:
-    """Return samples in physical units, and the unit of each channel.
-
-    Parameters
-    ----------
-    samples : (n_samples, n_channels) counts
-    channels
-        Names, as in a signal.
-    scales
-        Offsets and factors of the channels; None takes those of the manual.
-
-    Returns
-    -------
-    (n_samples, n_channels), and 'Pa', 'V' or 'count' for each channel
-    """
-    scales = scales or BioTacScales()
-    known = {PAC: (scales.pac_baseline, scales.pac_pa, 'Pa'), 'pdc': (scales.pdc_baseline, scales.pdc_pa, 'Pa')}
-    electrode, other = (0.0, scales.electrode_v, 'V'), (0.0, 1.0, UNIT)
-    rows = [known.get(name, electrode if name.startswith('electrode') else other) for name in channels]
-    baseline, size, units = zip(*rows, strict=True)
-    return (np.asarray(samples, dtype=np.float64) - baseline) * size, list(units)

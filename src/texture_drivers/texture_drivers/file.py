@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import BinaryIO, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,7 @@ from texture_drivers.sensor import SensorParams, load_settings
 # The signals of a recording in a file.
 
 
-@dataclass(frozen=True, eq=False)
-class FileRecording:
+class FileRecording(NamedTuple):
     """Samples from a file.
 
     Parameters

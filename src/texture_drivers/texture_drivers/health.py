@@ -465,11 +465,7 @@ class SensorHealth:
         conditions = (
             (bool(self._reader.fault), 'ERROR', self._reader.fault),
             (age_s > NO_SAMPLE_TIMEOUT_S, 'ERROR', f'no sample for {age_s:.1f} s; check the sensor'),
-            (
-                bool(dropped),
-                'ERROR',
-                f'no sample comes any more of {" and ".join(dropped)}; check its plug',
-            ),
+            (bool(dropped), 'ERROR', f'no sample comes any more of {" and ".join(dropped)}; check its plug'),
             (new.get('reopened', 0) > 0, 'WARN', 'the sensor was gone and has been opened again'),
             (new.get('lost', 0) > 0, 'WARN', f'{new.get("lost", 0)} samples lost since the last report'),
             (

@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from struct import Struct
 from typing import NamedTuple
 
@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.types import TactileSignal
-from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import SerialSensor
+from texture_drivers.serial_line import Decoder, SerialSensor
 from texture_drivers.timing import PPM, SLOW_CLOCK, PacketNumbering, StreamClock
 
 # --------------------
 # Numbers of the PapillArray's protocol and streams.
 #
 # Source: langxin11/contactile-papillarray-ros2, the description of the controller's protocol 2.0 (PTS, 2025). All
-# numbers
-# are little endian; offsets count from the byte after the start mark.
+# numbers are little endian; offsets count from the byte after the start mark.
 
 START = b'\x55\x66\x77\x88'
 END = b'\xaa\xbb\xcc\xdd'
@@ -152,8 +150,7 @@ class Measurements(NamedTuple):
     wholes: Sequence[Values]
 
 
-@dataclass(frozen=True)
-class PacketLayout:
+class PacketLayout(NamedTuple):
     """Where the measurements stand in a packet.
 
     Parameters
@@ -299,24 +296,7 @@ class PapillArraySettings:
             )
 
 
-@dataclass(frozen=True)
-class ArrayTopics:
-    """Names of what one array publishes."""
-
-    prefix: str
-
-    @cached_property
-    def signal(self) -> str:
-        """Topic of the pillars."""
-        return f'{self.prefix}{SIGNAL}'
-
-    @cached_property
-    def wrench(self) -> str:
-        """Topic of the whole array."""
-        return f'{self.prefix}{WRENCH}'
-
-
-class PapillArrayDecoder:
+class PapillArrayDecoder(Decoder):
     """Decode the packets of a hub; see `texture_drivers.serial_line.Decoder`.
 
     The hub's counter numbers the samples and its clock times them; over an interruption the host's clock tells what is
@@ -338,10 +318,10 @@ class PapillArrayDecoder:
         self, settings: PapillArraySettings, arrays: Mapping[int, str], device: str, frame_id: str = ''
     ) -> None:
         self._settings = settings
-        self._topics = {array: ArrayTopics(prefix) for array, prefix in arrays.items()}
+        self._topics = {array: (f'{prefix}{SIGNAL}', f'{prefix}{WRENCH}') for array, prefix in arrays.items()}
         self._device = device
-        self._frame_id = frame_id
         self._rate_hz = float(settings.rate_hz)
+        self._signal = partial(TactileSignal, sampling_rate_hz=self._rate_hz, frame_id=frame_id)
         self._parser = PapillArrayParser()
         self._layout: tuple[int, PacketLayout] | None = None  # length of the packets, and their layout
         self._clock = StreamClock(MICROSECONDS_PER_S)
@@ -375,14 +355,8 @@ class PapillArrayDecoder:
     @property
     def rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
-        topics = [(topics.signal, topics.wrench) for topics in self._topics.values()]
-        named = [name for names in topics for name in (names if self._settings.wrench else names[:1])]
+        named = [name for names in self._topics.values() for name in (names if self._settings.wrench else names[:1])]
         return dict.fromkeys(named, self._rate_hz)
-
-    @property
-    def limits(self) -> Limits:
-        """None is published."""
-        return {}
 
     def restart(self) -> None:
         """Go on after an interruption, with the index that the host's clock will tell."""
@@ -444,12 +418,20 @@ class PapillArrayDecoder:
         self, found: Measurements, rows: NDArray[np.intp], stamp_ns: int, index: int, topics: Topics
     ) -> None:
         """Add the batch of each array that a run of packets makes."""
-        for array, names in self._topics.items():
+        signal_of = partial(self._signal, stamp_ns=stamp_ns, first_sample=index)
+        units = tuple(PILLAR_QUANTITIES.values())
+        for array, (signal, wrench) in self._topics.items():
             pillars = found.pillars[array][rows]
-            topics.setdefault(names.signal, []).append(self._pillars(stamp_ns, index, pillars))
+            count = pillars.shape[1] // len(PILLAR_QUANTITIES)
+            batch = signal_of(
+                sensor=PILLARS_SENSOR, channels=pillar_channels(count), units=units * count, samples=pillars
+            )
+            topics.setdefault(signal, []).append(batch)
             if self._settings.wrench and array < len(found.wholes):
-                whole = self._whole(stamp_ns, index, found.wholes[array][rows])
-                topics.setdefault(names.wrench, []).append(whole)
+                whole = found.wholes[array][rows]
+                channels, whole_units = tuple(WHOLE_QUANTITIES), tuple(WHOLE_QUANTITIES.values())
+                batch = signal_of(sensor=WHOLE_SENSOR, channels=channels, units=whole_units, samples=whole)
+                topics.setdefault(wrench, []).append(batch)
 
     def _runs(self, found: Measurements) -> Iterator[NDArray[np.intp]]:
         """Yield the rows of packets that follow each other, without those sent twice."""
@@ -476,31 +458,6 @@ class PapillArrayDecoder:
         self._numbering.interrupt()
         self._clock.restart()
         self._last = None
-
-    def _pillars(self, stamp_ns: int, index: int, values: Values) -> TactileSignal:
-        count = values.shape[1] // len(PILLAR_QUANTITIES)
-        return TactileSignal(
-            stamp_ns=stamp_ns,
-            sensor=PILLARS_SENSOR,
-            channels=pillar_channels(count),
-            units=tuple(PILLAR_QUANTITIES.values()) * count,
-            sampling_rate_hz=self._rate_hz,
-            first_sample=index,
-            samples=values,
-            frame_id=self._frame_id,
-        )
-
-    def _whole(self, stamp_ns: int, index: int, values: Values) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=stamp_ns,
-            sensor=WHOLE_SENSOR,
-            channels=tuple(WHOLE_QUANTITIES),
-            units=tuple(WHOLE_QUANTITIES.values()),
-            sampling_rate_hz=self._rate_hz,
-            first_sample=index,
-            samples=values,
-            frame_id=self._frame_id,
-        )
 
 
 class PapillArray(SerialSensor):

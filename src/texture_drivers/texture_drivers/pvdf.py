@@ -9,10 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texture_core.config import param
-from texture_core.types import Array, Samples, TactileSignal
+from texture_core.types import Samples, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
 from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder
@@ -50,31 +49,12 @@ class ChargeLeak:
         """T = R·C, after which a charge has leaked to 37 %."""
         return self.resistance_ohm * self.capacitance_f
 
-    @property
-    def corner_hz(self) -> float:
-        """Frequency below which the film answers less and less."""
-        return 1 / (2 * math.pi * self.time_constant_s)
 
-    def response(self, frequency_hz: Array) -> NDArray[np.complex128]:
-        """Return the charge per force at frequencies, (n,), C/N.
+class ForceReconstructor:
+    """Reconstruct the force from the charge, batch by batch: the inverse of the leak above a frequency.
 
-        Parameters
-        ----------
-        frequency_hz : (n,)
-            At least 0.
-
-        Returns
-        -------
-        (n,) complex
-            C/N.
-        """
-        transfer = 2j * np.pi * frequency_hz * self.time_constant_s
-        response: NDArray[np.complex128] = self.d33_c_n * transfer / (1 + transfer)
-        return response
-
-
-class LeakingFilm:
-    """Force to charge, batch by batch; exact for a force that is constant between samples.
+    A constant force leaves no charge, so what lies far below the film's corner is lost for good, and a plain inverse
+    would add up every offset for ever. This one is exact but for a high-pass of first order at `from_hz`.
 
     Parameters
     ----------
@@ -82,39 +62,6 @@ class LeakingFilm:
         The film and its amplifier.
     rate_hz
         Of the samples.
-    """
-
-    def __init__(self, leak: ChargeLeak, rate_hz: float) -> None:
-        self._gain = leak.d33_c_n
-        self._pole = math.exp(-1 / (leak.time_constant_s * rate_hz))
-        self._filter = FirstOrder((1.0, -1.0), (1.0, -self._pole))
-
-    def update(self, force_n: Samples) -> Samples:
-        """Return the charge, (n_samples, n_channels) C, for forces of the same shape; at rest before the first.
-
-        Parameters
-        ----------
-        force_n : (n_samples, n_channels)
-            Force on the film.
-
-        Returns
-        -------
-        (n_samples, n_channels)
-            Charge, C.
-        """
-        return self._gain * self._filter.update(force_n)
-
-
-class ForceReconstructor:
-    """Reconstruct the force from the charge, batch by batch: the inverse of `LeakingFilm` above a frequency.
-
-    A constant force leaves no charge, so what lies far below the film's corner is lost for good, and a plain inverse
-    would add up every offset for ever. This one is exact but for a high-pass of first order at `from_hz`.
-
-    Parameters
-    ----------
-    leak, rate_hz
-        As for `LeakingFilm`.
     from_hz
         Lowest frequency restored; below the film's corner, or nothing is gained.
     """
@@ -123,7 +70,8 @@ class ForceReconstructor:
         self._gain = 1 / leak.d33_c_n
         pole = math.exp(-1 / (leak.time_constant_s * rate_hz))
         restored_pole = math.exp(-2 * math.pi * from_hz / rate_hz)
-        self._filter = FirstOrder((1.0, -pole), (1.0, -restored_pole))
+        self._numerator, self._denominator = (1.0, -pole), (1.0, -restored_pole)
+        self._state: Samples | None = None  # at rest
 
     def update(self, charge_c: Samples) -> Samples:
         """Return the force, (n_samples, n_channels) N, for charges of the same shape; at rest before the first.
@@ -138,51 +86,23 @@ class ForceReconstructor:
         (n_samples, n_channels)
             Force, N.
         """
-        return self._gain * self._filter.update(charge_c)
-
-    def restart(self) -> None:
-        """Forget the past: samples are missing."""
-        self._filter.restart()
-
-
-class FirstOrder:
-    """A recursive filter of first order that goes on from batch to batch."""
-
-    def __init__(self, numerator: tuple[float, float], denominator: tuple[float, float]) -> None:
-        self._numerator, self._denominator = numerator, denominator
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin at rest."""
-        self._state: Samples | None = None
-
-    def update(self, samples: Samples) -> Samples:
-        """Return the filtered samples, (n_samples, n_channels).
-
-        Parameters
-        ----------
-        samples : (n_samples, n_channels)
-            Follow those of the last call.
-
-        Returns
-        -------
-        (n_samples, n_channels)
-            In the unit of the samples.
-        """
         from scipy.signal import lfilter  # noqa: PLC0415 – no other sensor needs scipy
 
         if self._state is None:
-            self._state = np.zeros((1, samples.shape[1]))
-        filtered, self._state = lfilter(self._numerator, self._denominator, samples, axis=0, zi=self._state)
-        return np.asarray(filtered, dtype=np.float64)
+            self._state = np.zeros((1, charge_c.shape[1]))
+        filtered, self._state = lfilter(self._numerator, self._denominator, charge_c, axis=0, zi=self._state)
+        return np.asarray(self._gain * filtered)
+
+    def restart(self) -> None:
+        """Forget the past: samples are missing."""
+        self._state = None
 
 
 # --------------------
 # Numbers of the PVDF finger and of the line to its microcontroller.
 #
-# Film, force sensor and machine are those of Hu et al. 2014; the frames are our own (see `texture_core.framing`).
-# The paper tells neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz
-# that
+# Film, force sensor and machine are those of Hu et al. 2014; the frames are our own (see `texture_core.framing`). The
+# paper tells neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz that
 # are 3 s, or 76 mm of fabric at its 25.5 mm/s.
 
 FILM_TOPIC, FORCE_TOPIC = 'signal', 'signal_static'
@@ -233,9 +153,7 @@ class PvdfSettings:
         high=1e4,
     )
     film_gain_pc: float = param(
-        FILM_PC_PER_COUNT,
-        'Sets the charge of one count of the film; a larger value gives larger samples.',
-        unit='pC',
+        FILM_PC_PER_COUNT, 'Sets the charge of one count of the film; a larger value gives larger samples.', unit='pC'
     )
     film_offset_pc: float = param(
         0.0, 'Sets the charge of the film at 0 counts, which is added to every sample.', unit='pC'
@@ -313,51 +231,27 @@ class PvdfSettings:
 # The PVDF finger as a sensor of the suite: the film on 'signal', the force on 'signal_static'.
 
 
-class Pvdf:
+class Pvdf(SerialSensor):
     """Read film and force. See `texture_core.types.Sensor`."""
 
     def __init__(self, params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> None:
         settings = load_settings(PvdfSettings, params.config)
-        decoder = StreamDecoder(settings.streams(), params.frame_id)
-        self._line = SerialSensor(params, now_ns, decoder, baud=settings.baud)
+        super().__init__(params, now_ns, StreamDecoder(settings.streams(), params.frame_id), baud=settings.baud)
         self._reconstructor = settings.reconstructor()
         self._next_sample = 0
 
-    def open(self) -> None:
-        """Open the device; DeviceError if it cannot be reached."""
-        self._line.open()
-
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
         """Wait for the length of one batch and return what arrived."""
-        batches = self._line.read()
+        batches = super().read()
         if self._reconstructor is None or FILM_TOPIC not in batches:
             return batches
         restored = [self._restored(batch, self._reconstructor) for batch in batches[FILM_TOPIC]]
         return {**batches, FILM_TOPIC: restored}
 
-    def close(self) -> None:
-        """Close the device."""
-        self._line.close()
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Totals; see `StreamDecoder.counts`."""
-        return self._line.counts
-
-    @property
-    def details(self) -> Mapping[str, float]:
-        """How much the device's clock is slow."""
-        return self._line.details
-
-    @property
-    def expected_rates_hz(self) -> Mapping[str, float]:
-        """Nominal rate of each topic."""
-        return self._line.expected_rates_hz
-
     @property
     def limits(self) -> Limits:
         """Lowest and highest sample by topic; the force that is restored from the film has none."""
-        kept = self._line.limits
+        kept = super().limits
         return {FORCE_TOPIC: kept[FORCE_TOPIC]} if self._reconstructor else kept
 
     def _restored(self, film: TactileSignal, reconstructor: ForceReconstructor) -> TactileSignal:

@@ -178,16 +178,12 @@ def read_settings(config: str) -> dict[str, Any]:
     if not config:
         return {}
     if config.lstrip().startswith('{'):
-        content = _in_place(config)
+        try:
+            content = parse_yaml(config)
+        except PARSE_ERRORS as error:
+            raise InvalidParameter(f'settings {config} are no YAML: {error}') from error
     else:
         content = load_yaml(find_file(config, 'texture_drivers', 'config/sensors', 'settings'), 'settings')
     if not isinstance(content, dict):
         raise InvalidParameter(f'settings {config} hold {safe_repr(content)}; a mapping of names to values is needed')
     return content
-
-
-def _in_place(text: str) -> Any:
-    try:
-        return parse_yaml(text)
-    except PARSE_ERRORS as error:
-        raise InvalidParameter(f'settings {text} are no YAML: {error}') from error

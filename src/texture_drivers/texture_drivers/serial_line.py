@@ -9,8 +9,9 @@ import termios
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import serial
@@ -161,40 +162,41 @@ def reason_of(error: Exception) -> str:
 SILENCE_S = 1.0  # the device sends without being asked; opening the port again has woken many a one
 
 
-class Decoder(Protocol):
+class Decoder:
     """Turns the bytes of one protocol into batches; knows no port and no clock of its own."""
 
     @property
     def valid_frames(self) -> int:
         """How many valid frames have come in all."""
-        ...
+        raise NotImplementedError
 
     @property
     def counts(self) -> Mapping[str, int]:
         """Running totals, 'samples', 'lost' and 'bogus' among them."""
-        ...
+        raise NotImplementedError
 
     @property
     def details(self) -> Mapping[str, float]:
         """What the device's stream shows beside the samples, by name."""
-        ...
+        raise NotImplementedError
 
     @property
     def rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
-        ...
+        raise NotImplementedError
 
     @property
     def limits(self) -> Limits:
         """Lowest and highest sample by topic, where they are known."""
-        ...
+        return {}
 
     def restart(self) -> None:
         """Go on after an interruption."""
+        raise NotImplementedError
 
     def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
         """Return the batches, by topic, in `data`, which has just arrived."""
-        ...
+        raise NotImplementedError
 
 
 class SerialSensor:
@@ -339,7 +341,10 @@ class StreamTracker:
         self.stream = stream
         self.samples = 0  # published
         self.lost = 0  # between the first one published and the last
-        self._frame_id = frame_id
+        self._signal = partial(
+            TactileSignal, sensor=stream.sensor, channels=stream.channels, units=stream.units,
+            sampling_rate_hz=stream.rate_hz, frame_id=frame_id,
+        )  # fmt: skip
         self._counter = BlockCounter(stream.rate_hz, stream.sensor)
         self._due_ns: int | None = None  # when the next sample would have come, had there been no interruption
         self._published: int | None = None  # index after the last one
@@ -374,25 +379,13 @@ class StreamTracker:
             runs[-1][2].append(block.data)
         return [self._batch(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
 
-    def _account(self, index: int, samples: int) -> None:
-        """Count samples that are published, and those that are missing before them."""
-        self.lost += 0 if self._published is None else index - self._published
-        self._published = index + samples
-        self.samples += samples
-
     def _batch(self, index: int, stamp_ns: int, data: bytes) -> TactileSignal:
         counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(self.stream.channels))
-        self._account(index, len(counts))
-        return TactileSignal(
-            stamp_ns=stamp_ns,
-            sensor=self.stream.sensor,
-            channels=self.stream.channels,
-            units=self.stream.units,
-            sampling_rate_hz=self.stream.rate_hz,
-            first_sample=index,
-            samples=(counts * self.stream.gains + self.stream.offsets).astype(np.float32),
-            frame_id=self._frame_id,
-        )
+        self.lost += 0 if self._published is None else index - self._published
+        self._published = index + len(counts)
+        self.samples += len(counts)
+        samples = (counts * self.stream.gains + self.stream.offsets).astype(np.float32)
+        return self._signal(stamp_ns=stamp_ns, first_sample=index, samples=samples)
 
 
 # --------------------
@@ -404,7 +397,7 @@ class StreamTracker:
 LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
 
 
-class StreamDecoder:
+class StreamDecoder(Decoder):
     """Decode the bytes of a framed serial line into the batches of its streams, by topic.
 
     Frames of other kinds are passed over, so that other traffic may share the line. All streams are timed by one clock.

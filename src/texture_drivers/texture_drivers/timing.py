@@ -509,74 +509,21 @@ class BlockCounter:
 
 
 # --------------------
-# Losses in a stream that neither stamps nor counts its samples, known by how late they arrive.
-
-
-class UnseenLoss:
-    """Tell how many samples of a stream of constant rate were lost.
-
-    Whatever comes after a lost sample seems late by its time, and stays so. A busy host makes some arrivals late, but
-    not all of half a second: what was kept back arrives in one burst, whose last sample is in time. So what the least
-    late arrival of the end of such a stretch is late by has been lost.
-
-    Parameters
-    ----------
-    rate_hz
-        Nominal rate of the stream.
-    window_s
-        All arrivals must have been late for so long.
-    min_duration_s
-        Lateness below this is none; it is also what may be lost without being noticed.
-    """
-
-    def __init__(self, rate_hz: float, *, window_s: float = 0.5, min_duration_s: float = 0.01) -> None:
-        self._rate_hz = rate_hz
-        self._window_ns = window_s * NANOSECONDS
-        self._end_ns = 0.2 * self._window_ns
-        self._min_duration_ns = min_duration_s * NANOSECONDS
-        self.restart()
-
-    def restart(self) -> None:
-        """Forget what was late."""
-        self._since_ns: int | None = None
-        self._newest: deque[tuple[int, int]] = deque()  # arrival, lateness
-
-    def lost(self, late_ns: int, arrival_ns: int) -> int:
-        """Return how many samples are known to be lost now that one has arrived.
-
-        Parameters
-        ----------
-        late_ns
-            How much later than expected it was there.
-        arrival_ns
-            When.
-        """
-        if late_ns <= self._min_duration_ns:
-            self.restart()
-            return 0
-        if self._since_ns is None:
-            self._since_ns = arrival_ns
-        self._newest.append((arrival_ns, late_ns))
-        while arrival_ns - self._newest[0][0] > self._end_ns:
-            self._newest.popleft()
-        if arrival_ns - self._since_ns < self._window_ns:
-            return 0
-        least_late_ns = min(late for _, late in self._newest)
-        self.restart()
-        return round(least_late_ns / NANOSECONDS * self._rate_hz)
-
-
-# --------------------
 # Number and time the samples of a stream that neither counts nor stamps them, by when they arrive.
 
 BLOCKS_LATE = 1.5  # a block may come so late by the pace at which it is read, and nothing is lost
+# Whatever comes after a lost sample seems late by its time, and stays so. A busy host makes some arrivals late, but not
+# all of half a second: what was kept back arrives in one burst, whose last sample is in time. So what the least late
+# arrival of the end of such a stretch is late by has been lost.
+LATE_NS = 0.5 * NANOSECONDS
+LATE_END_NS = 0.2 * LATE_NS
 
 
 class ArrivalNumbering:
     """Give blocks of samples their running index: a jump is what was lost.
 
     Losses that the protocol shows are given by the caller. Others are known half a second later, by all samples being
-    late from then on (see `UnseenLoss`); over an interruption the host's clock shows how much is missing.
+    late from then on (`LATE_NS`); over an interruption the host's clock shows how much is missing.
 
     Parameters
     ----------
@@ -591,7 +538,9 @@ class ArrivalNumbering:
     def __init__(self, rate_hz: float, *, block_s: float, max_drift: float = 5e-3) -> None:
         self.clock = StreamClock(rate_hz, max_drift=max_drift)
         self.next_index = 0
-        self._losses = UnseenLoss(rate_hz, min_duration_s=BLOCKS_LATE * max(block_s, 1 / rate_hz))
+        self._rate_hz = rate_hz
+        self._no_loss_ns = BLOCKS_LATE * max(block_s, 1 / rate_hz) * NANOSECONDS
+        self._late: deque[tuple[int, int]] = deque()  # arrival and lateness: the first of a stretch, and its end
         self._interrupted = False
         self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
 
@@ -614,17 +563,31 @@ class ArrivalNumbering:
         list of int
             Empty while the clock is not settled: then no time is known.
         """
-        if self._interrupted:
-            self._resume()
         indices = []
         for missing, samples in blocks:
             indices.append(self.next_index + missing)
             self.next_index += missing + samples
-        unseen = self._unseen(self.next_index - 1, arrival_ns)
-        self.clock.observe(self.next_index - 1 + unseen, arrival_ns)
-        skipped = unseen + self._skipped(self.next_index - 1 + unseen)
+        skipped = self.missing(self.next_index - 1, arrival_ns)
         self.next_index += skipped
         return [index + skipped for index in indices] if self.clock.settled else []
+
+    def missing(self, index: int, arrival_ns: int, *, counted: bool = False) -> int:
+        """Return how many samples were lost, by the host's clock, before those that have just arrived.
+
+        Parameters
+        ----------
+        index
+            Of the last one that has arrived, as far as known.
+        arrival_ns
+            When it was there.
+        counted
+            Whether the device's own numbers tell losses: then only an interruption hides any.
+        """
+        if self._interrupted:
+            self._resume()
+        unseen = self._unseen(index, arrival_ns, counted)
+        self.clock.observe(index + unseen, arrival_ns)
+        return unseen + self._skipped(index + unseen)
 
     def _resume(self) -> None:
         """Number on after an interruption, and keep the clock of before for telling what was lost in it."""
@@ -632,16 +595,29 @@ class ArrivalNumbering:
         if self.clock.settled:
             self._clock_before = copy.copy(self.clock)
         self.clock.restart()
-        self._losses.restart()
+        self._late.clear()
 
-    def _unseen(self, index: int, arrival_ns: int) -> int:
+    def _unseen(self, index: int, arrival_ns: int, counted: bool) -> int:
         """Return how many samples must have been lost before those that have just arrived."""
-        if not self.clock.settled or self._clock_before is not None:
+        late_ns = arrival_ns - self.clock.time_ns(index)
+        if counted or not self.clock.settled or self._clock_before is not None or late_ns <= self._no_loss_ns:
+            self._late.clear()
             return 0
-        return self._losses.lost(arrival_ns - self.clock.time_ns(index), arrival_ns)
+        late = self._late
+        late.append((arrival_ns, late_ns))
+        while len(late) > 2 and arrival_ns - late[1][0] > LATE_END_NS:
+            del late[1]
+        if arrival_ns - late[0][0] < LATE_NS:
+            return 0
+        least_ns = min(by_ns for at_ns, by_ns in late if arrival_ns - at_ns <= LATE_END_NS)
+        late.clear()
+        return round(least_ns / NANOSECONDS * self._rate_hz)
 
     def _skipped(self, index: int) -> int:
-        """Return how many samples an interruption has cost that is over now; known once the clock is settled again."""
+        """Return how many samples an interruption has cost that is over now.
+
+        That is known when the clock is settled again and not before: what arrives first may be long on its way.
+        """
         if self._clock_before is None or not self.clock.settled:
             return 0
         skipped = max(0, round(self._clock_before.index_at(self.clock.time_ns(index))) - index)
@@ -675,16 +651,13 @@ class RateMeter:
     def update(self, samples: int, arrival_ns: int) -> float:
         """Take note of samples that have just arrived; return the rate, Hz, or 0.0 while it is not certain."""
         self._samples += samples
-        self._arrivals.append(Arrival(float(self._samples), float(arrival_ns - self._first_ns(arrival_ns))))
+        if not self._arrivals:
+            self._start_ns = arrival_ns
+        self._arrivals.append(Arrival(float(self._samples), float(arrival_ns - self._start_ns)))
         elapsed_ns = self._arrivals[-1].delay_ns
         if elapsed_ns < MEASURED_S * NANOSECONDS or len(self._arrivals) < LEAST_ARRIVALS:
             return 0.0
         return NANOSECONDS / supporting_slope(self._arrivals)
-
-    def _first_ns(self, arrival_ns: int) -> int:
-        if not self._arrivals:
-            self._start_ns = arrival_ns
-        return self._start_ns
 
 
 # --------------------

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import io
 import math
 import time
@@ -12,7 +11,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
 from pathlib import Path
 from struct import Struct
@@ -23,12 +22,12 @@ from numpy.typing import NDArray
 
 from texture_core.config import open_regular, param
 from texture_core.errors import DeviceError, InvalidData, InvalidParameter
-from texture_core.types import NANOSECONDS, AnyArray, Array, TactileSignal
+from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers import serial_line
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
 from texture_drivers.serial_line import SerialPort
-from texture_drivers.timing import SampleCounter, StreamClock, UnseenLoss
+from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumbering, SampleCounter, StreamClock
 
 # --------------------
 # Numbers of the TSF-85's protocol and streams.
@@ -38,7 +37,6 @@ from texture_drivers.timing import SampleCounter, StreamClock, UnseenLoss
 
 START_BYTE = 0x9A
 HEADER_BYTES = 4  # start, checksum (sent as 0, checked by nobody), command, payload length
-MAX_PACKET_BYTES = HEADER_BYTES + 255
 
 READ_SENSORS = 0x61
 AUTOSEND = 0x58
@@ -95,6 +93,7 @@ LAYOUTS: Mapping[str, Tsf85Layout] = {
 TSF85 = LAYOUTS['tsf85']
 STATIC_ROWS, STATIC_COLUMNS, STATIC_RATE_HZ = TSF85.rows, TSF85.columns, TSF85.static_rate_hz
 STATIC_CHANNELS = TSF85.static_channels
+TAXELS = len(STATIC_CHANNELS)
 
 USB_IDS = ((0x16D0, 0x14CC), (0x04B4, 0xF232))  # the present one; an older one, Cypress' default
 
@@ -368,11 +367,7 @@ class Tsf85Settings:
         return np.repeat([gains[kind] for kind in self.kinds], len(SETTINGS_AXES))
 
 
-QUANTITIES = {
-    ACCELEROMETER: ('acceleration', 'm/s²'),
-    GYROSCOPE: ('rotation', 'rad/s'),
-    MAGNETOMETER: ('field', 'T'),
-}
+QUANTITIES = {ACCELEROMETER: ('acceleration', 'm/s²'), GYROSCOPE: ('rotation', 'rad/s'), MAGNETOMETER: ('field', 'T')}
 
 
 # --------------------
@@ -386,23 +381,22 @@ class BatchCutter:
     """Batch numbered sample frames: a new batch wherever the index jumps, and taxel images at a constant rate."""
 
     def __init__(
-        self,
-        layout: Tsf85Layout,
-        settings: Tsf85Settings,
-        static_rate_hz: float,
-        frame_id: str,
-        clock: StreamClock,
+        self, layout: Tsf85Layout, settings: Tsf85Settings, static_rate_hz: float, frame_id: str, clock: StreamClock
     ) -> None:
         self.samples = 0
         self.lost = 0
         self.images = 0
         self.repeated_images = 0  # published although no other image had come since the tick before
         self.static_rate_hz = static_rate_hz
-        self._layout = layout
-        self._frame_id = frame_id
         self._clock = clock
-        self._motion_channels, self._motion_units = settings.channels, settings.units
         self._motion_gains: Array = settings.gains
+        signal = partial(TactileSignal, frame_id=frame_id)
+        taxels, fast = layout.static_channels, {'sampling_rate_hz': RATE_HZ}
+        self._dynamic = partial(signal, sensor=DYNAMIC_SENSOR, channels=DYNAMIC_CHANNELS, units=(UNIT,), **fast)
+        self._motion = partial(signal, sensor=MOTION_SENSOR, channels=settings.channels, units=settings.units, **fast)
+        self._static = partial(
+            signal, sensor=STATIC_SENSOR, channels=taxels, units=(UNIT,) * len(taxels), sampling_rate_hz=static_rate_hz
+        )
         self._next_index: int | None = None  # none published yet
         self._image: tuple[int, ...] | None = None
         self._image_index = 0
@@ -413,7 +407,7 @@ class BatchCutter:
     @property
     def has_motion(self) -> bool:
         """Whether the inertial sensors are published."""
-        return bool(self._motion_channels)
+        return bool(len(self._motion_gains))
 
     def cut(self, indices: Sequence[int], frames: Sequence[SampleFrame]) -> Mapping[str, list[TactileSignal]]:
         """Return the batches by topic; nothing while the clock is not settled."""
@@ -425,9 +419,14 @@ class BatchCutter:
                 self._jump(first)
             self._next_index = first + len(members)
             self.samples += len(members)
-            batches[SIGNAL].append(self._dynamic(first, members))
+            stamp_ns = self._clock.time_ns(first)
+            dynamic = np.array([item.dynamic for item in members], dtype=np.float32)[:, None]
+            batches[SIGNAL].append(self._dynamic(stamp_ns=stamp_ns, first_sample=first, samples=dynamic))
             batches[BATCH_STATIC].extend(self._images(first, members))
-            batches[IMU].extend(self._motion(first, members))
+            motion = np.array([item.motion for item in members])
+            if self.has_motion and not np.isnan(motion).all():  # the device has sent some of it
+                motion = (motion * self._motion_gains).astype(np.float32)
+                batches[IMU].append(self._motion(stamp_ns=stamp_ns, first_sample=first, samples=motion))
         return batches
 
     def _jump(self, first: int) -> None:
@@ -440,51 +439,15 @@ class BatchCutter:
                 self._image, self._image_index = item.image, index
             while self._tick * self._frames_per_tick <= index:
                 if self._image is not None and index - self._image_index <= IMAGE_HOLD_S * RATE_HZ:
-                    yield self._static(self._tick, self._image)
+                    yield self._published(self._image)
                 self._tick += 1
 
-    def _dynamic(self, first: int, members: Sequence[SampleFrame]) -> TactileSignal:
-        return TactileSignal(
-            stamp_ns=self._clock.time_ns(first),
-            sensor=DYNAMIC_SENSOR,
-            channels=DYNAMIC_CHANNELS,
-            units=(UNIT,),
-            sampling_rate_hz=RATE_HZ,
-            first_sample=first,
-            samples=np.array([item.dynamic for item in members], dtype=np.float32)[:, None],
-            frame_id=self._frame_id,
-        )
-
-    def _motion(self, first: int, members: Sequence[SampleFrame]) -> Iterator[TactileSignal]:
-        """Yield the inertial values, unless the device has sent none of them."""
-        counts = np.array([item.motion for item in members])
-        if not self.has_motion or np.isnan(counts).all():
-            return
-        yield TactileSignal(
-            stamp_ns=self._clock.time_ns(first),
-            sensor=MOTION_SENSOR,
-            channels=self._motion_channels,
-            units=self._motion_units,
-            sampling_rate_hz=RATE_HZ,
-            first_sample=first,
-            samples=(counts * self._motion_gains).astype(np.float32),
-            frame_id=self._frame_id,
-        )
-
-    def _static(self, tick: int, image: tuple[int, ...]) -> TactileSignal:
+    def _published(self, image: tuple[int, ...]) -> TactileSignal:
         self.images += 1
         self.repeated_images += image == self._last_published
         self._last_published = image
-        return TactileSignal(
-            stamp_ns=self._clock.time_ns(tick * self._frames_per_tick),
-            sensor=STATIC_SENSOR,
-            channels=self._layout.static_channels,
-            units=(UNIT,) * len(self._layout.static_channels),
-            sampling_rate_hz=self.static_rate_hz,
-            first_sample=tick,
-            samples=np.array([image], dtype=np.float32),
-            frame_id=self._frame_id,
-        )
+        stamp_ns = self._clock.time_ns(self._tick * self._frames_per_tick)
+        return self._static(stamp_ns=stamp_ns, first_sample=self._tick, samples=np.array([image], dtype=np.float32))
 
 
 def _runs(indices: Sequence[int], frames: Sequence[SampleFrame]) -> Iterator[tuple[int, list[SampleFrame]]]:
@@ -497,6 +460,8 @@ def _runs(indices: Sequence[int], frames: Sequence[SampleFrame]) -> Iterator[tup
 
 # --------------------
 # One finger of a TSF-85: its sample frames become numbered, timed batches.
+
+SHORTEST_LOSS_S = 0.01  # what is late by less is no loss, where the firmware sends no stamps
 
 
 class FingerStream:
@@ -524,13 +489,11 @@ class FingerStream:
         frame_id: str = '',
     ) -> None:
         settings = Tsf85Settings() if settings is None else settings
-        self.clock = StreamClock(RATE_HZ)
         self.counter = SampleCounter()
+        self._numbering = ArrivalNumbering(RATE_HZ, block_s=SHORTEST_LOSS_S / BLOCKS_LATE)
+        self.clock = self._numbering.clock
         self.cutter = BatchCutter(layout, settings, static_rate_hz or layout.static_rate_hz, frame_id, self.clock)
-        self._losses = UnseenLoss(RATE_HZ)
         self._waiting: list[SampleFrame] = []
-        self._interrupted = False
-        self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
 
     @property
     def rates_hz(self) -> Mapping[str, float]:
@@ -540,73 +503,38 @@ class FingerStream:
 
     def interrupt(self) -> None:
         """Forget what belongs to the stream so far: another one begins."""
-        self._interrupted = True
+        self._numbering.interrupt()
+        self.counter.interrupt()
         self._waiting = []
 
     def place(self, frames: Sequence[SampleFrame], arrival_ns: int) -> Mapping[str, list[TactileSignal]]:
         """Return the batches, by topic, that the sets make which have just arrived."""
         if not frames:
             return {}
-        if self._interrupted:
-            self._resume()
         waiting = [*self._waiting, *frames]
         indices, restarted = self.counter.place([item.stamp_ms for item in waiting])
-        self._waiting = waiting[len(indices) :]
+        placed, self._waiting = waiting[: len(indices)], waiting[len(indices) :]
+        skipped = 0
+        if indices:
+            counted = any(item.stamp_ms is not None for item in placed)
+            skipped = self._numbering.missing(indices[-1], arrival_ns, counted=counted)
+            self.counter.skip(skipped)
         if restarted:
             self.interrupt()
-        if not indices:
-            return {}
-        missing = self._unseen(waiting[: len(indices)], indices[-1], arrival_ns)
-        self.clock.observe(indices[-1] + missing, arrival_ns)
-        skipped = missing + self._skipped(indices[-1] + missing)
-        return self.cutter.cut([index + skipped for index in indices], waiting[: len(indices)])
-
-    def _resume(self) -> None:
-        """Number on after an interruption, and keep the clock of before for telling what was lost in it."""
-        self._interrupted = False
-        if self.clock.settled:
-            self._clock_before = copy.copy(self.clock)
-        self.clock.restart()
-        self.counter.interrupt()
-
-    def _unseen(self, frames: Sequence[SampleFrame], index: int, arrival_ns: int) -> int:
-        """Return how many samples must have been lost before these, which have no stamps, and number on behind them."""
-        stamped = any(item.stamp_ms is not None for item in frames)
-        if stamped or not self.clock.settled or self._clock_before is not None:
-            self._losses.restart()
-            return 0
-        missing = self._losses.lost(arrival_ns - self.clock.time_ns(index), arrival_ns)
-        self.counter.skip(missing)
-        return missing
-
-    def _skipped(self, index: int) -> int:
-        """Return how many samples an interruption has cost that is over now, and number on behind them.
-
-        That is known when the clock is settled again and not before: what arrives first may be long on its way.
-        """
-        if self._clock_before is None or not self.clock.settled:
-            return 0
-        skipped = max(0, round(self._clock_before.index_at(self.clock.time_ns(index))) - index)
-        self._clock_before = None
-        self.counter.skip(skipped)
-        self.clock.skip(skipped)
-        return skipped
+        return self.cutter.cut([index + skipped for index in indices], placed) if indices else {}
 
 
 # --------------------
 # TSF-85 data as the vendor's ROS driver publishes it, made into the suite's signals. Knows no ROS.
 #
 # `robotiq/ros` @18335fa, `robotiq_tsf`: for each packet one message on each of several topics, both fingers in each,
-# none
-# with a header; the device's stamp, 16 bits in ms, is a message of its own and the last of its packet. So what
-# belongs
-# together follows from the times at which the messages were sent.
+# none with a header; the device's stamp, 16 bits in ms, is a message of its own and the last of its packet. So what
+# belongs together follows from the times at which the messages were sent.
 #
 # The functions work on any objects with the attributes of those messages.
 
 MAX_WAITING_SAMPLES = 50  # samples that wait for a stamp; more, and the stamp is taken as lost
 SILENCE_NS = 1 * NANOSECONDS  # after so long the 16 bits of the stamps may have wrapped unseen
-MESSAGES_TAXELS = STATIC_ROWS * STATIC_COLUMNS
 
 
 class TimedValue(NamedTuple):
@@ -733,21 +661,12 @@ class Tsf85MessageConverter:
 
     def _take_static(self, message: Any, _source_ns: int) -> None:
         values = message.taxels[self._finger].values
-        if len(values) != MESSAGES_TAXELS:
-            raise InvalidData(
-                f'the message has {len(values)} taxels; a TSF-85 has {MESSAGES_TAXELS}; check the message package'
-            )
+        if len(values) != TAXELS:
+            raise InvalidData(f'the message has {len(values)} taxels; a TSF-85 has {TAXELS}; check the message package')
         self._image = tuple(int(value) for value in values)
 
-    def _take_acceleration(self, message: Any, _source_ns: int) -> None:
-        self._motion[ACCELEROMETER] = _axes(message, self._finger)
-
-    def _take_rotation(self, message: Any, _source_ns: int) -> None:
-        self._motion[GYROSCOPE] = _axes(message, self._finger)
-
-
-def _axes(message: Any, finger: int) -> tuple[float, ...]:
-    return tuple(float(value) for value in message.data[finger].values)
+    def _take_motion(self, kind: int, message: Any, _source_ns: int) -> None:
+        self._motion[kind] = tuple(float(value) for value in message.data[self._finger].values)
 
 
 # Name of the vendor's topic and of its message type: what is done with it.
@@ -755,32 +674,22 @@ TOPICS: Mapping[str, Callable[[Tsf85MessageConverter, Any, int], None]] = {
     'Dynamic': Tsf85MessageConverter._take_dynamic,
     'Timestamp': Tsf85MessageConverter._take_stamp,
     'StaticData': Tsf85MessageConverter._take_static,
-    'Accelerometer': Tsf85MessageConverter._take_acceleration,
-    'Gyroscope': Tsf85MessageConverter._take_rotation,
+    'Accelerometer': lambda line, *sent: line._take_motion(ACCELEROMETER, *sent),
+    'Gyroscope': lambda line, *sent: line._take_motion(GYROSCOPE, *sent),
 }
 
 
 # --------------------
 # Recordings of the vendor's SDK: the CSV that `sensor_quickstart/record_data.py` of robotiq/tactile_sensors writes.
 #
-# A header, then one line a packet, separated by semicolons: host time in ms; dynamic value of finger 0 and 1; 28
-# taxels
+# A header, then one line a packet, separated by semicolons: host time in ms; dynamic value of finger 0 and 1; 28 taxels
 # of finger 0, 28 of finger 1; acceleration of both; rotation of both. The first line holds the baseline of the taxels
-# and
-# no measurement; unless it was told otherwise, the program has subtracted it from those that follow.
+# and no measurement; unless it was told otherwise, the program has subtracted it from those that follow.
 
-RECORDING_TAXELS, RECORDING_AXES = STATIC_ROWS * STATIC_COLUMNS, 3
+RECORDING_AXES = 3
 FIRST_COLUMN = 'Time(ms)'
-ChannelGroup = tuple[str, tuple[str, ...], tuple[str, ...], float]
-RECORDING_DYNAMIC: ChannelGroup = (DYNAMIC_SENSOR, DYNAMIC_CHANNELS, (UNIT,), RATE_HZ)
-TAXEL: ChannelGroup = (
-    STATIC_SENSOR,
-    STATIC_CHANNELS,
-    (UNIT,) * RECORDING_TAXELS,
-    STATIC_RATE_HZ,
-)
 MAX_LINE = 10_000  # characters; a number has 25 at most
-COLUMNS = 1 + FINGERS * (1 + RECORDING_TAXELS + RECORDING_AXES + RECORDING_AXES)
+COLUMNS = 1 + FINGERS * (1 + TAXELS + RECORDING_AXES + RECORDING_AXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -832,29 +741,22 @@ class VendorRecording:
         lines = self.samples
         ticks = lines[np.arange(0, len(lines), RATE_HZ / STATIC_RATE_HZ).astype(int)]
         motion = np.concatenate([values[lines, 3 * finger : 3 * finger + 3] for values in self._motion()], axis=1)
+        dynamic, static = self.dynamic[lines, finger, None], self.static[ticks, finger]
         streams = {
-            SIGNAL: (RECORDING_DYNAMIC, self.dynamic[lines, finger, None]),
-            BATCH_STATIC: (TAXEL, self.static[ticks, finger]),
-            IMU: ((MOTION_SENSOR, settings.channels, settings.units, RATE_HZ), motion * settings.gains),
+            SIGNAL: (DYNAMIC_SENSOR, DYNAMIC_CHANNELS, (UNIT,), RATE_HZ, dynamic),
+            BATCH_STATIC: (STATIC_SENSOR, STATIC_CHANNELS, (UNIT,) * TAXELS, STATIC_RATE_HZ, static),
+            IMU: (MOTION_SENSOR, settings.channels, settings.units, RATE_HZ, motion * settings.gains),
         }
-        return {topic: [self._batch(stream, samples)] for topic, (stream, samples) in streams.items()}
+        stamp_ns = round(self.time_ms[0] * NANOSECONDS / 1000)
+        return {
+            topic: [TactileSignal(stamp_ns, sensor, channels, units, rate_hz, 0, samples.astype(np.float32))]
+            for topic, (sensor, channels, units, rate_hz, samples) in streams.items()
+        }
 
     def _motion(self) -> tuple[Array, Array]:
         """Return acceleration and rotation, each (n, 6): finger after finger."""
         n = len(self.time_ms)
         return self.acceleration.reshape(n, -1), self.rotation.reshape(n, -1)
-
-    def _batch(self, stream: ChannelGroup, samples: Array) -> TactileSignal:
-        sensor, channels, units, rate_hz = stream
-        return TactileSignal(
-            stamp_ns=round(self.time_ms[0] * NANOSECONDS / 1000),
-            sensor=sensor,
-            channels=channels,
-            units=units,
-            sampling_rate_hz=rate_hz,
-            first_sample=0,
-            samples=samples.astype(np.float32),
-        )
 
 
 def load_vendor_csv(path: Path) -> VendorRecording:
@@ -883,23 +785,12 @@ def load_vendor_csv(path: Path) -> VendorRecording:
         )
     if not table[-1, 0] > table[1, 0]:
         raise InvalidData(f"recording '{path}' has times that do not rise; record it again")
-    return _recording(table)
-
-
-def _recording(table: AnyArray) -> VendorRecording:
-    fingers = FINGERS
-    time_ms, dynamic, static, acceleration, rotation = np.split(
-        table, np.cumsum([1, fingers, fingers * RECORDING_TAXELS, fingers * RECORDING_AXES]), axis=1
-    )
-    taxels = static.reshape(-1, fingers, RECORDING_TAXELS)
-    return VendorRecording(
-        time_ms=time_ms[1:, 0],
-        dynamic=dynamic[1:],
-        static=taxels[1:],
-        acceleration=acceleration[1:].reshape(-1, fingers, RECORDING_AXES),
-        rotation=rotation[1:].reshape(-1, fingers, RECORDING_AXES),
-        baseline=taxels[0],
-    )
+    ends = np.cumsum([1, FINGERS, FINGERS * TAXELS, FINGERS * RECORDING_AXES])
+    time_ms, dynamic, static, acceleration, rotation = np.split(table, ends, axis=1)
+    taxels = static.reshape(-1, FINGERS, TAXELS)
+    axes = (len(table) - 1, FINGERS, RECORDING_AXES)
+    acceleration, rotation = acceleration[1:].reshape(axes), rotation[1:].reshape(axes)
+    return VendorRecording(time_ms[1:, 0], dynamic[1:], taxels[1:], acceleration, rotation, baseline=taxels[0])
 
 
 # --------------------
@@ -908,7 +799,6 @@ def _recording(table: AnyArray) -> VendorRecording:
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
 REVIVALS = 3  # so many times, as the vendor does, before the port is given up
 REVIVAL_PAUSE_S = 0.05  # between stop and start
-PPM = 1e6
 
 
 class Tsf85:
@@ -1034,7 +924,7 @@ class Tsf85:
         """Serial number of the USB device if it tells one, and how much its clock is slow."""
         drift = next(iter(self._fingers.values())).clock.drift
         serial = {'serial number': self._serial} if self._serial else {}
-        return {**serial, 'device clock slow by [ppm]': PPM * drift}
+        return {**serial, SLOW_CLOCK: PPM * drift}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:

@@ -18,7 +18,7 @@ SCENE = scene_from(
 
 
 def model(surface: str) -> BioTacModel:
-    return BioTacModel(SCENE, SCENE.surface(surface), np.random.default_rng(0), BIOTAC)
+    return BioTacModel(SCENE, SCENE.surface(surface), np.random.default_rng(0), layout=BIOTAC)
 
 
 def slide(n_frames: int, speed_m_s: float = 0.0, force_n: float = 2.0) -> Trajectory:

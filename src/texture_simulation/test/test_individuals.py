@@ -44,7 +44,7 @@ def test_a_curved_object_is_sensed_more_softly_than_a_flat_one_of_the_same_relie
 def test_the_load_wanders_over_the_fingertip_by_the_share_of_its_radius_in_both() -> None:
     scene = scene_of(SMOOTH, {'kind': 'curved', 'radius_m': 0.035})
     model = BioTacModel(
-        scene, scene.surface('object'), np.random.default_rng(0), LAYOUTS['biotac'], finger=0, settled=True
+        scene, scene.surface('object'), np.random.default_rng(0), layout=LAYOUTS['biotac'], finger=0, settled=True
     )
     model.touch._tilt_rad = np.zeros((2, 1))
     way_m = 0.012

@@ -17,7 +17,7 @@ from texture_core.types import NANOSECONDS, FingerState
 from texture_drivers.daq import daq
 from texture_drivers.pvdf import Pvdf
 from texture_drivers.sensor import SensorParams
-from texture_simulation.emulator import Emulator, EmulatorParams, live_biotac, live_biotac_hand, live_daq
+from texture_simulation.emulator import LIVE_SENSORS, Emulator, EmulatorParams
 from texture_simulation.path import straight
 from texture_simulation.scene import load_scene
 
@@ -93,7 +93,7 @@ def test_the_pvdf_finger_senses_ridges_and_force(emulator: Emulator, arm: None, 
 
 def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
     scene = load_scene('twelve_textures')
-    live = live_daq(scene, scene.surface('glass'), tmp_path / 'daq', np.random.default_rng(0))
+    live = LIVE_SENSORS['daq'](scene, scene.surface('glass'), tmp_path / 'daq', np.random.default_rng(0))
     live.advance(0)
     live.advance(10 * NANOSECONDS)
     assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.75 s, and then 0.25 s of samples
@@ -101,7 +101,7 @@ def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
 
 def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
     scene = load_scene('twelve_textures')
-    live = live_biotac(scene, scene.surface('glass'), tmp_path / 'biotac', np.random.default_rng(0))
+    live = LIVE_SENSORS['biotac'](scene, scene.surface('glass'), tmp_path / 'biotac', np.random.default_rng(0))
     live.advance(0)
     live.advance(10 * NANOSECONDS)
     assert (live.done, live.skipped) == (1000, 975)
@@ -109,7 +109,8 @@ def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
 
 def test_two_fingers_of_a_board_sense_other_places_of_one_surface_and_its_third_place_nothing(tmp_path: Path) -> None:
     scene = load_scene('twelve_textures')
-    live = live_biotac_hand(scene, scene.surface('ridge_2mm_deep'), tmp_path / 'biotac', np.random.default_rng(0))
+    surface, rng = scene.surface('ridge_2mm_deep'), np.random.default_rng(0)
+    live = LIVE_SENSORS['biotac_hand'](scene, surface, tmp_path / 'biotac', rng)
     slide = straight((0.0, 0.0, FORCE_N), (0.1, 0.0, FORCE_N), 4400)
     counts = live.model.advance(slide).astype(float)  # type: ignore[attr-defined]
     assert counts.shape == (100, 44, 3)

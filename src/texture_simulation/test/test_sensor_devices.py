@@ -20,7 +20,6 @@ from texture_drivers.biotac import LAYOUTS, BioTac
 from texture_drivers.papillarray import PapillArray
 from texture_drivers.sensor import SensorParams
 from texture_simulation.devices.fingers import (
-    BoardFaults,
     ByteFaults,
     EmulatedBioTac,
     EmulatedDaq,
@@ -50,7 +49,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
 
 def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(make: Make) -> None:
     rig = make(serials=('BT-0', 'BT-1', ''), finger=1)
-    rig.set(board_faults=BoardFaults(flip=0.01))
+    rig.set(board_flip=0.01)
     batches = rig.signal_s(1.4)
     values = np.concatenate([batch.samples[:, 0] for batch in batches])
     assert 0.005 < np.isnan(values).mean() < 0.05  # two bytes a word

@@ -6,15 +6,14 @@ from __future__ import annotations
 import numpy as np
 
 from texture_core.types import Array
-from texture_simulation.effects import BatchShape, ForceEffect, GrowthEffect, PathEffect, TextureEffect
-from texture_simulation.friction import Drag, make_drag
+from texture_simulation.effects import BatchShape
+from texture_simulation.friction import SlidingDrag, TipDrag, make_drag
 from texture_simulation.path import Trajectory, before_first
 from texture_simulation.scene import Scene
 from texture_simulation.surfaces import Surface
 
-MAX_TILT_RAD = (
-    0.5  # a fingertip that slides over a curved object tilts to it by so much at most; then the hand turns it
-)
+# A fingertip that slides over a curved object tilts to it by so much at most; then the hand turns it.
+MAX_TILT_RAD = 0.5
 START_TILT_RAD = 0.15  # assumption: how far the grip turns a finger to a curved object, at most, in either direction
 SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
 # A point of a fast path stands for the stretch up to the next: the texture is blurred by at least so much of the step.
@@ -56,14 +55,12 @@ class SkinContact:
         self._batch_shape = batch_shape
         self._finger = finger
         self._before: tuple[Array, Array] | None = None
-        self._growths = scene.effects_of(GrowthEffect)
-        self._gains = scene.effects_of(TextureEffect)
-        self._trajectory_filters = [
-            effect.start_path(rng, rate_hz, batch_shape) for effect in scene.effects_of(PathEffect)
-        ]
-        self._force_filters = [
-            effect.start_force(rng, rate_hz, batch_shape) for effect in scene.effects_of(ForceEffect)
-        ]
+        self._blur_growths = [effect.blur_growth for effect in scene.effects_of('blur_growth')]
+        self._gain_growths = [effect.gain_growth for effect in scene.effects_of('gain_growth')]
+        self._gains = [effect.gain for effect in scene.effects_of('gain')]
+        begun = rng, rate_hz, batch_shape
+        self._trajectory_filters = [effect.start_path(*begun) for effect in scene.effects_of('start_path')]
+        self._force_filters = [effect.start_force(*begun) for effect in scene.effects_of('start_force')]
         self.relocate()
 
     @property
@@ -125,8 +122,8 @@ class SkinContact:
         force_n = constant(placed.force_n)
         blur_m, gain = self._blur_and_stiffness(force_n)
         blur_m = np.maximum(blur_m, MIN_BLUR_PER_STEP * self._steps_m(placed))
-        for effect in self._gains:
-            gain = gain * effect.gain(placed, self._finger)
+        for factor in self._gains:
+            gain = gain * factor(placed, self._finger)
         x_m, y_m = placed.x_m, placed.y_m
         if offset_m is not None:
             x_m, y_m = x_m[..., None, :] + offset_m[0], y_m[..., None, :] + offset_m[1]
@@ -161,8 +158,8 @@ class SkinContact:
             N.
         """
         _, gain = self._blur_and_stiffness(placed.force_n)
-        for effect in self._gains:
-            gain = gain * effect.gain(placed, self._finger)
+        for factor in self._gains:
+            gain = gain * factor(placed, self._finger)
         x_m, y_m = placed.x_m[..., None, :] + offset_m[0], placed.y_m[..., None, :] + offset_m[1]
         height = self._surface.height_m(x_m, y_m, np.full((1,), blur_m))
         return np.asarray(gain[..., None, :] * height)
@@ -198,7 +195,7 @@ class SkinContact:
         """How much smaller than on a plane the contact is, at most 1."""
         return self._contact.on(self._surface.shape.radius_m)
 
-    def _make_drag(self) -> Drag | None:
+    def _make_drag(self) -> TipDrag | SlidingDrag | None:
         """Return what senses the friction from here on, if there is any."""
         friction = self._surface.friction
         return make_drag(friction, self._rate_hz, self._rng, self._batch_shape) if friction else None
@@ -208,8 +205,10 @@ class SkinContact:
         share = self.patch_share
         blur_m: Array = share * self._contact.blur_m * np.ones_like(force_n)
         stiffness: Array = share * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
-        for effect in self._growths:
-            blur_m, stiffness = blur_m * effect.blur_growth(force_n), stiffness * effect.gain_growth(force_n)
+        for growth in self._blur_growths:
+            blur_m = blur_m * growth(force_n)
+        for growth in self._gain_growths:
+            stiffness = stiffness * growth(force_n)
         return blur_m, stiffness
 
     def _steps_m(self, placed: Trajectory) -> Array:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -15,13 +14,26 @@ from texture_core.types import Array, Samples
 from texture_simulation.path import Filter, Trajectory, interpolated_field
 
 # --------------------
+# Where in the chain from slide to sample an effect acts is told by the method that it has:
+#
+# slide(speed_m_s, force_n, rng)              a slide begins: (count,) planned speeds and forces become others
+# start_path(rng, rate_hz, batch_shape)       where the skin goes: a `TrajectoryFilter`
+# blur_growth(force_n), gain_growth(force_n)  how much larger the contact, how much stiffer it is than at 1 N: (...)
+# gain(path, finger)                          how strongly a texture is sensed at places by one individual: (..., n)
+# start_force(rng, rate_hz, batch_shape)      the force that shakes the skin, (..., n) N: a `ForceFilter`
+# start_signal(rng, rate_hz, batch_shape, channels, *, slow)
+#                                             samples in counts, (..., n_samples, n_channels): a `SignalFilter`
+#
+# What has a memory is started once and then called block by block; what lies between the blocks is continuous.
+
+BatchShape = tuple[int, ...]  # () for one slide, (count,) for many at once
+TrajectoryFilter = Callable[[Trajectory], Trajectory]
+ForceFilter = Callable[[Trajectory, Array], Array]
+SignalFilter = Callable[[Samples], Samples]
+
+
+# --------------------
 # A sphere pressed on a plane (Hertz): size and stiffness of the contact grow with the cube root of the force.
-
-
-def _power(force_n: Array, exponent: float) -> Array:
-    """Return force ** exponent; 0 N gives 0."""
-    grown: Array = np.maximum(force_n, 0.0) ** exponent
-    return grown
 
 
 @dataclass(frozen=True)
@@ -35,13 +47,9 @@ class PatchGrowth:
         high=1.0,
     )
 
-    def blur_growth(self, force_n: Array) -> Array | float:
-        """Return how much larger the contact is than at 1 N."""
-        return _power(force_n, self.exponent)
-
-    def gain_growth(self, force_n: Array) -> Array | float:
-        """Return 1."""
-        return 1.0
+    def blur_growth(self, force_n: Array) -> Array:
+        """Return how much larger the contact is than at 1 N; 0 N gives 0."""
+        return np.asarray(np.maximum(force_n, 0.0) ** self.exponent)
 
 
 @dataclass(frozen=True)
@@ -55,13 +63,9 @@ class ForceGain:
         high=1.0,
     )
 
-    def blur_growth(self, force_n: Array) -> Array | float:
-        """Return 1."""
-        return 1.0
-
-    def gain_growth(self, force_n: Array) -> Array | float:
-        """Return how much stronger a texture is measured than at 1 N."""
-        return _power(force_n, self.exponent)
+    def gain_growth(self, force_n: Array) -> Array:
+        """Return how much stronger a texture is measured than at 1 N; 0 N gives 0."""
+        return np.asarray(np.maximum(force_n, 0.0) ** self.exponent)
 
 
 # --------------------
@@ -106,171 +110,6 @@ class FingerSpread:
 
 
 # --------------------
-# Where in the chain from slide to sample an effect acts: each stage is one protocol.
-#
-# A slide begins: `SlideEffect`. The finger goes its way: `PathEffect`. The skin senses a texture: `GrowthEffect`,
-# `TextureEffect`. The force shakes the skin: `ForceEffect`. Samples are taken: `SignalEffect`. What has a memory is
-# started once and then called block by block; what lies between the blocks is continuous.
-
-BatchShape = tuple[int, ...]  # () for one slide, (count,) for many at once
-TrajectoryFilter = Callable[[Trajectory], Trajectory]
-ForceFilter = Callable[[Trajectory, Array], Array]
-SignalFilter = Callable[[Samples], Samples]
-
-
-@runtime_checkable
-class SlideEffect(Protocol):
-    """Changes what was planned."""
-
-    def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Return speed and force as they become, of the same shape.
-
-        Parameters
-        ----------
-        speed_m_s : (count,)
-            Planned speeds.
-        force_n : (count,)
-            Planned normal forces.
-        rng
-            Random numbers of this effect.
-
-        Returns
-        -------
-        (count,), (count,)
-            Speeds in m/s and forces in N.
-        """
-
-
-@runtime_checkable
-class PathEffect(Protocol):
-    """Changes where the skin is."""
-
-    def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
-        """Return what turns the next piece of path, (..., n) points, into the skin's own.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-
-        Returns
-        -------
-        callable
-            Takes and returns a Trajectory; keeps a state from piece to piece.
-        """
-
-
-@runtime_checkable
-class GrowthEffect(Protocol):
-    """Lets what the skin makes of a texture depend on the force."""
-
-    def blur_growth(self, force_n: Array) -> Array | float:
-        """Return how much larger the contact is than at 1 N.
-
-        Parameters
-        ----------
-        force_n : (...)
-            Normal force.
-
-        Returns
-        -------
-        (...)
-            Factor of the contact size, of the shape of `force_n`.
-        """
-
-    def gain_growth(self, force_n: Array) -> Array | float:
-        """Return how much stronger a texture is measured than at 1 N.
-
-        Parameters
-        ----------
-        force_n : (...)
-            Normal force.
-
-        Returns
-        -------
-        (...)
-            Factor of the stiffness, of the shape of `force_n`.
-        """
-
-
-@runtime_checkable
-class TextureEffect(Protocol):
-    """Changes how strongly the texture is measured."""
-
-    def gain(self, path: Trajectory, finger: int) -> Array | float:
-        """Return the gain at places, (..., n), for one individual of the sensor.
-
-        Parameters
-        ----------
-        path
-            Places on the sample.
-        finger
-            Which individual of the sensor.
-
-        Returns
-        -------
-        (..., n), or a number
-            Factor of the texture.
-        """
-
-
-@runtime_checkable
-class ForceEffect(Protocol):
-    """Changes how the force on the skin varies."""
-
-    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
-        """Return what turns the variation along the next piece of path, (..., n) N, into another.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-
-        Returns
-        -------
-        callable
-            Takes and returns (..., n) N; keeps a state from piece to piece.
-        """
-
-
-@runtime_checkable
-class SignalEffect(Protocol):
-    """Changes what is measured."""
-
-    def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
-    ) -> SignalFilter:
-        """Return what turns the next samples, (..., n_samples, n_channels) counts, into those with the effect.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        channels
-            Number of channels.
-        slow
-            Whether the stream is the slow one.
-
-        Returns
-        -------
-        callable
-            Takes and returns (..., n_samples, n_channels) counts; keeps a state from piece to piece.
-        """
-
-
-# --------------------
 # What warms up wanders.
 
 
@@ -311,7 +150,7 @@ class Drift:
 class Dropouts:
     """Now and then all channels stand still for a moment: the converter repeats its last sample.
 
-    Samples that are missing altogether are a fault of the line: see `devices/faults.py`.
+    Samples that are missing altogether are a fault of the line: see devices/fingers.py.
     """
 
     per_s: float = param(

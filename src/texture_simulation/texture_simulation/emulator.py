@@ -10,15 +10,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from pathlib import Path as FilePath
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from texture_core.config import find, param
 from texture_core.errors import DeviceError
 from texture_core.types import LOOPBACK, NANOSECONDS, FingerState
-from texture_drivers.biotac import LAYOUTS
+from texture_drivers import daq, pvdf
+from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
 from texture_drivers.tsf85 import RATE_HZ
 from texture_simulation import sensor_models
@@ -31,10 +31,19 @@ from texture_simulation.devices.fingers import (
     EmulatedDevice,
     EmulatedPapillArray,
     EmulatedPvdf,
+    EmulatedSampler,
     EmulatedTsf85,
 )
-from texture_simulation.path import FingerTrack, Trajectory
+from texture_simulation.path import FingerTrack
 from texture_simulation.scene import Scene, load_scene
+from texture_simulation.sensor_models import (
+    BioTacHand,
+    BioTacModel,
+    SensorModel,
+    Tsf85Model,
+    Tsf85Pair,
+    points_per_frame,
+)
 from texture_simulation.surfaces import Surface
 
 # --------------------
@@ -71,19 +80,16 @@ class FingerStateReceiver:
     def states(self) -> list[FingerState]:
         """Return what has come since the last call."""
         states = []
-        while (data := self._receive()) is not None:
+        while True:
+            try:
+                data = self._socket.recv(256)
+            except BlockingIOError:
+                return states
             state = FingerState.from_bytes(data)
             self.received += 1
             self.refused += state is None
             if state is not None:
                 states.append(state)
-        return states
-
-    def _receive(self) -> bytes | None:
-        try:
-            return self._socket.recv(256)
-        except BlockingIOError:
-            return None
 
     def close(self) -> None:
         """Give the port back."""
@@ -97,28 +103,6 @@ class FingerStateReceiver:
 LONGEST_BURST_S = 0.25
 
 
-class SurfaceContact(Protocol):
-    """Where a finger, or several, touch a surface."""
-
-    @property
-    def surface(self) -> Surface:
-        """What is touched; it may be set."""
-
-    @surface.setter
-    def surface(self, surface: Surface) -> None: ...
-
-    def relocate(self) -> None:
-        """Let the sample lie otherwise from now on."""
-
-
-class ContactModel(Protocol):
-    """What a sensor model lets the emulator change."""
-
-    @property
-    def touch(self) -> SurfaceContact:
-        """Where it touches."""
-
-
 class LiveSensor:
     """Follow the finger with one sensor.
 
@@ -126,34 +110,29 @@ class LiveSensor:
     ----------
     model, device
         What senses, and what sends.
-    measure
-        Measures along a piece of path and sends.
+    send
+        Sends what the model has measured along a piece of path.
     skip
         Lets so many steps pass of which nothing is sent.
-    rate_hz
-        Steps a second: samples, or frames of them.
-    points
-        Of the path in a step.
+    pace
+        Steps a second: samples, or frames of them; and points of the path in a step.
     """
 
     def __init__(
         self,
-        model: ContactModel,
+        model: SensorModel | Tsf85Pair | BioTacHand,
         device: EmulatedDevice,
-        measure: Callable[[Trajectory], None],
+        send: Callable[[Any], None],
         skip: Callable[[int], None],
-        *,
-        rate_hz: float,
-        points: int,
+        pace: tuple[float, int],
     ) -> None:
         self.model = model
         self.device = device
         self.done = 0  # steps, those that were skipped among them
         self.skipped = 0
-        self._measure = measure
+        self._send = send
         self._skip = skip
-        self._rate_hz = rate_hz
-        self._points = points
+        self._rate_hz, self._points = pace
         self._track = FingerTrack()
         self._start_ns: int | None = None
 
@@ -178,7 +157,7 @@ class LiveSensor:
         path = self._track.advance(until_ns, self._points * steps, self._points * self._rate_hz)
         if not was_touching and self._track.touching:
             self.model.touch.relocate()
-        self._measure(path)
+        self._send(self.model.advance(path))
 
 
 # --------------------
@@ -187,20 +166,21 @@ class LiveSensor:
 
 # Makes a live sensor, not started: its first `advance` is the beginning of its time. From a scene, the surface that is
 # touched, the symbolic link that leads to the device, and all random numbers: positions, effects, noise.
-MakeLiveSensor = Callable[[Scene, Surface, FilePath, np.random.Generator], 'LiveSensor']
+MakeLiveSensor = Callable[..., LiveSensor]
 
 
 def live_tsf85(
     scene: Scene,
     surface: Surface,
-    link: FilePath,
+    link: Path,
     rng: np.random.Generator,
     *,
     layout: str = 'tsf85',
     finger: int = 0,
     long_stamps: bool = True,
+    pair: bool = False,
 ) -> LiveSensor:
-    """Return a TSF-85 of which one finger touches.
+    """Return a TSF-85.
 
     Parameters
     ----------
@@ -215,139 +195,75 @@ def live_tsf85(
     layout
         Name of the layout of the fingertip.
     finger
-        Which individual of the sensor.
+        Which of the two touches.
     long_stamps
         64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
-
-    Returns
-    -------
-    LiveSensor
-        Closed when its context ends.
-    """
-    model = sensor_models.Tsf85Model(scene, surface, rng, TSF85S[layout])
-    return _of_tsf85(model, EmulatedTsf85(link, rng, finger, long_stamps))
-
-
-def live_tsf85_pair(
-    scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator, *, long_stamps: bool = True
-) -> LiveSensor:
-    """Return a TSF-85 of which both fingers touch.
-
-    Parameters
-    ----------
-    scene
-        Scene: sensor, contact and effects.
-    surface
-        Surface that is touched.
-    link
-        Symbolic link that leads to the device.
-    rng
-        All random numbers: positions on the sample, effects, noise.
-    long_stamps
-        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+    pair
+        Whether both fingers touch, whatever `finger` says.
 
     Returns
     -------
     LiveSensor
         Not started: its first `advance` is the beginning of its time.
     """
-    return _of_tsf85(sensor_models.Tsf85Pair(scene, surface, rng), EmulatedTsf85(link, rng, long_stamps=long_stamps))
+    model = Tsf85Pair(scene, surface, rng) if pair else Tsf85Model(scene, surface, rng, layout=TSF85S[layout])
+    device = EmulatedTsf85(link, rng, 0 if pair else finger, long_stamps)
+    pace = RATE_HZ, sensor_models.TSF85_OVERSAMPLING
+    return LiveSensor(model, device, lambda measured: device.advance(*measured), device.skip, pace)
 
 
-def _of_tsf85(model: sensor_models.Tsf85Model | sensor_models.Tsf85Pair, device: EmulatedTsf85) -> LiveSensor:
-    """Return the sensor of a TSF-85, whether one finger touches or both."""
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.advance(*model.advance(path)),
-        device.skip,
-        rate_hz=RATE_HZ,
-        points=sensor_models.TSF85_OVERSAMPLING,
-    )
-
-
-def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
-    """Return a BioTac alone on its board."""
-    model, device = sensor_models.BioTacModel(scene, surface, rng, LAYOUTS['biotac']), EmulatedBioTac(link, rng)
-    return _on_board(model, device, lambda path: device.advance(model.advance(path)[:, :, None]))
-
-
-def live_biotac_hand(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
-    """Return a board with BioTacs on two fingers."""
-    model = sensor_models.BioTacHand(scene, surface, rng, LAYOUTS['biotac'])
-    device = EmulatedBioTac(link, rng, sensor_models.SERIALS)
-    return _on_board(model, device, lambda path: device.advance(model.advance(path)))
-
-
-def _on_board(
-    model: sensor_models.BioTacModel | sensor_models.BioTacHand,
-    device: EmulatedBioTac,
-    advance: Callable[[Trajectory], None],
+def live_biotac(
+    scene: Scene, surface: Surface, link: Path, rng: np.random.Generator, *, hand: bool = False
 ) -> LiveSensor:
-    """Return the sensor of a board whose fingers are all served at the rate of its frames."""
-    rate_hz, points = LAYOUTS['biotac'].frame_rate_hz, model.points_per_frame
-    return LiveSensor(model, device, advance, device.skip, rate_hz=rate_hz, points=points)
+    """Return a BioTac alone on its board, or a board with BioTacs on two fingers: all are served with each frame."""
+    layout = BIOTACS['biotac']
+    pace = layout.frame_rate_hz, points_per_frame(layout)
+    if hand:
+        device = EmulatedBioTac(link, rng, sensor_models.SERIALS)
+        return LiveSensor(BioTacHand(scene, surface, rng, layout), device, device.advance, device.skip, pace)
+    device = EmulatedBioTac(link, rng)
+    model = BioTacModel(scene, surface, rng, layout=layout)
+    return LiveSensor(model, device, lambda counts: device.advance(counts[:, :, None]), device.skip, pace)
 
 
-def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+def live_daq(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 3."""
-    model, device = sensor_models.DaqModel(scene, surface, rng), EmulatedDaq(link, rng)
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.sample(model.advance(path)),
-        lambda samples: device.skip(samples / sensor_models.DAQ_RATE_HZ),
-        rate_hz=sensor_models.DAQ_RATE_HZ,
-        points=sensor_models.DAQ_OVERSAMPLING,
-    )
+    model, device, rate_hz = sensor_models.DaqModel(scene, surface, rng), EmulatedDaq(link, rng), daq.RATE_HZ
+    skip = partial(_skip_samples, device, rate_hz)
+    return LiveSensor(model, device, device.sample, skip, (rate_hz, sensor_models.DAQ_OVERSAMPLING))
 
 
-def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+def live_pvdf(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 5."""
-    model, device = sensor_models.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng)
-    rate_hz = sensor_models.PVDF_PATH_RATE_HZ / sensor_models.PVDF_OVERSAMPLING
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.sample(*model.advance(path)),
-        lambda samples: device.skip(samples / rate_hz),
-        rate_hz=rate_hz,
-        points=sensor_models.PVDF_OVERSAMPLING,
-    )
+    model, device, rate_hz = sensor_models.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng), pvdf.FILM_RATE_HZ
+    skip, pace = partial(_skip_samples, device, rate_hz), (rate_hz, sensor_models.PVDF_OVERSAMPLING)
+    return LiveSensor(model, device, lambda both: device.sample(*both), skip, pace)
 
 
-def live_anyskin(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+def _skip_samples(device: EmulatedSampler, rate_hz: float, samples: int) -> None:
+    device.skip(samples / rate_hz)
+
+
+def live_anyskin(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return an AnySkin."""
     model, device = sensor_models.AnySkinModel(scene, surface, rng), EmulatedAnySkin(link, rng)
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.sample(model.advance(path)),
-        device.skip,
-        rate_hz=sensor_models.ANYSKIN_RATE_HZ,
-        points=sensor_models.ANYSKIN_OVERSAMPLING,
-    )
+    pace = sensor_models.ANYSKIN_RATE_HZ, sensor_models.ANYSKIN_OVERSAMPLING
+    return LiveSensor(model, device, device.sample, device.skip, pace)
 
 
-def live_papillarray(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+def live_papillarray(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return a PapillArray alone on its hub."""
     model, device = sensor_models.PapillArrayModel(scene, surface, rng), EmulatedPapillArray(link, rng)
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.sample(model.advance(path)[:, None]),
-        device.skip,
-        rate_hz=sensor_models.PAPILLARRAY_PATH_RATE_HZ,
-        points=1,
-    )
+    pace = sensor_models.PAPILLARRAY_PATH_RATE_HZ, 1
+    return LiveSensor(model, device, lambda pillars: device.sample(pillars[:, None]), device.skip, pace)
 
 
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': live_tsf85,
-    'tsf85_pair': live_tsf85_pair,
+    'tsf85_pair': partial(live_tsf85, pair=True),
     'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
     'biotac': live_biotac,
-    'biotac_hand': live_biotac_hand,
+    'biotac_hand': partial(live_biotac, hand=True),
     'daq': live_daq,
     'pvdf': live_pvdf,
     'anyskin': live_anyskin,
@@ -437,12 +353,9 @@ class Emulator:
         surface = self.scene.surface(params.surface)
         for other in self.scene.surfaces.values():  # all tables are made now: swapping takes no time and no memory
             other.height_m(np.zeros(1), np.zeros(1), np.zeros(1))
-        tsf85 = {
-            name: partial(live_tsf85, layout=name, finger=params.finger, long_stamps=params.long_stamps)
-            for name in ('tsf85', 'tsf85_3x4')
-        }
-        pair = partial(live_tsf85_pair, long_stamps=params.long_stamps)
-        makers: dict[str, MakeLiveSensor] = {**LIVE_SENSORS, **tsf85, 'tsf85_pair': pair}
+        makers = dict(LIVE_SENSORS)
+        for name in ('tsf85', 'tsf85_3x4', 'tsf85_pair'):
+            makers[name] = partial(LIVE_SENSORS[name], finger=params.finger, long_stamps=params.long_stamps)
         sensor = params.sensor or self.scene.sensor
         find(makers, sensor, 'sensor')
         links = [(sensor, params.sensor_link), ('daq', params.daq_link), ('pvdf', params.pvdf_link)]

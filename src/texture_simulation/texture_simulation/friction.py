@@ -6,14 +6,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
-from texture_core.config import find, param
+from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Array
 from texture_simulation.path import Trajectory, before_first
@@ -27,20 +25,20 @@ PASSIVE = 4 * math.sqrt(2 * math.e)
 
 
 @dataclass(frozen=True)
-class StickSlip:
-    """Friction by LuGre bristles with a Stribeck curve, and a tip of some mass on the spring and damper of the skin.
-
-    All friction is proportional to the normal force, so stiffness and damping of the bristles are given for 1 N. The
-    values are guesses of the order of what is published for fingertips and silicone on smooth surfaces.
+class Stribeck:
+    """A Stribeck curve: friction that falls from its value at rest to that of fast sliding.
 
     Raises
     ------
     InvalidParameter
-        If the friction could give out more work than it took in (`PASSIVE`), or falls below the sliding one at rest.
+        If friction is lower at rest than in fast sliding.
     """
 
     static: float = param(
-        0.9, 'Sets the coefficient of static friction at which a sticking tip starts to slip.', low=0.0, high=5.0
+        0.9,
+        'Sets the coefficient of friction at rest, at which a sticking tip starts to slip, and of slow sliding.',
+        low=0.0,
+        high=5.0,
     )
     kinetic: float = param(0.5, 'Sets the coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
     stribeck_m_s: float = param(
@@ -53,6 +51,33 @@ class StickSlip:
     viscous_s_m: float = param(
         0.0, 'Sets the growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0
     )
+    force_coupling: float = param(
+        0.2,
+        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
+        low=-10.0,
+        high=10.0,
+    )
+
+    def __post_init__(self) -> None:
+        if self.static < self.kinetic:
+            raise InvalidParameter(
+                f'static friction {self.static} is below the kinetic one, {self.kinetic}; give at least as much'
+            )
+
+
+@dataclass(frozen=True)
+class StickSlip(Stribeck):
+    """Friction by LuGre bristles with a Stribeck curve, and a tip of some mass on the spring and damper of the skin.
+
+    All friction is proportional to the normal force, so stiffness and damping of the bristles are given for 1 N. The
+    values are guesses of the order of what is published for fingertips and silicone on smooth surfaces.
+
+    Raises
+    ------
+    InvalidParameter
+        If the friction could give out more work than it took in (`PASSIVE`), or is lower at rest than in sliding.
+    """
+
     bristle_1_m: float = param(
         1.5e5,
         'Sets the bristle stiffness per normal force; a larger value bends the bristles less.',
@@ -88,12 +113,6 @@ class StickSlip:
         low=1e-6,
         high=1.0,
     )
-    force_coupling: float = param(
-        0.2,
-        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
-        low=-10.0,
-        high=10.0,
-    )
     step_s: float = param(
         2.5e-4,
         'Sets the longest integration step; a shorter step is more exact and costs more computing time.',
@@ -103,10 +122,7 @@ class StickSlip:
     )
 
     def __post_init__(self) -> None:
-        if self.static < self.kinetic:
-            raise InvalidParameter(
-                f'static friction {self.static} is below the kinetic one, {self.kinetic}; give at least as much'
-            )
+        super().__post_init__()
         most = PASSIVE * self.kinetic / self.stribeck_m_s
         if self.bristle_s_m > most:
             raise InvalidParameter(
@@ -131,10 +147,8 @@ class StickSlip:
 #     bend' = slip − σ0·|slip|·bend / g(slip)
 #
 # σ1 fades as the Stribeck curve does, which keeps friction passive at all speeds. What comes into contact when the
-# force
-# grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend stays
-# when
-# N falls. So a change of force adds no energy, and a new touch begins unbent by itself.
+# force grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend
+# stays when N falls. So a change of force adds no energy, and a new touch begins unbent by itself.
 
 Value = Any  # a float, or an array over scans: the same formulas serve both
 
@@ -150,187 +164,12 @@ class Tip(NamedTuple):
 AT_REST = Tip(0.0, 0.0, 0.0)
 
 
-def rate(friction: StickSlip, tip: Tip, speed_m_s: Value, force_n: Value, exp: Any = math.exp) -> Tip:
-    """Return the derivative of the state under a constant normal force; `exp` is numpy's for arrays.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    tip
-        State of the tip, floats or arrays of one shape.
-    speed_m_s
-        Speed of the base along the surface.
-    force_n
-        Normal force, at least 0.
-    exp
-        `math.exp` for one slide in floats, `numpy.exp` for arrays.
-
-    Returns
-    -------
-    Tip
-        Derivative of each part of the state by time.
-    """
-    stretch, slip, bend = tip
-    fading = exp(-slip * slip / friction.stribeck_m_s**2)
-    curve = friction.kinetic + (friction.static - friction.kinetic) * fading
-    bending = slip - friction.bristle_1_m * abs(slip) * bend / curve
-    rubbing = friction.bristle_1_m * bend + friction.bristle_s_m * fading * bending + friction.viscous_s_m * slip
-    pull_n = friction.skin_n_m * stretch + friction.skin_n_s_m * (speed_m_s - slip)
-    return Tip(speed_m_s - slip, (pull_n - force_n * rubbing) / friction.mass_kg, bending)
-
-
-def energy_j(friction: StickSlip, tip: Tip, force_n: Value) -> Value:
-    """Return what is stored: movement of the tip, stretched skin, bent bristles.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    tip
-        State of the tip, floats or arrays of one shape.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float or array
-        J, at least 0.
-    """
-    moving = friction.mass_kg * tip.slip_m_s**2
-    bent = force_n * friction.bristle_1_m * tip.bend_m**2
-    return (moving + friction.skin_n_m * tip.stretch_m**2 + bent) / 2
-
-
-def jacobian(friction: StickSlip, slip_m_s: float, force_n: float) -> Array:
-    """Return the derivative of `rate` at rest with unbent bristles, or at steady sliding with slip > 0, (3, 3).
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    slip_m_s
-        Speed of the tip over the surface; 0 if it sticks.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    (3, 3)
-        1/s, in the order of the fields of `Tip`.
-    """
-    fading = math.exp(-((slip_m_s / friction.stribeck_m_s) ** 2))
-    curve = friction.kinetic + (friction.static - friction.kinetic) * fading
-    slope = -2 * slip_m_s / friction.stribeck_m_s**2 * (curve - friction.kinetic)
-    relaxing = friction.bristle_1_m * slip_m_s / curve
-    bending_by_slip = slip_m_s * slope / curve if slip_m_s else 1.0
-    damping = friction.bristle_s_m * fading
-    by_slip = force_n * (damping * bending_by_slip + friction.viscous_s_m)
-    by_bend = force_n * (friction.bristle_1_m - damping * relaxing)
-    moved = np.array([friction.skin_n_m, -friction.skin_n_s_m - by_slip, -by_bend]) / friction.mass_kg
-    return np.array([[0.0, -1.0, 0.0], moved, [0.0, bending_by_slip, -relaxing]])
-
-
-# --------------------
-# What integrates the bristle model step by step, and the longest step with which it is stable.
-
-State = tuple[Value, Value, Value]
-Step = Callable[[Value, Value, Value, Value, Value], State]
-
-
-# Makes the step of an integrator, from a friction, the length of a step, and `math.exp` or `numpy.exp` for arrays.
-# The step takes stretch, slip, bend, and the speed and the force at the end of the step, and returns the next state.
-PrepareStep = Callable[['StickSlip', float, Any], Step]
-
-
-# Gives the longest step, s, with which an integrator is stable at a speed of the tip and a force; inf if every one is.
-StepLimit = Callable[['StickSlip', float, float], float]
-
-
-@dataclass(frozen=True)
-class Integrator:
-    """An integrator of fixed step.
-
-    Parameters
-    ----------
-    name
-        For messages and charts.
-    prepare
-        Makes its step.
-    limit_s
-        Gives the longest stable step.
-    """
-
-    name: str
-    prepare: PrepareStep
-    limit_s: StepLimit
-
-
-# --------------------
-# Stick-slip solved by scipy with a step of its own choice: the measure for the integrators of fixed step.
-
-SOLVERS: Mapping[str, str] = {'lsoda': 'LSODA', 'radau': 'Radau'}
-ABSOLUTE = np.array([1e-4, 1e-2, 1e-6])  # m, m/s, m: how large stretch, slip and bend are; times the tolerance
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """States at the times asked for, and how often the rate was computed."""
-
-    tip: Tip
-    evaluations: int
-
-
-def solve(
-    friction: StickSlip,
-    speed_m_s: float,
-    force_n: float,
-    times_s: Array,
-    *,
-    method: str = 'radau',
-    tolerance: float = 1e-9,
-) -> Solution:
-    """Return the movement from rest under constant speed and force at increasing times, (n,).
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    speed_m_s
-        Constant speed of the base.
-    force_n
-        Constant normal force.
-    times_s : (n,)
-        Increasing times.
-    method
-        One of `SOLVERS`.
-    tolerance
-        Relative tolerance of the solver.
-
-    Returns
-    -------
-    Solution
-        State at each time, and what it took.
-    """
-
-    def slope(_: float, state: Array) -> Tip:
-        return rate(friction, Tip(*state.tolist()), speed_m_s, force_n)
-
-    found = solve_ivp(
-        slope,
-        (0.0, float(times_s[-1])),
-        AT_REST,
-        method=find(SOLVERS, method, 'solver'),
-        t_eval=times_s,
-        rtol=tolerance,
-        atol=tolerance * ABSOLUTE,
-    )
-    return Solution(Tip(*found.y), int(found.nfev))
-
-
 # --------------------
 # The integrator of the bristle model: stable with long steps however stiff the bristles are.
 
+State = tuple[Value, Value, Value]
+# Takes stretch, slip, bend, and the speed and the force at the end of the step; returns the next state.
+Step = Callable[[Value, Value, Value, Value, Value], State]
 CORRECTIONS = 2  # solutions of the semi-implicit step: one with the friction of the old speed, one with that of the new
 
 
@@ -348,12 +187,7 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
     stiffness, damping, viscous = friction.skin_n_m, friction.skin_n_s_m, friction.viscous_s_m
     bristle, bristle_damping = friction.bristle_1_m, friction.bristle_s_m
     kinetic, more = friction.kinetic, friction.static - friction.kinetic
-    inertia, narrow, step_bristle = (
-        friction.mass_kg / step_s,
-        -1 / friction.stribeck_m_s**2,
-        step_s * friction.bristle_1_m,
-    )
-    corrections = range(CORRECTIONS)
+    inertia, narrow, step_bristle = friction.mass_kg / step_s, -1 / friction.stribeck_m_s**2, step_s * bristle
     copysign = math.copysign if exp is math.exp else np.copysign
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
@@ -361,7 +195,7 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
         drive = inertia * slip + stiffness * stretch + damping * speed
         left = drive - force * bristle * bend
         size, sign = abs(left), copysign(1.0, left)
-        for _ in corrections:
+        for _ in range(CORRECTIONS):
             fading = exp(narrow * slip * slip)
             bent = step_bristle / (kinetic + more * fading)
             holding = force * bristle_damping * fading
@@ -388,43 +222,17 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
     return (damper + math.sqrt(damper**2 + 4 * f.mass_kg * spring)) / spring
 
 
-SEMI_IMPLICIT = Integrator('semi_implicit', semi_implicit, semi_implicit_limit_s)
-
-
 # --------------------
 # Longest step with which an integrator stays stable; longer steps are refused.
 
 MARGIN = 0.5  # share of the border up to which a step is accepted
 
 
-def max_slip_m_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
-    """Return the speed that a tip reaches at most when it slips: that of the base and that of the skin let go.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    speed_m_s
-        Speed of the base along the surface.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float
-        m/s.
-    """
-    drop_n = (friction.static - friction.kinetic) * force_n
-    return speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
-
-
-def max_stable_step_s(integrator: Integrator, friction: StickSlip, speed_m_s: float, force_n: float) -> float:
+def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
     """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface.
 
     Parameters
     ----------
-    integrator
-        What integrates.
     friction
         Friction of the surface, and the skin.
     speed_m_s
@@ -437,18 +245,19 @@ def max_stable_step_s(integrator: Integrator, friction: StickSlip, speed_m_s: fl
     float
         s.
     """
-    slip_m_s = max(max_slip_m_s(friction, speed_m_s, force_n), friction.stribeck_m_s)
+    # A slipping tip reaches at most the speed of the base and that of the skin let go.
+    drop_n = (friction.static - friction.kinetic) * force_n
+    fastest_m_s = speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
+    slip_m_s = max(fastest_m_s, friction.stribeck_m_s)
     cases = ((0.0, force_n), (slip_m_s, force_n), (slip_m_s, 0.0))
-    return min(integrator.limit_s(friction, slip, force) for slip, force in cases)
+    return min(semi_implicit_limit_s(friction, slip, force) for slip, force in cases)
 
 
-def check_step(integrator: Integrator, friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
+def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
     """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all.
 
     Parameters
     ----------
-    integrator
-        What integrates.
     friction
         Friction of the surface, and the skin.
     step_s
@@ -465,10 +274,10 @@ def check_step(integrator: Integrator, friction: StickSlip, step_s: float, speed
     """
     if not step_s > 0:
         raise InvalidParameter(f'a step of {step_s} s; it must be above 0')
-    allowed_s = MARGIN * max_stable_step_s(integrator, friction, speed_m_s, force_n)
+    allowed_s = MARGIN * max_stable_step_s(friction, speed_m_s, force_n)
     if step_s > allowed_s:
         raise InvalidParameter(
-            f'a step of {1e6 * step_s:.3g} µs; {integrator.name} allows at most {1e6 * allowed_s:.3g} µs at '
+            f'a step of {1e6 * step_s:.3g} µs; the integrator allows at most {1e6 * allowed_s:.3g} µs at '
             f'{force_n:.3g} N and {speed_m_s:.3g} m/s with this skin and these bristles: take a shorter step_s, or a '
             'heavier or softer skin'
         )
@@ -486,7 +295,6 @@ def drag(
     force_n: Array,
     step_s: float,
     *,
-    integrator: Integrator = SEMI_IMPLICIT,
     start: Tip = AT_REST,
     force_before_n: Value = 0.0,
 ) -> Tip:
@@ -498,8 +306,6 @@ def drag(
         Speed of the base along the path and normal force, at the end of each of n steps. Leading axes are scans.
     step_s
         Length of a step.
-    integrator
-        What integrates.
     start, force_before_n
         State of the tip and force before the first step, (...).
     friction
@@ -519,53 +325,13 @@ def drag(
     check_drive(speed_m_s, force_n)
     if not speed_m_s.size:
         return Tip(*(np.zeros_like(speed_m_s) for _ in range(3)))
-    check_step(integrator, friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
-    return drag_unchecked(
-        friction, speed_m_s, force_n, step_s, integrator=integrator, start=start, force_before_n=force_before_n
-    )
-
-
-def drag_unchecked(
-    friction: StickSlip,
-    speed_m_s: Array,
-    force_n: Array,
-    step_s: float,
-    *,
-    integrator: Integrator,
-    start: Tip = AT_REST,
-    force_before_n: Value = 0.0,
-) -> Tip:
-    """Do as `drag` does, whatever comes of it; to find the borders.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    speed_m_s : (..., n)
-        Speed of the base at the end of each step.
-    force_n : (..., n)
-        Normal force at the end of each step.
-    step_s
-        Length of an integration step.
-    integrator
-        What integrates.
-    start
-        State of the tip before the first step.
-    force_before_n : (...)
-        Force before the first step.
-
-    Returns
-    -------
-    Tip of arrays (..., n)
-    """
+    check_step(friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
     before = np.concatenate([np.broadcast_to(force_before_n, speed_m_s.shape[:-1])[..., None], force_n[..., :-1]], -1)
-    kept = np.divide(
-        before, force_n, out=np.ones_like(before), where=force_n > before
-    )  # of the bending, see bristle.py
-    prepare = integrator.prepare
+    # What comes into contact when the force grows comes unbent: so much is kept of the bending.
+    kept = np.divide(before, force_n, out=np.ones_like(before), where=force_n > before)
     if math.prod(speed_m_s.shape[:-1]) <= FEW:
-        return _few(prepare(friction, step_s, math.exp), start, speed_m_s, force_n, kept)
-    return _many(prepare(friction, step_s, np.exp), start, speed_m_s, force_n, kept)
+        return _few(semi_implicit(friction, step_s), start, speed_m_s, force_n, kept)
+    return _many(semi_implicit(friction, step_s, np.exp), start, speed_m_s, force_n, kept)
 
 
 def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
@@ -616,7 +382,7 @@ def _few(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array) 
     starts = [np.broadcast_to(value, shape[:-1]).ravel().tolist() for value in start]
     drives = [values.reshape(-1, shape[-1]).tolist() for values in (speed_m_s, force_n, kept)]
     states = [_one(step, first, *drive) for first, *drive in zip(zip(*starts, strict=True), *drives, strict=True)]
-    return _tip(np.moveaxis(np.array(states), -1, 0).reshape(3, *shape))
+    return Tip(*np.moveaxis(np.array(states), -1, 0).reshape(3, *shape))
 
 
 def _one(
@@ -640,20 +406,14 @@ def _many(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array)
     drives = (np.ascontiguousarray(np.moveaxis(values, -1, 0)) for values in (speed_m_s, force_n, kept))
     for i, (speed, force, share) in enumerate(zip(*drives, strict=True)):
         stretch, slip, bend = states[:, i] = step(stretch, slip, bend * share, speed, force)
-    return _tip(np.moveaxis(states, 1, -1))
-
-
-def _tip(states: Array) -> Tip:
-    return Tip(states[0], states[1], states[2])
+    return Tip(*np.moveaxis(states, 1, -1))
 
 
 # --------------------
 # The Stribeck curve: friction that falls from its value at rest to that of sliding.
 
-FADED = 6.0  # at so many Stribeck speeds the curve is flat
 
-
-def coefficient(friction: StickSlip, speed_m_s: Array) -> Array:
+def coefficient(friction: Stribeck, speed_m_s: Array) -> Array:
     """Return the coefficient of friction of steady sliding, without the viscous part: in kinetic to static.
 
     kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
@@ -673,7 +433,7 @@ def coefficient(friction: StickSlip, speed_m_s: Array) -> Array:
     return friction.kinetic + (friction.static - friction.kinetic) * share
 
 
-def steady_force_n(friction: StickSlip, speed_m_s: Array, force_n: float) -> Array:
+def steady_force_n(friction: Stribeck, speed_m_s: Array, force_n: float) -> Array:
     """Return the friction of steady sliding, against the movement, with the viscous part.
 
     Parameters
@@ -693,116 +453,6 @@ def steady_force_n(friction: StickSlip, speed_m_s: Array, force_n: float) -> Arr
     speed = np.asarray(speed_m_s)
     force: Array = force_n * (np.sign(speed) * coefficient(friction, speed) + friction.viscous_s_m * speed)
     return force
-
-
-def slope_s_m(friction: StickSlip, speed_m_s: Array) -> Array:
-    """Return by how much the coefficient grows with a speed ≥ 0, viscous part included; mostly negative.
-
-    Parameters
-    ----------
-    speed_m_s : (...)
-        Speed of the tip over the surface, at least 0.
-
-    Returns
-    -------
-    (...)
-        Slope in s/m at each speed.
-    """
-    speed = np.asarray(speed_m_s)
-    fading = coefficient(friction, speed) - friction.kinetic
-    slope: Array = friction.viscous_s_m - 2 * speed / friction.stribeck_m_s**2 * fading
-    return slope
-
-
-def critical_speed_m_s(friction: StickSlip, force_n: float) -> float:
-    """Return the speed from which steady sliding is stable: the skin damps more than the falling friction drives.
-
-    The highest speed with skin damping + force·slope = 0; 0 if sliding is stable at all speeds.
-    """
-
-    def damping(speed_m_s: float) -> float:
-        return friction.skin_n_s_m + force_n * float(slope_s_m(friction, np.array(speed_m_s)))
-
-    speeds = np.linspace(0.0, FADED * friction.stribeck_m_s, 1000)
-    driven = np.flatnonzero([damping(speed) < 0 for speed in speeds])
-    if not len(driven):
-        return 0.0
-    last = driven[-1]
-    if last + 1 == len(speeds):
-        return float(speeds[-1])
-    return float(brentq(damping, speeds[last], speeds[last + 1]))
-
-
-# --------------------
-# The vibration of a slowly dragged tip, by formula: it sticks until the skin pulls enough, then slips half a swing.
-
-NUDGE = 1e-9  # m/s, so small that only the linear movement is seen
-BEND_NUDGE = 1e-7  # share of the bending
-
-
-@dataclass(frozen=True)
-class LimitCycle:
-    """How long a tip sticks and slips, and how far the force on the skin swings."""
-
-    stick_s: float
-    slip_s: float
-    swing_n: float
-
-    @property
-    def period_s(self) -> float:
-        """Time from one letting go to the next."""
-        return self.stick_s + self.slip_s
-
-
-def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> LimitCycle:
-    """Return the cycle of a drag that is slow against the Stribeck speed and the swing of the tip.
-
-    The tip lets go at static·force and swings about kinetic·force; without damping it comes to rest as far below, hence
-    the period 2·(static − kinetic)·force / (stiffness·speed) + half a period of the skin. Damping shortens the swing.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    speed_m_s
-        Speed of the base along the surface.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    LimitCycle
-        Times in s, and the swing of the force in N.
-    """
-    drop_n = (friction.static - friction.kinetic) * force_n
-    natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)
-    damping = min(friction.skin_n_s_m / (2 * friction.mass_kg * natural_1_s), 1 - 1e-9)
-    root = math.sqrt(1 - damping**2)
-    swing_n = drop_n * (1 + math.exp(-math.pi * damping / root))
-    return LimitCycle(swing_n / (friction.skin_n_m * speed_m_s), math.pi / (natural_1_s * root), swing_n)
-
-
-def nudged(friction: StickSlip, base_m_s: float, force_n: float) -> Tip:
-    """Return the state of steady sliding (or rest, at 0) with the speed of the tip and the bend off by a nudge.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    base_m_s
-        Speed of the base; 0 for a tip at rest.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    Tip
-        In floats.
-    """
-    curve = float(coefficient(friction, np.array(base_m_s))) if base_m_s else 0.0
-    off = BEND_NUDGE * (curve or friction.kinetic)
-    stretch_m = force_n * (curve + friction.viscous_s_m * base_m_s) / friction.skin_n_m
-    return Tip(stretch_m, base_m_s + NUDGE, (curve + off) / friction.bristle_1_m)
 
 
 # --------------------
@@ -833,7 +483,7 @@ class TipDrag:
     def __init__(self, friction: StickSlip, rate_hz: float, stretched: float | Array = 0.0) -> None:
         self.friction = friction
         self._rate_hz = rate_hz
-        check_step(SEMI_IMPLICIT, friction, friction.step_s, 0.0, 0.0)
+        check_step(friction, friction.step_s, 0.0, 0.0)
         self._substeps = max(1, math.ceil(1 / (rate_hz * friction.step_s) - 1e-9))
         self._step_s = 1 / (rate_hz * self._substeps)
         self._stretched = np.asarray(stretched, dtype=np.float64)
@@ -884,10 +534,8 @@ class TipDrag:
         signs: Array = np.cumprod(np.where(moving & (along < 0), -1.0, 1.0), axis=-1)
         # What counts as forward stays, whatever way the tip goes at the end of the block.
         end = last[..., -1:]
-        self._forward = (
-            signs[..., -1:] * np.take_along_axis(x, end, -1),
-            signs[..., -1:] * np.take_along_axis(y, end, -1),
-        )
+        forward_x, forward_y = (signs[..., -1:] * np.take_along_axis(place, end, -1) for place in (x, y))
+        self._forward = forward_x, forward_y
         return signs
 
     def _between(self, before: Array, values: Array) -> Array:
@@ -907,42 +555,13 @@ CREEP_M_S = 1e-3  # below about this speed friction builds up, so that nothing j
 
 
 @dataclass(frozen=True)
-class SlidingFriction:
+class SlidingFriction(Stribeck):
     """A Stribeck curve without memory: the skin is pulled along as at a steady speed, and never hangs.
 
     For surfaces on which nothing sticks, hundreds of times cheaper than `StickSlip`.
-
-    Raises
-    ------
-    InvalidParameter
-        If friction is lower at rest than in fast sliding.
     """
 
     static: float = param(0.6, 'Sets the coefficient of friction of slow sliding.', low=0.0, high=5.0)
-    kinetic: float = param(0.5, 'Sets the coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
-    stribeck_m_s: float = param(
-        0.05,
-        'Sets the Stribeck speed over which friction falls from static to kinetic; a larger value falls more slowly.',
-        unit='m/s',
-        low=1e-4,
-        high=10.0,
-    )
-    viscous_s_m: float = param(
-        0.0, 'Sets the growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0
-    )
-    force_coupling: float = param(
-        0.2,
-        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
-        low=-10.0,
-        high=10.0,
-    )
-
-    def __post_init__(self) -> None:
-        self.curve()
-
-    def curve(self) -> StickSlip:
-        """Return the same curve as that of bristles."""
-        return StickSlip(self.static, self.kinetic, self.stribeck_m_s, self.viscous_s_m, bristle_s_m=0.0)
 
 
 class SlidingDrag:
@@ -957,8 +576,7 @@ class SlidingDrag:
     """
 
     def __init__(self, friction: SlidingFriction, rate_hz: float) -> None:
-        self._curve = friction.curve()
-        self._force_coupling = friction.force_coupling
+        self._friction = friction
         self._rate_hz = rate_hz
         self._before: tuple[Array, Array] | None = None
 
@@ -970,13 +588,8 @@ class SlidingDrag:
         self._before = path.x_m[..., -1:], path.y_m[..., -1:]
         speed_m_s = np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)) * self._rate_hz
         built_up = speed_m_s / np.hypot(speed_m_s, CREEP_M_S)
-        force_coupling: Array = (
-            self._force_coupling
-            * np.maximum(path.force_n, 0.0)
-            * built_up
-            * steady_force_n(self._curve, speed_m_s, 1.0)
-        )
-        return force_coupling
+        pull_n = np.maximum(path.force_n, 0.0) * built_up * steady_force_n(self._friction, speed_m_s, 1.0)
+        return np.asarray(self._friction.force_coupling * pull_n)
 
 
 # --------------------
@@ -988,44 +601,9 @@ FRICTIONS: Mapping[str, type] = {
 }
 
 
-class Drag(Protocol):
-    """What a finger senses of the friction along its path, block by block."""
-
-    def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses beside the shape of the surface, (..., n) N.
-
-        Parameters
-        ----------
-        path
-            The next points of the trajectory.
-
-        Returns
-        -------
-        (..., n)
-            N.
-        """
-
-
-def _stick_slip_drag(
-    friction: StickSlip, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
-) -> Drag:
-    # Slides that are cut out of longer ones begin with the skin at any point of its cycle, not all at the same.
-    return TipDrag(friction, rate_hz, stretched=rng.uniform(0.0, 1.0, batch_shape))
-
-
-def _sliding_drag(
-    friction: SlidingFriction, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
-) -> Drag:
-    return SlidingDrag(friction, rate_hz)
-
-
-DRAGS: Mapping[type, Callable[[Any, float, np.random.Generator, tuple[int, ...]], Drag]] = {
-    StickSlip: _stick_slip_drag,
-    SlidingFriction: _sliding_drag,
-}
-
-
-def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]) -> Drag:
+def make_drag(
+    friction: Any, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
+) -> TipDrag | SlidingDrag:
     """Return what follows a finger over a surface.
 
     Parameters
@@ -1041,13 +619,16 @@ def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_sha
 
     Returns
     -------
-    Drag
+    TipDrag or SlidingDrag
         Follows the path from its first point on.
     """
-    return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)
+    if isinstance(friction, SlidingFriction):
+        return SlidingDrag(friction, rate_hz)
+    # Slides that are cut out of longer ones begin with the skin at any point of its cycle, not all at the same.
+    return TipDrag(friction, rate_hz, stretched=rng.uniform(0.0, 1.0, batch_shape))
 
 
-def sliding_coefficient(friction: StickSlip | SlidingFriction, speed_m_s: Array) -> Array:
+def sliding_coefficient(friction: Stribeck, speed_m_s: Array) -> Array:
     """Return tangential over normal force of a finger that slides steadily.
 
     Parameters
@@ -1067,5 +648,4 @@ def sliding_coefficient(friction: StickSlip | SlidingFriction, speed_m_s: Array)
     >>> sliding_coefficient(SlidingFriction(static=0.6, kinetic=0.5), np.array([10.0])).round(3).tolist()  # fast
     [0.5]
     """
-    curve = friction.curve() if isinstance(friction, SlidingFriction) else friction
-    return steady_force_n(curve, speed_m_s, 1.0)
+    return steady_force_n(friction, speed_m_s, 1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,6 @@ import numpy as np
 from texture_core.config import find, param
 from texture_core.types import NANOSECONDS, Array, ExplorationState, Phase, Samples, TactileSignal
 from texture_recordings.bags import BagWriter
-from texture_simulation.effects import SlideEffect
 from texture_simulation.friction import sliding_coefficient
 from texture_simulation.path import SimulatedSlide, trajectory_along
 from texture_simulation.scene import Scene, load_scene
@@ -115,7 +114,7 @@ def _parts(
             sliding.speed_m_s, sliding.force_n, sliding.direction_rad, sliding.start_x_m, sliding.start_y_m
         )
     )  # fmt: skip
-    for effect in scene.effects_of(SlideEffect):
+    for effect in scene.effects_of('slide'):
         speed_m_s, force_n = effect.slide(speed_m_s, force_n, rng)
     size = max(1, POINTS_AT_ONCE // points)
     for first in range(0, count, size):
@@ -128,15 +127,6 @@ def _parts(
 
 # --------------------
 # Recordings without devices: whole explorations at thousands of times real time.
-
-__all__ = [
-    'SimulatedRecording',
-    'SimulatedSlide',
-    'record',
-    'simulate_exploration',
-    'simulate_slide_streams',
-    'simulate_slides',
-]
 
 SimulatedRecording = dict[str, list[TactileSignal]]
 BATCH_S = 0.05
@@ -240,25 +230,22 @@ def simulate_exploration(
     """
     kind = find(SENSORS, scene.sensor, 'sensor model')
     speed, force = np.array([speed_m_s]), np.array([force_n])
-    for effect in scene.effects_of(SlideEffect):
+    for effect in scene.effects_of('slide'):
         speed, force = effect.slide(speed, force, rng)
     travelled_m, pressed_n = _profile(float(speed[0]), float(force[0]), slide_s, kind)
     path = trajectory_along(
         travelled_m, pressed_n, SimulatedSlide(speed_m_s, force_n, slide_s, direction_rad, radius_m)
     )
     streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
-    timeline = _ExplorationTimeline(
-        exploration_id,
-        surface,
-        speed_m_s,
-        force_n,
-        slide_s,
-        start_ns,
-        direction_rad,
-        radius_m,
-        _tangential_n(scene, surface, float(speed[0]), float(force[0])),
-    )
-    return timeline.states(), {
+    slide = {
+        'speed_m_s': speed_m_s,
+        'force_n': force_n,
+        'direction_rad': direction_rad,
+        'tangential_force_n': _tangential_n(scene, surface, float(speed[0]), float(force[0])),
+    }
+    motion = 'circular' if radius_m else 'linear_slide'
+    begun = ExplorationState(start_ns, exploration_id, motion, Phase.APPROACH, 0.0, surface=surface)
+    return _states(begun, slide_s, radius_m, slide), {
         stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams
     }
 
@@ -280,52 +267,28 @@ def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind)
     return np.cumsum(speed_m_s * moving) / kind.path_rate_hz, force_n * pressed
 
 
-@dataclass(frozen=True)
-class _ExplorationTimeline:
-    """What an exploration tells about itself."""
+def _states(
+    begun: ExplorationState, slide_s: float, radius_m: float, slide: Mapping[str, float]
+) -> list[ExplorationState]:
+    """Return the state at each change of phase, and regularly while sliding with the speed and force of `slide`."""
+    lift_s, end_s = SLIDE_FROM_S + slide_s, SLIDE_FROM_S + slide_s + LIFT_S
 
-    exploration_id: str
-    surface: str
-    speed_m_s: float
-    force_n: float
-    slide_s: float
-    start_ns: int
-    direction_rad: float
-    radius_m: float
-    tangential_force_n: float
+    def state(at_s: float, phase: Phase, **more: Any) -> ExplorationState:
+        stamp_ns = begun.stamp_ns + round(at_s * NANOSECONDS)
+        return replace(begun, stamp_ns=stamp_ns, phase=phase, progress=at_s / end_s, **more)
 
-    def states(self) -> list[ExplorationState]:
-        """Return the state at each change of phase, and regularly while sliding."""
-        lift_s = SLIDE_FROM_S + self.slide_s
-        times = np.arange(SLIDE_FROM_S, lift_s - 1e-9, STATE_PERIOD_S).tolist()
-        return [
-            self._state(0.0, Phase.APPROACH),
-            self._state(APPROACH_S, Phase.CONTACT),
-            *(self._sliding(at_s, min(STATE_PERIOD_S, lift_s - at_s)) for at_s in times),
-            self._state(lift_s, Phase.LIFT),
-            self._state(lift_s + LIFT_S, Phase.DONE),
-        ]
+    def sliding(at_s: float) -> ExplorationState:
+        turned_rad = (at_s - SLIDE_FROM_S) * slide['speed_m_s'] / radius_m if radius_m else 0.0
+        now = {'steady_s': min(STATE_PERIOD_S, lift_s - at_s), 'direction_rad': slide['direction_rad'] + turned_rad}
+        return state(at_s, Phase.SLIDE, **{**slide, **now})
 
-    def _state(self, at_s: float, phase: Phase) -> ExplorationState:
-        return ExplorationState(
-            stamp_ns=self.start_ns + round(at_s * NANOSECONDS),
-            exploration_id=self.exploration_id,
-            motion='circular' if self.radius_m else 'linear_slide',
-            phase=phase,
-            progress=at_s / (SLIDE_FROM_S + self.slide_s + LIFT_S),
-            surface=self.surface,
-        )
-
-    def _sliding(self, at_s: float, steady_s: float) -> ExplorationState:
-        turned_rad = (at_s - SLIDE_FROM_S) * self.speed_m_s / self.radius_m if self.radius_m else 0.0
-        return replace(
-            self._state(at_s, Phase.SLIDE),
-            steady_s=steady_s,
-            speed_m_s=self.speed_m_s,
-            force_n=self.force_n,
-            direction_rad=self.direction_rad + turned_rad,
-            tangential_force_n=self.tangential_force_n,
-        )
+    return [
+        state(0.0, Phase.APPROACH),
+        state(APPROACH_S, Phase.CONTACT),
+        *(sliding(at_s) for at_s in np.arange(SLIDE_FROM_S, lift_s - 1e-9, STATE_PERIOD_S).tolist()),
+        state(lift_s, Phase.LIFT),
+        state(end_s, Phase.DONE),
+    ]
 
 
 def _batches(samples: Samples, stream: SimulatedStream, start_ns: int) -> list[TactileSignal]:

@@ -7,7 +7,6 @@ import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 from texture_core.config import find, find_file, from_mapping, load_yaml, param, safe_repr
@@ -80,13 +79,13 @@ class Scene:
     name, about
         Its file's name, and what it stands for.
     sensor
-        Name of the sensor model (`sensors/catalogue.py`).
+        Name of the sensor model (`sensor_models.py`).
     surfaces
         By name.
     contact
         Of the finger at 1 N.
     effects
-        What is not ideal, by name (`effects/catalogue.py`); what is not named is off.
+        What is not ideal, by name (`effects.py`); what is not named is off.
     """
 
     name: str
@@ -100,9 +99,9 @@ class Scene:
         """Return a surface by name; UnknownName with the nearest one if there is none."""
         return find(self.surfaces, name, 'surface')
 
-    def effects_of(self, stage: Any) -> list[Any]:
-        """Return the effects that act at a stage (`effects/protocols.py`), in the order of the catalogue."""
-        return [self.effects[name] for name in EFFECTS if name in self.effects and _acts_at(EFFECTS[name], stage)]
+    def effects_of(self, stage: str) -> list[Any]:
+        """Return the effects that have the method of a stage (see effects.py), in the order of the catalogue."""
+        return [self.effects[name] for name in EFFECTS if name in self.effects and hasattr(EFFECTS[name], stage)]
 
     def of_finger(self, finger: int) -> Scene:
         """Return the scene as one individual of the sensor senses it: with a skin and a noise of its own."""
@@ -126,11 +125,6 @@ class Scene:
         return replace(self, effects={name: kept for name, kept in self.effects.items() if name != effect})
 
 
-@cache
-def _acts_at(effect: type, stage: type) -> bool:
-    return issubclass(effect, stage)  # asks for the stage's methods, which takes its time
-
-
 def load_scene(name_or_path: str) -> Scene:
     """Return a scene that the package ships in config/scenes, or that stands in a file.
 
@@ -143,14 +137,6 @@ def load_scene(name_or_path: str) -> Scene:
     return scene_from(path.stem, load_yaml(path, 'scene'))
 
 
-def _check_sections(content: Any, where: str) -> None:
-    if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
-        raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')
-    unexpected = set(content) - set(SECTIONS)
-    if unexpected:
-        raise InvalidParameter(f'{where} has the sections {sorted(unexpected)}; allowed are {", ".join(SECTIONS)}')
-
-
 def scene_from(name: str, content: Any) -> Scene:
     """Return the scene that a mapping with `surfaces`, and if wanted the other `SECTIONS`, describes.
 
@@ -160,7 +146,11 @@ def scene_from(name: str, content: Any) -> Scene:
         If a section is missing, unknown or impossible.
     """
     where = f"scene '{name}'"
-    _check_sections(content, where)
+    if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
+        raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')
+    unexpected = set(content) - set(SECTIONS)
+    if unexpected:
+        raise InvalidParameter(f'{where} has the sections {sorted(unexpected)}; allowed are {", ".join(SECTIONS)}')
     surfaces = {str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()}
     if 'variation' in content:
         variation = from_mapping(PlaceVariation, content['variation'] or {}, f'{where}, variation')
@@ -193,7 +183,10 @@ def _surface(name: str, terms: Any, where: str) -> Surface:
     place = f"{where}, surface '{name}'"
     if not isinstance(terms, list) or not all(isinstance(term, Mapping) and 'kind' in term for term in terms):
         raise InvalidParameter(f'{place} is {safe_repr(terms)}; a list of terms, each with a `kind`, is needed')
-    made = [_term(dict(term), place) for term in terms]
+    made = []
+    for term in terms:
+        values = dict(term)
+        made.append(from_mapping(find(TERMS, str(values.pop('kind')), 'kind of surface term'), values, place))
     frictions = [term for term in made if type(term) in FRICTIONS.values()]
     if len(frictions) > 1:
         raise InvalidParameter(f'{place} has {len(frictions)} kinds of friction; name one of {", ".join(FRICTIONS)}')
@@ -202,7 +195,3 @@ def _surface(name: str, terms: Any, where: str) -> Surface:
         raise InvalidParameter(f'{place} has {len(shapes)} shapes; an object has one')
     relief = tuple(term for term in made if term not in (*frictions, *shapes))
     return Surface(name, relief, next(iter(frictions), None), next(iter(shapes), FLAT))
-
-
-def _term(term: dict[str, Any], place: str) -> Any:
-    return from_mapping(find(TERMS, str(term.pop('kind')), 'kind of surface term'), term, place)

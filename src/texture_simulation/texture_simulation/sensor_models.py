@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,10 @@ from texture_drivers import anyskin, biotac, daq, papillarray, pvdf, tsf85
 from texture_drivers.biotac import FULL_SCALE, PAC, SLOT_RATE_HZ, BioTacLayout
 from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.pvdf import ChargeLeak
-from texture_drivers.tsf85 import LAYOUTS, RATE_HZ, TSF85, Tsf85Layout
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
+from texture_drivers.tsf85 import RATE_HZ, TSF85, Tsf85Layout
 from texture_simulation.contact import SkinContact
-from texture_simulation.effects import BatchShape, SignalEffect
+from texture_simulation.effects import BatchShape
 from texture_simulation.path import Filter, Trajectory, before_first
 from texture_simulation.scene import Scene
 from texture_simulation.surfaces import Surface
@@ -69,7 +68,7 @@ class Converter:
         self._scale = scale
         self._filters = [
             effect.start_signal(rng, rate_hz, batch_shape, channels, slow=slow)
-            for effect in scene.effects_of(SignalEffect)
+            for effect in scene.effects_of('start_signal')
         ]
 
     def exact(self, counts: Samples) -> Samples:
@@ -116,10 +115,39 @@ class Converter:
 # What every simulated sensor has in common.
 
 
-class SensorModel(Protocol):
-    """Turns a path, block by block, into what the sensor publishes; what lies between the blocks is continuous."""
+class SensorModel:
+    """Turn a path, block by block, into what a sensor publishes; what lies between the blocks is continuous.
 
-    touch: SkinContact
+    Parameters
+    ----------
+    scene, surface
+        How the finger senses, and what.
+    rng
+        All randomness: where a sample is touched, what the effects do.
+    finger
+        Which individual of the sensor: its traits are its own and stay the same.
+    batch_shape
+        () for one slide at a time, (count,) for many at once.
+    settled
+        Whether its filters have forgotten how the touch began.
+    """
+
+    PATH_RATE_HZ: float  # points of the path a second
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        batch_shape: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = SkinContact(scene, surface, rng, self.PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+        self._finger = finger
+        self._converter = partial(Converter, scene, rng, batch_shape=batch_shape)
+        self._filter = partial(Filter, settled=settled)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return samples by topic, (..., n_samples, n_channels) in the unit the driver publishes.
@@ -136,10 +164,19 @@ class SensorModel(Protocol):
         mapping
             Topic → (..., n_samples, n_channels).
         """
+        raise NotImplementedError
+
+    def advance(self, path: Trajectory) -> Any:
+        """Return what the emulated device takes along the next piece of path: whole numbers, or values in units."""
+        raise NotImplementedError
+
+    def _pressed_n(self, path: Trajectory) -> tuple[Trajectory, Array]:
+        """Return where the skin goes, and the force on it there, (..., n)."""
+        placed = self.touch.placed(path)
+        return placed, placed.force_n + self.touch.variation_n(placed)
 
 
-@dataclass(frozen=True)
-class SimulatedStream:
+class SimulatedStream(NamedTuple):
     """What a topic holds."""
 
     topic: str
@@ -150,48 +187,13 @@ class SimulatedStream:
     delay_s: float = 0.0  # of the first sample, after the beginning
 
 
-class MakeModel(Protocol):
-    """How a model is made."""
-
-    def __call__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> SensorModel:
-        """Return a model.
-
-        Parameters
-        ----------
-        scene, surface
-            How the finger senses, and what.
-        rng
-            All randomness: where a sample is touched, what the effects do.
-        finger
-            Which individual of the sensor: its traits are its own and stay the same.
-        batch_shape
-            () for one slide at a time, (count,) for many at once.
-        settled
-            Whether its filters have forgotten how the touch began.
-
-        Returns
-        -------
-        SensorModel
-        """
-
-
-@dataclass(frozen=True)
-class SensorKind:
+class SensorKind(NamedTuple):
     """A simulated sensor.
 
     Parameters
     ----------
     make
-        The model.
+        The model, from the arguments of `SensorModel`.
     path_rate_hz
         Points of the path a second.
     step_points
@@ -200,7 +202,7 @@ class SensorKind:
         What it publishes; the fast one first.
     """
 
-    make: MakeModel
+    make: Callable[..., SensorModel]
     path_rate_hz: float
     step_points: int
     streams: tuple[SimulatedStream, ...]
@@ -220,14 +222,11 @@ def individual_rng(finger: int) -> np.random.Generator:
 # What a BioTac fingertip measures while it goes along a path.
 #
 # PAC: pressure of the fluid between 10 and 1040 Hz. PDC: that pressure itself. Electrodes: the fluid over them, which
-# the
-# load squeezes away. TDC, TAC: the finger is cooled by what it touches. Bands and resolutions of the pressures are
-# those
-# of the manual; the sensitivities are ours, in the order of magnitude of public recordings of slides at 10 N.
+# the load squeezes away. TDC, TAC: the finger is cooled by what it touches. Bands and resolutions of the pressures are
+# those of the manual; the sensitivities are ours, in the order of magnitude of public recordings of slides at 10 N.
 
-BIOTAC_OVERSAMPLING = (
-    1  # points of the path in a slot: at 0.4 m/s and below the skin blurs what 4.4 kHz would fold down
-)
+# Points of the path in a slot: at 0.4 m/s and below the skin blurs what 4.4 kHz would fold down.
+BIOTAC_OVERSAMPLING = 1
 BIOTAC_PATH_RATE_HZ = BIOTAC_OVERSAMPLING * SLOT_RATE_HZ
 PA_PER_N = 1500.0  # fluid pressure
 PAC_PA, PDC_PA = 0.37, 36.5  # of a count
@@ -255,8 +254,8 @@ EFFECT_SCALE = 0.1  # counts of 12 bits; an idle PAC stays within a few (QuickSt
 BIOTAC_LIMITS = (0, FULL_SCALE)
 
 
-class BioTacModel:
-    """Turn a path, frame by frame, into the sensor's counts; see `sensors.model.MakeModel` for the arguments.
+class BioTacModel(SensorModel):
+    """Turn a path, frame by frame, into the sensor's counts; see `SensorModel` for the arguments.
 
     Parameters
     ----------
@@ -264,50 +263,27 @@ class BioTacModel:
         Kind of BioTac.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        layout: BioTacLayout,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> None:
-        self.touch = SkinContact(scene, surface, rng, BIOTAC_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+    PATH_RATE_HZ = BIOTAC_PATH_RATE_HZ
+
+    def __init__(self, *touched: Any, layout: BioTacLayout, **individual: Any) -> None:
+        super().__init__(*touched, **individual)
         self._layout = layout
-        self._band = Filter(PAC_BAND, settled=settled)
+        self._band = self._filter(PAC_BAND)
         step = 1 - np.exp(-layout.frame_s / TOUCH_S)
         self._cool = Filter(np.array([[step, 0.0, 0.0, 1.0, step - 1, 0.0]]))
         self._cooled: Array | None = None  # share of the fall of temperature, (..., 1)
         row, column = np.divmod(np.arange(layout.electrodes)[:, None], COLUMNS)
         self._x_m = (column - (COLUMNS - 1) / 2) * ELECTRODE_PITCH_M
         self._y_m = (row - (layout.electrodes // COLUMNS) / 2) * ELECTRODE_PITCH_M
-        self._baseline = individual_rng(finger).uniform(*ELECTRODE_BASELINE, (layout.electrodes, 1))
-        slow = len(layout.slow_slots)
-        self._fast = Converter(
-            scene, rng, layout.pac_rate_hz, 1, BIOTAC_LIMITS, batch_shape=batch_shape, scale=EFFECT_SCALE
-        )
-        self._slow = Converter(
-            scene,
-            rng,
-            layout.frame_rate_hz,
-            slow,
-            BIOTAC_LIMITS,
-            batch_shape=batch_shape,
-            slow=True,
-            scale=EFFECT_SCALE,
-        )
-
-    @property
-    def points_per_frame(self) -> int:
-        """Points of the path, at 4.4 kHz, that one frame takes."""
-        return points_per_frame(self._layout)
+        self._baseline = individual_rng(self._finger).uniform(*ELECTRODE_BASELINE, (layout.electrodes, 1))
+        convert = partial(self._converter, limits=BIOTAC_LIMITS, scale=EFFECT_SCALE)
+        self._fast = convert(layout.pac_rate_hz, 1)
+        self._slow = convert(layout.frame_rate_hz, len(layout.slow_slots), slow=True)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return PAC, and the slow channels if wanted, in counts."""
-        placed, pressure_pa = self._pressure_pa(path)
+        placed, pressed_n = self._pressed_n(path)
+        pressure_pa = PA_PER_N * pressed_n  # in the fluid
         fast = {'signal': self._fast.exact(self._pac(pressure_pa))}
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
 
@@ -331,18 +307,13 @@ class BioTacModel:
         counts[..., list(self._layout.slow_slots)] = frames
         return counts
 
-    def _pressure_pa(self, path: Trajectory) -> tuple[Trajectory, Array]:
-        """Return where the skin goes, and the pressure in the finger there, (..., n)."""
-        placed = self.touch.placed(path)
-        return placed, PA_PER_N * (placed.force_n + self.touch.variation_n(placed))
-
     def _pac(self, pressure_pa: Array) -> Samples:
         """Return PAC, (..., n_samples, 1) counts."""
         return PAC_BASELINE + self._band(pressure_pa)[..., PAC_POINTS, None] / PAC_PA
 
     def _frames(self, placed: Trajectory, pressure_pa: Array) -> Samples:
         """Return the slow channels at the start of each frame, (..., n_frames, n_slow_channels) counts."""
-        starts = slice(0, None, self.points_per_frame)
+        starts = slice(0, None, points_per_frame(self._layout))
         at = placed.at(starts)
         pdc = PDC_BASELINE + pressure_pa[..., starts, None] / PDC_PA
         electrodes = np.swapaxes(self._electrodes(at), -1, -2)
@@ -398,14 +369,12 @@ def biotac_kind(layout: BioTacLayout) -> SensorKind:
 # What the finger of Jamali & Sammut 2010 measures while it goes along a path.
 #
 # Four PVDF films and four strain gauges lie at random places in two layers of silicone. Each senses the pressure over
-# its
-# place, the blunter the deeper it lies: a film its changes (the charge leaks), a gauge the pressure itself. All pass
-# a
-# low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper tells none.
+# its place, the blunter the deeper it lies: a film its changes (the charge leaks), a gauge the pressure itself. All
+# pass a low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper tells none.
 
 DAQ_RATE_HZ = daq.RATE_HZ
 # A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
-# that 2.5 kHz would fold down; what is faster is blurred more (`skin_contact.py`).
+# that 2.5 kHz would fold down; what is faster is blurred more (contact.py).
 DAQ_OVERSAMPLING = 1
 DAQ_PATH_RATE_HZ = DAQ_OVERSAMPLING * DAQ_RATE_HZ
 FILMS, GAUGES = 4, 4
@@ -424,27 +393,20 @@ DAQ_BAND = filters.butter(4, 500.0, 'lowpass', fs=DAQ_PATH_RATE_HZ, output='sos'
 DAQ_LIMITS = (-(2**15), 2**15 - 1)
 
 
-class DaqModel:
-    """Turn a path, block by block, into the converter's counts; see `sensors.model.MakeModel` for the arguments."""
+class DaqModel(SensorModel):
+    """Turn a path, block by block, into the converter's counts; see `SensorModel` for the arguments."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> None:
-        self.touch = SkinContact(scene, surface, rng, DAQ_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
-        self._offset_m, self.volt_per_n = _elements(finger)
-        self._leak, self._band = Filter(DAQ_LEAK, settled=settled), Filter(DAQ_BAND, settled=settled)
-        self._converter = Converter(scene, rng, DAQ_RATE_HZ, ELEMENTS, DAQ_LIMITS, batch_shape=batch_shape)
+    PATH_RATE_HZ = DAQ_PATH_RATE_HZ
+
+    def __init__(self, *touched: Any, **individual: Any) -> None:
+        super().__init__(*touched, **individual)
+        self._offset_m, self.volt_per_n = _elements(self._finger)
+        self._leak, self._band = self._filter(DAQ_LEAK), self._filter(DAQ_BAND)
+        self._counts = self._converter(DAQ_RATE_HZ, ELEMENTS, DAQ_LIMITS)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the 8 channels in V, (..., n_samples, 8)."""
-        return {daq.TOPIC: VOLT_PER_COUNT * self._converter.exact(self._exact(path))}
+        return {daq.TOPIC: VOLT_PER_COUNT * self._counts.exact(self._exact(path))}
 
     def advance(self, path: Trajectory) -> NDArray[np.int16]:
         """Return what is measured along the next piece of path.
@@ -458,17 +420,15 @@ class DaqModel:
         -------
         (n_points / OVERSAMPLING, 8) counts: films then gauges, of each the outer ones first
         """
-        return self._converter.counts(self._exact(path), np.int16)
+        return self._counts.counts(self._exact(path), np.int16)
 
     def _exact(self, path: Trajectory) -> Samples:
-        pressed_n = self._pressed_n(self.touch.placed(path))
+        placed = self.touch.placed(path)
+        # The force that each element senses, (..., 8, n).
+        pressed_n = placed.force_n[..., None, :] + self.touch.variation_n(placed, DAQ_BLUR_M, self._offset_m)
         pressed_n[..., :FILMS, :] = self._leak(pressed_n[..., :FILMS, :])
         sensed_n = self._band(pressed_n)[..., DAQ_OVERSAMPLING - 1 :: DAQ_OVERSAMPLING]
         return np.swapaxes(sensed_n, -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
-
-    def _pressed_n(self, placed: Trajectory) -> Array:
-        """Return the force that each element senses, (..., 8, n)."""
-        return placed.force_n[..., None, :] + self.touch.variation_n(placed, DAQ_BLUR_M, self._offset_m)
 
 
 @lru_cache(maxsize=16)
@@ -504,8 +464,8 @@ class PressedElements:
 
     Parameters
     ----------
-    x_m, y_m : (n_elements,)
-        Where the elements lie.
+    places_m
+        Where the elements lie, x and y of each.
     blur_m
         Length over which each averages.
     rate_hz
@@ -514,8 +474,9 @@ class PressedElements:
         Which individual of the sensor.
     """
 
-    def __init__(self, x_m: Array, y_m: Array, blur_m: float, rate_hz: float, finger: int) -> None:
+    def __init__(self, places_m: Sequence[tuple[float, float]], blur_m: float, rate_hz: float, finger: int) -> None:
         made = individual_rng(finger)
+        x_m, y_m = np.array(places_m).T
         self._offset_m = x_m[:, None], y_m[:, None]
         self._blur_m = np.full((len(x_m), 1), blur_m)
         self._rate_hz = rate_hz
@@ -549,18 +510,19 @@ class PressedElements:
         return scale * x_m_s, scale * y_m_s
 
 
-def grid_m(places: tuple[tuple[float, float], ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return x and y of places, (n,) each.
+def as_samples(forces_n: Array) -> Samples:
+    """Return the forces on elements, (..., n_elements, 3, n), as samples of all their axes, (..., n, 3 · n_elements).
+
+    Parameters
+    ----------
+    forces_n : (..., n_elements, 3, n)
+        As `PressedElements.forces_n` returns them.
 
     Returns
     -------
-    (n,)
-        x, m.
-    (n,)
-        y, m.
+    (..., n, 3 · n_elements)
     """
-    x_m, y_m = np.array(places).T
-    return x_m, y_m
+    return np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
 
 
 # --------------------
@@ -585,26 +547,18 @@ ANYSKIN_LIMITS = (
 )  # ±49 mT: the magnetometer's range is wider than 16 bits at its finest step
 
 
-class AnySkinModel:
-    """Turn a path, block by block, into the field; see `sensors.model.MakeModel` for the arguments."""
+class AnySkinModel(SensorModel):
+    """Turn a path, block by block, into the field; see `SensorModel` for the arguments."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> None:
-        self.touch = SkinContact(scene, surface, rng, ANYSKIN_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
-        x_m, y_m = grid_m(ANYSKIN_PLACES_M)
-        self._elements = PressedElements(x_m, y_m, ANYSKIN_BLUR_M, ANYSKIN_PATH_RATE_HZ, finger)
-        self._band = Filter(ANYSKIN_BAND, settled=settled)
+    PATH_RATE_HZ = ANYSKIN_PATH_RATE_HZ
+
+    def __init__(self, *touched: Any, **individual: Any) -> None:
+        super().__init__(*touched, **individual)
+        self._elements = PressedElements(ANYSKIN_PLACES_M, ANYSKIN_BLUR_M, self.PATH_RATE_HZ, self._finger)
+        self._band = self._filter(ANYSKIN_BAND)
         channels = 3 * len(ANYSKIN_PLACES_M)
-        self._unloaded_ut = individual_rng(finger).uniform(-UNLOADED_UT, UNLOADED_UT, channels)
-        self._converter = Converter(scene, rng, ANYSKIN_RATE_HZ, channels, ANYSKIN_LIMITS, batch_shape=batch_shape)
+        self._unloaded_ut = individual_rng(self._finger).uniform(-UNLOADED_UT, UNLOADED_UT, channels)
+        self._counts = self._converter(ANYSKIN_RATE_HZ, channels, ANYSKIN_LIMITS)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the field in µT, (..., n_samples, 15)."""
@@ -622,12 +576,9 @@ class AnySkinModel:
         -------
         (..., n_points / OVERSAMPLING, 15) µT
         """
-        forces_n = self._band(self._elements.forces_n(self.touch, path))[
-            ..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING
-        ]
-        by_channel = np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
-        counts = (self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT
-        return UT_PER_COUNT * self._converter.exact(counts)
+        forces_n = self._band(self._elements.forces_n(self.touch, path))
+        by_channel = as_samples(forces_n[..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING])
+        return UT_PER_COUNT * self._counts.exact((self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT)
 
 
 ANYSKIN_KIND = SensorKind(
@@ -665,33 +616,17 @@ COUNTS_PER_EFFECT = 100.0  # one count of the effects is 1 mN
 PAPILLARRAY_CHANNELS = papillarray.pillar_channels(len(PAPILLARRAY_PLACES_M))
 
 
-class PapillArrayModel:
-    """Turn a path, block by block, into forces and displacements; see `sensors.model.MakeModel` for the arguments."""
+class PapillArrayModel(SensorModel):
+    """Turn a path, block by block, into forces and displacements; see `SensorModel` for the arguments."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> None:
-        self.touch = SkinContact(scene, surface, rng, PAPILLARRAY_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
-        x_m, y_m = grid_m(PAPILLARRAY_PLACES_M)
-        self._elements = PressedElements(x_m, y_m, PAPILLARRAY_BLUR_M, PAPILLARRAY_PATH_RATE_HZ, finger)
-        self._band = Filter(PAPILLARRAY_BAND, settled=settled)
+    PATH_RATE_HZ = PAPILLARRAY_PATH_RATE_HZ
+
+    def __init__(self, *touched: Any, **individual: Any) -> None:
+        super().__init__(*touched, **individual)
+        self._elements = PressedElements(PAPILLARRAY_PLACES_M, PAPILLARRAY_BLUR_M, self.PATH_RATE_HZ, self._finger)
+        self._band = self._filter(PAPILLARRAY_BAND)
         axes = 3 * len(PAPILLARRAY_PLACES_M)
-        self._converter = Converter(
-            scene,
-            rng,
-            PAPILLARRAY_PATH_RATE_HZ,
-            axes,
-            PAPILLARRAY_LIMITS,
-            batch_shape=batch_shape,
-            scale=COUNTS_PER_EFFECT,
-        )
+        self._counts = self._converter(self.PATH_RATE_HZ, axes, PAPILLARRAY_LIMITS, scale=COUNTS_PER_EFFECT)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return forces (N) and displacements (mm) of the pillars, (..., n_samples, 54)."""
@@ -712,8 +647,7 @@ class PapillArrayModel:
             A step for each point, 1000 a second.
         """
         forces_n = self._band(self._elements.forces_n(self.touch, path))
-        by_axis = np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
-        measured_n = N_PER_COUNT * self._converter.exact(by_axis / N_PER_COUNT)
+        measured_n = N_PER_COUNT * self._counts.exact(as_samples(forces_n) / N_PER_COUNT)
         measured_n = measured_n.reshape(*measured_n.shape[:-1], len(PAPILLARRAY_PLACES_M), 3)
         return np.concatenate([measured_n, measured_n / STIFFNESS_N_MM], axis=-1)
 
@@ -731,8 +665,7 @@ PAPILLARRAY_KIND = SensorKind(
 # --------------------
 # What the PVDF finger of Hu et al. 2014 measures while it goes along a path.
 #
-# The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses
-# the
+# The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses the
 # slow part. The gains are ours: the paper tells none.
 
 PVDF_OVERSAMPLING = 1  # at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more
@@ -748,29 +681,21 @@ POINTS_PER_FORCE = round(PVDF_PATH_RATE_HZ / pvdf.FORCE_RATE_HZ)
 PVDF_LIMITS = (-(2**15), 2**15 - 1)
 
 
-class PvdfModel:
-    """Turn a path, block by block, into the controller's counts; see `sensors.model.MakeModel` for the arguments."""
+class PvdfModel(SensorModel):
+    """Turn a path, block by block, into the controller's counts; see `SensorModel` for the arguments."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> None:
-        self.touch = SkinContact(scene, surface, rng, PVDF_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
-        self._film = Filter(FILM_BAND, settled=settled)
-        self._force_band = Filter(FORCE_BAND, settled=settled)
+    PATH_RATE_HZ = PVDF_PATH_RATE_HZ
+
+    def __init__(self, *touched: Any, **individual: Any) -> None:
+        super().__init__(*touched, **individual)
+        self._film, self._force_band = self._filter(FILM_BAND), self._filter(FORCE_BAND)
         self._points = 0
-        self._fast = Converter(scene, rng, pvdf.FILM_RATE_HZ, 1, PVDF_LIMITS, batch_shape=batch_shape)
-        self._slow = Converter(scene, rng, pvdf.FORCE_RATE_HZ, 1, PVDF_LIMITS, batch_shape=batch_shape, slow=True)
+        self._fast = self._converter(pvdf.FILM_RATE_HZ, 1, PVDF_LIMITS)
+        self._slow = self._converter(pvdf.FORCE_RATE_HZ, 1, PVDF_LIMITS, slow=True)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the charge of the film in pC, and the force in N if wanted, (..., n_samples, 1) each."""
-        force_n = self._pressed_n(path)
+        _, force_n = self._pressed_n(path)
         fast = {pvdf.FILM_TOPIC: pvdf.FILM_PC_PER_COUNT * self._fast.exact(self._charge(force_n))}
         if not slow:
             return fast
@@ -790,7 +715,7 @@ class PvdfModel:
         force : (n_force,) counts
             Those whose time, at 64 Hz from the very first point on, lies in this piece.
         """
-        force_n = self._pressed_n(path)
+        _, force_n = self._pressed_n(path)
         film = self._fast.counts(self._charge(force_n), np.int16)
         return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
 
@@ -805,10 +730,6 @@ class PvdfModel:
         first = -self._points % POINTS_PER_FORCE
         self._points += force_n.shape[-1]
         return slow_n[..., first::POINTS_PER_FORCE, None] / pvdf.FORCE_N_PER_COUNT
-
-    def _pressed_n(self, path: Trajectory) -> Array:
-        placed = self.touch.placed(path)
-        return placed.force_n + self.touch.variation_n(placed)
 
 
 PVDF_KIND = SensorKind(
@@ -825,8 +746,7 @@ PVDF_KIND = SensorKind(
 # --------------------
 # What a TSF-85 fingertip measures while it goes along a path.
 #
-# Dynamic channel: rate of change of the force on the skin, 50 to 450 Hz, sampled at 1 kHz. Static channel: the
-# pressure
+# Dynamic channel: rate of change of the force on the skin, 50 to 450 Hz, sampled at 1 kHz. Static channel: the pressure
 # on the taxels. The counts per newton are ours: none are published.
 
 TSF85_OVERSAMPLING = 2  # so that what lies above the band is filtered and not folded into it
@@ -846,8 +766,8 @@ TSF85_CONTACT_RADIUS_M = 6e-3  # of the pressed area at 1 N
 FAST_LIMITS, SLOW_LIMITS = (-(2**15), 2**15 - 1), (0, 2**16 - 1)
 
 
-class Tsf85Model:
-    """Turn a path, block by block, into the sensor's counts; see `sensors.model.MakeModel` for the arguments.
+class Tsf85Model(SensorModel):
+    """Turn a path, block by block, into the sensor's counts; see `SensorModel` for the arguments.
 
     Parameters
     ----------
@@ -855,35 +775,25 @@ class Tsf85Model:
         Kind of fingertip: how many taxels, and how often they are read.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        layout: Tsf85Layout = TSF85,
-        *,
-        finger: int = 0,
-        batch_shape: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> None:
-        self.touch = SkinContact(scene, surface, rng, TSF85_PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
+    PATH_RATE_HZ = TSF85_PATH_RATE_HZ
+
+    def __init__(self, *touched: Any, layout: Tsf85Layout = TSF85, **individual: Any) -> None:
+        super().__init__(*touched, **individual)
         self._static_rate_hz = layout.static_rate_hz
         self._force_before_n: Array | None = None
-        self._band = Filter(TSF85_BAND, settled=settled)
+        self._band = self._filter(TSF85_BAND)
         self._points = 0
         rows, columns = np.divmod(np.arange(layout.rows * layout.columns), layout.columns)
         self._taxel_x_m = (columns[:, None] - (layout.columns - 1) / 2) * TAXEL_PITCH_M
         self._taxel_y_m = (rows[:, None] - (layout.rows - 1) / 2) * TAXEL_PITCH_M
-        self._baseline = individual_rng(finger).uniform(*STATIC_BASELINE, len(rows))
-        self._fast = Converter(scene, rng, RATE_HZ, 1, FAST_LIMITS, batch_shape=batch_shape)
-        self._slow = Converter(
-            scene, rng, layout.static_rate_hz, len(rows), SLOW_LIMITS, batch_shape=batch_shape, slow=True
-        )
+        self._baseline = individual_rng(self._finger).uniform(*STATIC_BASELINE, len(rows))
+        self._fast = self._converter(RATE_HZ, 1, FAST_LIMITS)
+        self._slow = self._converter(layout.static_rate_hz, len(rows), SLOW_LIMITS, slow=True)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the dynamic channel, and the taxels if wanted, in counts."""
-        placed = self.touch.placed(path)
-        fast = {'signal': self._fast.exact(self._dynamic(placed))}
+        placed, force_n = self._pressed_n(path)
+        fast = {'signal': self._fast.exact(self._dynamic(force_n))}
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
@@ -900,12 +810,11 @@ class Tsf85Model:
         images : (n_images, n_taxels) counts
             Those whose time, from the very first point on, lies in this piece.
         """
-        placed = self.touch.placed(path)
-        dynamic = self._fast.counts(self._dynamic(placed), np.int16)
+        placed, force_n = self._pressed_n(path)
+        dynamic = self._fast.counts(self._dynamic(force_n), np.int16)
         return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
 
-    def _dynamic(self, placed: Trajectory) -> Samples:
-        force_n = placed.force_n + self.touch.variation_n(placed)
+    def _dynamic(self, force_n: Array) -> Samples:
         before = force_n[..., :1] if self._force_before_n is None else self._force_before_n
         self._force_before_n = force_n[..., -1:]
         rate_n_s = np.diff(force_n, prepend=before) * TSF85_PATH_RATE_HZ
@@ -998,9 +907,7 @@ class Tsf85Pair:
     """Two fingers of a TSF-85 that move as one, each an individual that touches a place of its own."""
 
     def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
-        self._models = [
-            Tsf85Model(scene.of_finger(finger), surface, rng, LAYOUTS['tsf85'], finger=finger) for finger in (0, 1)
-        ]
+        self._models = [Tsf85Model(scene.of_finger(finger), surface, rng, finger=finger) for finger in (0, 1)]
         self.touch = TwoContacts([model.touch for model in self._models])
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
@@ -1020,16 +927,11 @@ class BioTacHand:
 
     def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> None:
         self._models = [
-            BioTacModel(scene.of_finger(place), surface, rng, layout, finger=place)
+            BioTacModel(scene.of_finger(place), surface, rng, layout=layout, finger=place)
             for place, serial in enumerate(SERIALS)
             if serial
         ]
         self.touch = TwoContacts([model.touch for model in self._models])
-
-    @property
-    def points_per_frame(self) -> int:
-        """Points of the path, at 4.4 kHz, that one frame takes."""
-        return self._models[0].points_per_frame
 
     def advance(self, path: Trajectory) -> NDArray[np.uint16]:
         """Return what all places measure along the next piece of path, (n_frames, n_slots, n_places) counts."""

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,49 +149,36 @@ def _amplitudes(pitch_m: float, shape: str, duty: float, blur_m: float) -> list[
 
 
 # --------------------
-# Concentric rings.
+# Kinds of relief: each is a frozen dataclass that gives its height at places (x, y), blurred by a Gaussian of standard
+# deviation `blur_m`: detail finer than the contact is averaged out.
 
 
-@dataclass(frozen=True)
-class Circles:
-    """Concentric rings: blurred as straight ridges are, which is right but within a pitch or so of the centre."""
-
-    pitch_m: float = param(
-        2e-3,
-        'Sets the distance between rings; a larger pitch lowers the frequency of the signal.',
-        unit='m',
-        low=1e-5,
-        high=0.1,
-    )
-    depth_m: float = param(
-        2e-4,
-        'Sets the height of the rings above the grooves; a larger depth gives a stronger signal.',
-        unit='m',
-        low=0.0,
-        high=0.01,
-    )
-    centre_x_m: float = param(
-        0.05, 'Sets the x coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
-    )
-    centre_y_m: float = param(
-        0.05, 'Sets the y coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
-    )
-    shape: str = param('sine', "Sets the cross-section of the rings, 'sine' or 'square'.", choices=SHAPES)
-    duty: float = param(0.5, 'Sets the share of the pitch that a square ring takes.', low=0.05, high=0.95)
+class Relief:
+    """A kind of relief."""
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n)."""
-        radius_m = np.hypot(x_m - self.centre_x_m, y_m - self.centre_y_m)
-        return self.depth_m * profile(radius_m, blur_m, self.pitch_m, self.shape, self.duty)
+        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same.
 
+        Parameters
+        ----------
+        x_m : (..., n)
+            Positions along x.
+        y_m : (..., n)
+            Positions along y.
+        blur_m : (..., n) or (..., 1)
+            Standard deviation of the contact that averages.
 
-# --------------------
-# Parallel ridges.
+        Returns
+        -------
+        (..., n)
+            m, of zero mean.
+        """
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Grating:
-    """Parallel ridges, `angle_rad` from +x towards +y: a slide along +x meets v·cos(angle)/pitch of them a second."""
+class Ridges(Relief):
+    """What ridges of one pitch have in common, be they straight or rings."""
 
     pitch_m: float = param(
         2e-3,
@@ -207,11 +194,42 @@ class Grating:
         low=0.0,
         high=0.01,
     )
+    shape: str = param('sine', "Sets the cross-section of the ridges, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Sets the share of the pitch that a square ridge takes.', low=0.05, high=0.95)
+
+
+# --------------------
+# Concentric rings.
+
+
+@dataclass(frozen=True)
+class Circles(Ridges):
+    """Concentric rings: blurred as straight ridges are, which is right but within a pitch or so of the centre."""
+
+    centre_x_m: float = param(
+        0.05, 'Sets the x coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
+    )
+    centre_y_m: float = param(
+        0.05, 'Sets the y coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
+    )
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        radius_m = np.hypot(x_m - self.centre_x_m, y_m - self.centre_y_m)
+        return self.depth_m * profile(radius_m, blur_m, self.pitch_m, self.shape, self.duty)
+
+
+# --------------------
+# Parallel ridges.
+
+
+@dataclass(frozen=True)
+class Grating(Ridges):
+    """Parallel ridges, `angle_rad` from +x towards +y: a slide along +x meets v·cos(angle)/pitch of them a second."""
+
     angle_rad: float = param(
         0.0, 'Sets the direction across the ridges, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
     )
-    shape: str = param('sine', "Sets the cross-section of the ridges, 'sine' or 'square'.", choices=SHAPES)
-    duty: float = param(0.5, 'Sets the share of the pitch that a square ridge takes.', low=0.05, high=0.95)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""
@@ -226,7 +244,7 @@ MEAN = {'sine': 0.5}
 
 
 @dataclass(frozen=True)
-class Grid:
+class Grid(Relief):
     """Posts in rows and columns, or a net of ribs between hollows.
 
     The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
@@ -275,34 +293,9 @@ class Grid:
 
 
 # --------------------
-# A surface: heights over a plane, blurred by the contact of a soft finger.
-#
-# A surface is a sum of terms. Each kind of term is a frozen dataclass with a method that gives its height at places
-# (x, y), blurred by a Gaussian of standard deviation `blur_m`: detail finer than the contact is averaged out.
+# A surface: the sum of its kinds of relief.
 
 MIN_BLUR_M, MAX_BLUR_M = 5e-5, 2e-3
-
-
-class Term(Protocol):
-    """A kind of relief."""
-
-    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same.
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-
-        Returns
-        -------
-        (..., n)
-            m, of zero mean.
-        """
 
 
 @dataclass(frozen=True)
@@ -310,7 +303,7 @@ class Surface:
     """A named sum of terms, the friction on it (without one, the skin glides), its curvature, and how it varies."""
 
     name: str
-    terms: tuple[Term, ...]
+    terms: tuple[Relief, ...]
     friction: Any = None
     shape: Curved = FLAT
     variation: PlaceVariation | None = None
@@ -336,18 +329,18 @@ POINTS_PER_WAVE = 4  # of the shortest wave
 # The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(MIN_BLUR_M, MAX_BLUR_M, 10)  # tiles are made for these and interpolated between
-MIN_POINTS_FOR_OWN_TILE = (
-    20_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
-)
+# Points under one blur, from which on a tile of its own is cheaper than mixing point by point.
+MIN_POINTS_FOR_OWN_TILE = 20_000
 TILE_POINTS = (SIDE + 1) ** 2
 
 
-class RandomRelief(Protocol):
+class RandomRelief(Relief):
     """A kind of random relief; hashable, so that its tiles are made once."""
 
     @property
     def spacing_m(self) -> float:
         """Distance of the tile's points."""
+        raise NotImplementedError
 
     def sharp(self) -> Array:
         """Return the height over one tile, (SIDE, SIDE) m, not blurred, going on periodically.
@@ -357,40 +350,20 @@ class RandomRelief(Protocol):
         (SIDE, SIDE)
             m.
         """
+        raise NotImplementedError
 
-    def __hash__(self) -> int:
-        """Return what tells it from others."""
-
-
-def tile_height(random: RandomRelief, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-    """Return the height of random relief at places, (..., n); `blur_m` is (..., n) or (..., 1).
-
-    Parameters
-    ----------
-    random
-        Kind of relief.
-    x_m : (..., n)
-        Positions along x.
-    y_m : (..., n)
-        Positions along y.
-    blur_m : (..., n) or (..., 1)
-        Standard deviation of the contact that averages.
-
-    Returns
-    -------
-    (..., n)
-        m.
-    """
-    cosine, sine = math.cos(TURN_RAD) / random.spacing_m, math.sin(TURN_RAD) / random.spacing_m
-    rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
-    level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
-    many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_OWN_TILE
-    if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_OWN_TILE <= rows.size:
-        height = _bilinear(_mixed(random, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
-        return np.asarray(height, dtype=np.float64)
-    low = level.astype(np.intp)
-    both = _bilinear(_pairs(random), low, rows, columns)
-    return np.asarray(both.real + (level - low) * (both.imag - both.real), dtype=np.float64)
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at positions, (..., n)."""
+        cosine, sine = math.cos(TURN_RAD) / self.spacing_m, math.sin(TURN_RAD) / self.spacing_m
+        rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
+        level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
+        many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_OWN_TILE
+        if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_OWN_TILE <= rows.size:
+            height = _bilinear(_mixed(self, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
+            return np.asarray(height, dtype=np.float64)
+        low = level.astype(np.intp)
+        both = _bilinear(_pairs(self), low, rows, columns)
+        return np.asarray(both.real + (level - low) * (both.imag - both.real), dtype=np.float64)
 
 
 def _bilinear(tiles: AnyArray, number: NDArray[np.intp], rows: Array, columns: Array) -> AnyArray:
@@ -454,12 +427,10 @@ def _pairs(random: RandomRelief) -> AnyArray:
     """
     spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
     blurred = [_blurred(spectrum, wave_1_m, blur_m) for blur_m in BLURS_M]
-    return _flat([sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]).astype(np.complex64)
-
-
-def _flat(tiles: list[AnyArray]) -> AnyArray:
-    """Return tiles one after the other, each with its first row and column again at its end."""
-    return np.concatenate([np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in tiles])
+    both = [sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]
+    # One after the other, each with its first row and column again at its end.
+    flat = [np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in both]
+    return np.asarray(np.concatenate(flat), dtype=np.complex64)
 
 
 def _blurred(spectrum: NDArray[np.complex128], wave_1_m: Array, blur_m: float) -> Array:
@@ -493,7 +464,7 @@ SIZES = (0.5, 1.5)  # range of the grains' heights, of the mean
 
 
 @dataclass(frozen=True)
-class Sandpaper:
+class Sandpaper(RandomRelief):
     """Round grains at random places, of random height; where they overlap they add up.
 
     Sizes of FEPA grades: P60 269 µm, P80 201, P120 125, P240 58.5, P400 35 (ISO 6344).
@@ -529,17 +500,13 @@ class Sandpaper:
         height = self.grain_height_m * np.fft.irfft2(np.fft.rfft2(tops) * np.fft.rfft2(dome), s=(SIDE, SIDE))
         return np.asarray(height - height.mean())
 
-    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n)."""
-        return tile_height(self, x_m, y_m, blur_m)
-
 
 # --------------------
 # Random roughness on many scales.
 
 
 @dataclass(frozen=True)
-class SelfAffine:
+class SelfAffine(RandomRelief):
     """Random roughness: power ∝ k^(−2−2·hurst) between two wavelengths, the same in all directions.
 
     Along any line its power falls as 1/f^s with s = 1 + 2·hurst.
@@ -578,10 +545,6 @@ class SelfAffine:
         height = np.fft.irfft2(noise * amplitude, s=(SIDE, SIDE))
         return np.asarray(height * (self.rms_m / height.std()))
 
-    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n)."""
-        return tile_height(self, x_m, y_m, blur_m)
-
 
 # --------------------
 # Cloth: yarns that go over and under each other.
@@ -594,7 +557,7 @@ KNOT_M = 2.5e-4  # straight between such places the shift is wrong by 1 % at mos
 
 
 @dataclass(frozen=True)
-class Weave:
+class Weave(Relief):
     """Two sets of yarns: those met when sliding along x stand `pitch_x_m` apart.
 
     Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
@@ -662,9 +625,7 @@ class Weave:
 
     def _even(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
         """Return where places would lie if the yarns were even."""
-        if not self.irregular_m:
-            return x_m, y_m
-        if not x_m.shape[-1]:
+        if not self.irregular_m or not x_m.shape[-1]:
             return x_m, y_m
         turns = PHASES + np.random.default_rng(self.seed).uniform(0, 2 * np.pi, PHASES.shape)
         scale_m = self.irregular_m * math.sqrt(2 / len(WAVES_1_M))

@@ -19,8 +19,7 @@ from texture_simulation.devices.rails import EmulatedSerialRobot
 # --------------------
 # Dynamixel motors of the X series: control tables and mechanics, around an object.
 #
-# A motor in current-based position mode follows its goal by its gain, with at most its goal current; motors that
-# press
+# A motor in current-based position mode follows its goal by its gain, with at most its goal current; motors that press
 # meet the object. What a motor refuses, and what its Bus Watchdog, its shutdown and a reboot do, is as in the ROBOTIS
 # e-Manual of the X series (sections Bus Watchdog, Hardware Error Status, Shutdown; protocol 2.0, Status Packet).
 

@@ -10,28 +10,23 @@ import re
 import struct
 import tty
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.types import Array
 
 # --------------------
 # What a BioTac bridge puts on the wire, written from its protocol and not from the driver's code.
 #
-# Reply of a slot: the command's two bytes, then two bytes for each BioTac: seven and five bits of the value, each
-# byte
+# Reply of a slot: the command's two bytes, then two bytes for each BioTac: seven and five bits of the value, each byte
 # with a last bit that makes its number of ones odd. Frame: COBS(kind u8, version u8, sequence u16, time_us u32, rows
-# u8,
-# columns u8, body, CRC-16/CCITT-FALSE u16), then a zero; little endian, numbered kind by kind. Kind 'B' holds one
-# reply
-# to all slots, kind 'S' the serial numbers, separated by commas.
+# u8, columns u8, body, CRC-16/CCITT-FALSE u16), then a zero; little endian, numbered kind by kind. Kind 'B' holds one
+# reply to all slots, kind 'S' the serial numbers, separated by commas.
 
 Values = NDArray[np.uint16]
 Bytes = NDArray[np.uint8]
@@ -141,13 +136,12 @@ def stuff(content: bytes) -> bytes:
 # What goes wrong on the way: with bytes, and with whole frames.
 
 
-@dataclass(frozen=True)
-class ByteFaults:
-    """How likely each byte is to suffer."""
+class ByteFaults(NamedTuple):
+    """How likely each byte is to suffer: lost, a random one inserted before it, one bit changed."""
 
-    drop: float = param(0.0, 'Sets the probability that a byte is lost on the line.', low=0.0, high=1.0)
-    insert: float = param(0.0, 'Sets the probability that a random byte is inserted before a byte.', low=0.0, high=1.0)
-    flip: float = param(0.0, 'Sets the probability that one bit of a byte is changed.', low=0.0, high=1.0)
+    drop: float = 0.0
+    insert: float = 0.0
+    flip: float = 0.0
 
     def apply(self, data: bytes, rng: np.random.Generator) -> bytes:
         """Return what arrives of `data`."""
@@ -161,12 +155,11 @@ class ByteFaults:
         return np.insert(values, places, rng.integers(0, 256, len(places), dtype=np.uint8)).tobytes()
 
 
-@dataclass(frozen=True)
-class FrameFaults:
-    """Parameters of the faults that are injected in frames or packets."""
+class FrameFaults(NamedTuple):
+    """How likely each frame is to be numbered and not sent, and to be sent twice."""
 
-    skip: float = param(0.0, 'Sets the probability that a frame is numbered and not sent.', low=0.0, high=1.0)
-    duplicate: float = param(0.0, 'Sets the probability that a frame is sent twice.', low=0.0, high=1.0)
+    skip: float = 0.0
+    duplicate: float = 0.0
 
     def apply(self, frame: bytes, rng: np.random.Generator) -> bytes:
         """Return what is sent of a frame."""
@@ -178,8 +171,7 @@ class FrameFaults:
 # --------------------
 # What the hub of PapillArrays puts on the wire, written from its protocol and not from the driver's code.
 #
-# Packet: 55 66 77 88, index, blocks, sum of the bytes since the start mark (u16), AA BB CC DD; little endian. The
-# index
+# Packet: 55 66 77 88, index, blocks, sum of the bytes since the start mark (u16), AA BB CC DD; little endian. The index
 # is the size of an offset (u8), then type (u16) and offset of each block.
 
 PILLARS, QUANTITIES = 9, 6
@@ -469,15 +461,6 @@ FRAMES_PER_SERIALS = 100
 WRONG_VERSION = 99
 
 
-@dataclass(frozen=True)
-class BoardFaults:
-    """What goes wrong before the bridge's check sum is made."""
-
-    flip: float = param(
-        0.0, 'Sets the probability that one bit of a byte on the SPI bus is changed.', low=0.0, high=1.0
-    )
-
-
 class EmulatedBioTac(EmulatedDevice):
     """An emulated bridge: `advance` it by the frames that have been sampled.
 
@@ -493,7 +476,7 @@ class EmulatedBioTac(EmulatedDevice):
         self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
     ) -> None:
         super().__init__(link, rng)
-        self.board_faults = BoardFaults()
+        self.board_flip = 0.0  # probability that a bit of a byte changes before the check sum of the bridge is made
         self._serials = serials
         self._absent = [place for place, serial in enumerate(serials) if not serial]
         self._frames = 0
@@ -528,7 +511,7 @@ class EmulatedBioTac(EmulatedDevice):
 
     def _disturb(self, replies: Bytes) -> Bytes:
         """Return replies with flipped bits."""
-        hit = self._rng.random(replies.shape) < self.board_faults.flip
+        hit = self._rng.random(replies.shape) < self.board_flip
         bits = np.uint8(1) << self._rng.integers(0, 8, replies.shape, dtype=np.uint8)
         return np.where(hit, replies ^ bits, replies)
 
@@ -624,8 +607,7 @@ Counts = NDArray[np.int16]
 MICROSECONDS = 1_000_000
 
 
-@dataclass(frozen=True)
-class SampledStream:
+class SampledStream(NamedTuple):
     """One kind of frames that the device sends."""
 
     kind: int
@@ -733,7 +715,7 @@ class EmulatedDaq(EmulatedSampler):
     def __init__(
         self, link: Path, rng: np.random.Generator, start_us: int = 0, rate_hz: float = STREAM.rate_hz
     ) -> None:
-        super().__init__(link, rng, {'daq': replace(STREAM, rate_hz=rate_hz)}, start_us)
+        super().__init__(link, rng, {'daq': STREAM._replace(rate_hz=rate_hz)}, start_us)
 
     def sample(self, counts: Counts) -> None:
         """Take samples, (n_samples, 8)."""
@@ -761,8 +743,7 @@ class EmulatedPvdf(EmulatedSampler):
 # --------------------
 # A sound card without hardware: ALSA's file plugin reads what is sampled from a pipe, PortAudio lists it as a card.
 #
-# It lives in user space: the environment variable `ALSA_CONFIG_PATH` names its configuration, in the process that
-# opens
+# It lives in user space: the environment variable `ALSA_CONFIG_PATH` names its configuration, in the process that opens
 # it and before PortAudio is loaded there.
 
 # A write of this many bytes is read at once, or not at all; PortAudio asks for two blocks of 480 frames.

@@ -24,8 +24,7 @@ from texture_simulation.devices.fingers import ByteFaults, PtyPort
 # The rails of a PVDF finger: their firmware and their mechanics, written from the protocol.
 #
 # Frame: COBS(kind u8, version u8, sequence u16, time_us u32, 1, 1, body, CRC-16/CCITT-FALSE u16), then a zero; little
-# endian. Orders 0xA0 move (i32 vx, vy µm/s; u8 mode; i32 value), 0xA1 stop, 0xA2 clear; state 0x20 (i32 x, y, z
-# counts;
+# endian. Orders 0xA0 move (i32 vx, vy µm/s; u8 mode; i32 value), 0xA1 stop, 0xA2 clear; state 0x20 (i32 x, y, z counts;
 # i32 mN; u8 flags; u16 watchdog stops).
 
 WATCHDOG_S = 0.15

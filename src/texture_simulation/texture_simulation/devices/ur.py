@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,12 +32,11 @@ from texture_core.types import Array, FingerSender, FingerState, rotation_matrix
 # --------------------
 # What moves the emulated robot: each motion says which velocity comes next.
 #
-# Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched:
-# rotation
+# Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched: rotation
 # vectors change component by component, and 1 rad counts as 1 m.
 
 
-class RobotMove(Protocol):
+class RobotMove:
     """One motion of the robot; `done` when it will not move any further by itself."""
 
     done: bool
@@ -59,9 +58,10 @@ class RobotMove(Protocol):
         (6,)
             m/s and rad/s.
         """
+        raise NotImplementedError
 
 
-class StopMove:
+class StopMove(RobotMove):
     """Lose speed (stopl)."""
 
     def __init__(self, deceleration: float) -> None:
@@ -75,7 +75,7 @@ class StopMove:
         return slower
 
 
-class SpeedMove:
+class SpeedMove(RobotMove):
     """Gain a velocity and keep it (speedl)."""
 
     def __init__(self, wanted: Array, acceleration: float) -> None:
@@ -88,7 +88,7 @@ class SpeedMove:
         return approach(velocity, self._wanted, self._acceleration * step_s)
 
 
-class LinearMove:
+class LinearMove(RobotMove):
     """Go to a pose on a straight line, speeding up and slowing down (movel)."""
 
     def __init__(self, goal: Array, speed: float, acceleration: float) -> None:
@@ -111,7 +111,7 @@ class LinearMove:
         return speed / distance * offset if distance > 0 else np.zeros(6)
 
 
-class ServoMove:
+class ServoMove(RobotMove):
     """Follow a pose that is moved all the time (servoj of the pose): approach it within the look-ahead time."""
 
     def __init__(self, goal: Array, lookahead_s: float) -> None:
@@ -187,8 +187,7 @@ DASHBOARD_PORT = 29999
 SCRIPT_PORT = 30003
 
 
-@dataclass(frozen=True)
-class ControllerVersion:
+class ControllerVersion(NamedTuple):
     """What depends on the version of the control software."""
 
     numbers: tuple[int, int, int, int]
@@ -511,8 +510,7 @@ HALT = 20.0  # deceleration of a protective stop, m/s²
 OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
 
 
-@dataclass(frozen=True, eq=False)
-class ForceMode:
+class ForceMode(NamedTuple):
     """Which axes of a frame yield (selection, (6,)), to which wrench, and how fast at most; see force_mode in URScript.
 
     `axes` is (3, 3), the axes of the frame as columns, in the base frame. The wrench is what the robot does to its
@@ -630,8 +628,7 @@ def _stiff(velocity: Array, mode: ForceMode) -> Array:
 # --------------------
 # What the control script of ur-rtde does on the controller, without being URScript.
 #
-# The script looks at its command register, input_int_register_0 or 24, once per cycle. Realtime commands are obeyed
-# in
+# The script looks at its command register, input_int_register_0 or 24, once per cycle. Realtime commands are obeyed in
 # every cycle in which they stand there; others once, until the client has written 0 in between. A command that is
 # overwritten within a cycle is lost, as on the real controller.
 
@@ -643,27 +640,13 @@ RUNNING_BIT = 1 << 15
 COUNTER_SIZE = 128
 
 
-class Host(Protocol):
-    """What the program asks of the controller that runs it."""
-
-    def set_watchdog(self, min_frequency_hz: float) -> None:
-        """Stop the program when its command register comes less often."""
-
-    def protective_stop(self) -> None:
-        """Stop hard."""
-
-    @property
-    def acknowledge_s(self) -> float:
-        """So much later than it is done a stop, the end of force control or a zeroing is acknowledged."""
-
-
 Steps = Iterator[None]
 
 
 class ControlProgram:
     """The running script; `cycles` is advanced once per cycle of the controller and ends with the script."""
 
-    def __init__(self, robot: EmulatedRobot, registers: Registers, host: Host, step_s: float) -> None:
+    def __init__(self, robot: EmulatedRobot, registers: Registers, host: EmulatedController, step_s: float) -> None:
         self._robot = robot
         self._registers = registers
         self._host = host
@@ -1005,14 +988,30 @@ TOO_EARLY = (
 )
 
 
-class DashboardSession:
-    """The conversation with one client."""
+class Session:
+    """One conversation with one client; by itself it says nothing."""
+
+    def greeting(self) -> bytes:
+        """Return what the server says first."""
+        return b''
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answer."""
+        raise NotImplementedError
+
+    def package(self) -> bytes:
+        """Return what is sent unasked in this cycle."""
+        return b''
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+
+class DashboardSession(Session):
+    """The conversation on the dashboard."""
 
     def __init__(
-        self,
-        controller: EmulatedController,
-        go_offline: Callable[[float], None],
-        go_silent: Callable[[float], None],
+        self, controller: EmulatedController, go_offline: Callable[[float], None], go_silent: Callable[[float], None]
     ) -> None:
         self._controller = controller
         self._go_offline = go_offline
@@ -1027,13 +1026,6 @@ class DashboardSession:
         """Take over what came; return the answers."""
         *lines, self._received = (self._received + data).split(b'\n')
         return b''.join(self._answer(line.decode('utf-8', 'replace').strip()).encode() + b'\n' for line in lines)
-
-    def close(self) -> None:
-        """Leave nothing behind."""
-
-    def package(self) -> bytes:
-        """Say nothing unasked."""
-        return b''
 
     def _answer(self, line: str) -> str:
         for command, answer in ANSWERS.items():
@@ -1166,16 +1158,12 @@ LONGEST_SCRIPT = 1_000_000
 END = b'\nend\n'
 
 
-class ScriptSession:
+class ScriptSession(Session):
     """The conversation with one client, who sends programs and gets no answer."""
 
     def __init__(self, controller: EmulatedController) -> None:
         self._controller = controller
         self._received = b''
-
-    def greeting(self) -> bytes:
-        """Say nothing at the start."""
-        return b''
 
     def receive(self, data: bytes) -> bytes:
         """Start a program once its last line is there."""
@@ -1183,13 +1171,6 @@ class ScriptSession:
         if self._received.endswith(END):
             self._controller.upload(self._received.decode('utf-8', 'replace'))
             self._received = b''
-        return b''
-
-    def close(self) -> None:
-        """Leave nothing behind."""
-
-    def package(self) -> bytes:
-        """Say nothing unasked."""
         return b''
 
 
@@ -1321,7 +1302,7 @@ class InputClaims(dict[str, 'RtdeSession']):
     """Who writes which input: each may belong to one session only."""
 
 
-class RtdeSession:
+class RtdeSession(Session):
     """The conversation with one client; `package` is what it gets each cycle once it has asked for it."""
 
     def __init__(self, controller: EmulatedController, claims: InputClaims) -> None:
@@ -1334,10 +1315,6 @@ class RtdeSession:
         self._due_s = 0.0
         self._started = False
         self._inputs: list[InputRecipe] = []
-
-    def greeting(self) -> bytes:
-        """Say nothing at the start."""
-        return b''
 
     def receive(self, data: bytes) -> bytes:
         """Take over what came; return the answers."""
@@ -1476,22 +1453,6 @@ def _format(types: list[str]) -> struct.Struct:
 # real controller moves for longer than its watchdog waits without one.
 MAX_MISSED_CYCLES = 50
 CHUNK = 65536
-
-
-class Session(Protocol):
-    """One conversation."""
-
-    def greeting(self) -> bytes:
-        """Return what the server says first."""
-
-    def receive(self, data: bytes) -> bytes:
-        """Take over what came; return the answer."""
-
-    def package(self) -> bytes:
-        """Return what is sent unasked in this cycle."""
-
-    def close(self) -> None:
-        """End it."""
 
 
 class Server:

@@ -51,11 +51,7 @@ class ControllerTopicParams:
         high=1.0,
     )
     force_delay_s: float = param(
-        0.0,
-        'Publishes the measured force so much later than it was measured; 0 at once.',
-        unit='s',
-        low=0.0,
-        high=2.0,
+        0.0, 'Publishes the measured force so much later than it was measured; 0 at once.', unit='s', low=0.0, high=2.0
     )
     stamp_when_sent: bool = param(
         False, 'Stamps a delayed force when it is published; false stamps it when it was measured.'
