@@ -79,7 +79,7 @@ class FingerStateReceiver:
 
     def states(self) -> list[FingerState]:
         """Return what has come since the last call."""
-        states = []
+        states: list[FingerState] = []
         while True:
             try:
                 data = self._socket.recv(256)

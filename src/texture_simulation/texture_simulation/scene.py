@@ -183,7 +183,7 @@ def _surface(name: str, terms: Any, where: str) -> Surface:
     place = f"{where}, surface '{name}'"
     if not isinstance(terms, list) or not all(isinstance(term, Mapping) and 'kind' in term for term in terms):
         raise InvalidParameter(f'{place} is {safe_repr(terms)}; a list of terms, each with a `kind`, is needed')
-    made = []
+    made: list[Any] = []
     for term in terms:
         values = dict(term)
         made.append(from_mapping(find(TERMS, str(values.pop('kind')), 'kind of surface term'), values, place))
