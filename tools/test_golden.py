@@ -14,7 +14,14 @@ def test_every_recipe_and_arm_is_in_the_golden_set() -> None:
     assert stored == {*golden.every_recipe(), *golden.ARMS}
 
 
-@pytest.mark.parametrize('source', golden.SOURCES)
+# Public recordings take minutes of computing time in all: they are checked with the benchmarks.
+@pytest.mark.parametrize(
+    'source',
+    [
+        pytest.param(name, marks=pytest.mark.benchmark if source.data_set else ())
+        for name, source in golden.SOURCES.items()
+    ],
+)
 def test_the_recipes_say_what_they_said(source: str) -> None:
     if not golden.available(golden.SOURCES[source]):
         pytest.skip(f'no recorded data in {golden.DATA}; set TEXTURE_DATA to its folder')

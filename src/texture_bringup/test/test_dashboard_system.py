@@ -16,7 +16,6 @@ import warnings
 from contextlib import contextmanager
 
 import aiohttp
-import numpy as np
 import pytest
 
 sync_api = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
@@ -25,8 +24,6 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
-from texture_evaluation.train import train_from_bags
-from texture_simulation.offline import SlidePlan, write_simulated
 
 DOMAIN = 90
 DEADLINE_S = 90.0
@@ -139,17 +136,14 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def address(folder):
+def address(folder, two_surfaces):
     """Return the address of the page of a bench that knows two surfaces."""
-    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
-    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=SURFACES)
-    train_from_bags('default', bags, out=folder / 'model')
     port = free_tcp_port()
     given = {
         'device': folder / 'tsf85',
         'finger_port': free_port(),
         'surface': SURFACES[1],
-        'model': folder / 'model.skops',
+        'model': two_surfaces / 'model.skops',
     }
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
     page = {'dashboard': 'true', 'dashboard_port': port}

@@ -15,9 +15,11 @@ import pytest
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate, is_refused
+from texture_bringup.demo import ATTEMPTS, DemoPlan, ProgressLog, demonstrate, explore_patiently, is_refused
+from texture_bringup.operator import ExplorationResult
+from texture_core.errors import MotionAborted
 from texture_core.ros_testing import killed_on_error
-from texture_core.types import TextureEstimate
+from texture_core.types import ExplorationRequest, RoughnessEstimate, TextureEstimate
 
 pytestmark = pytest.mark.realtime
 
@@ -40,6 +42,22 @@ def started(log: Path) -> list[int]:
 )
 def test_a_refusal_names_the_condition_and_claims_nothing(estimate: TextureEstimate, refused: bool) -> None:
     assert is_refused(estimate) is refused
+
+
+@pytest.mark.parametrize('aborted', range(ATTEMPTS + 1))
+def test_an_aborted_slide_is_made_again_and_that_is_said(aborted: int) -> None:
+    nothing = TextureEstimate(0, '', ''), RoughnessEstimate(0, '')
+    results = [ExplorationResult(False, 'the arm has not answered for 135 ms', 'late', *nothing)] * aborted
+    results.append(ExplorationResult(True, 'the motion ended as asked', 'good', *nothing))
+    said: list[str] = []
+    made = iter(results)
+    if aborted == ATTEMPTS:
+        with pytest.raises(MotionAborted, match='the exploration of felt failed: the arm has not answered'):
+            explore_patiently(lambda _: next(made), ExplorationRequest('linear_slide', surface='felt'), said.append)
+    else:
+        explored = explore_patiently(lambda _: next(made), ExplorationRequest('linear_slide'), said.append)
+        assert explored.exploration_id == 'good'
+        assert said == ['(aborted: the arm has not answered for 135 ms; once more) '] * aborted
 
 
 @pytest.mark.ros

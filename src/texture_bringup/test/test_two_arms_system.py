@@ -43,18 +43,13 @@ PATIENT = {
 }
 
 
-def trained(folder: Path, recipe: str, fingers: int) -> Path:
-    """Return the path of a model of simulated slides."""
-    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0, fingers=fingers)
-    bags = write_simulated(folder / f'{recipe}_bags', plan, np.random.default_rng(0), surfaces=tuple(SURFACES.values()))
-    train_from_bags(recipe, bags, out=folder / recipe)
-    return folder / f'{recipe}.skops'
-
-
 @pytest.fixture
-def arms(tmp_path: Path):
+def arms(tmp_path: Path, two_surfaces: Path):
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': PATIENT}}))
-    models = {'left': trained(tmp_path, 'default', 1), 'right': trained(tmp_path, 'two-fingers', 2)}
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0, fingers=2)
+    bags = write_simulated(tmp_path / 'bags', plan, np.random.default_rng(0), surfaces=tuple(SURFACES.values()))
+    train_from_bags('two-fingers', bags, out=tmp_path / 'pair')
+    models = {'left': two_surfaces / 'model.skops', 'right': tmp_path / 'pair.skops'}
     given: dict[str, Any] = {'robot': 'emulator', 'right_sensor': 'tsf85_pair', 'right_signal_topics': FINGERS}
     given |= {'autostart': False, 'right_recipe': 'two-fingers', 'record_both': True, 'both_bag': tmp_path / 'bag'}
     for arm, surface in SURFACES.items():

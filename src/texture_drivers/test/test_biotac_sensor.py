@@ -130,30 +130,10 @@ def test_a_damaged_word_is_nan_in_its_own_channel_and_finger() -> None:
     assert sensor.counts['damaged_words'] == len(topics['finger1/signal_static'])
 
 
-def test_a_finger_is_chosen_by_its_place() -> None:
-    topics = run(opened(FakeLink(numbered(range(40), reply(fingers=(7, ABSENT, 9)), fingers=3)), finger=2), 40)
-    assert (topics['signal'][-1].samples == 9).all()
-
-
 def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:
     sensor = opened(FakeLink(numbered(range(200), reply(fingers=(7, ABSENT)), fingers=2)), finger=1)
     with pytest.raises(DeviceError, match='no BioTac answers as finger 1'):
         assert not any(run(sensor, 200).values())
-
-
-def test_a_silent_board_is_reported() -> None:
-    with pytest.raises(DeviceError, match='sends no whole frames'):
-        run(opened(FakeLink([])), 200)
-
-
-def test_a_biotac_sp_has_24_electrodes_at_81_hz() -> None:
-    layout = LAYOUTS['biotac_sp']
-    frames = [SpiFrame(1, n, round(n * 54 / 4400 * 1e6), 1, reply(layout, step=1)) for n in range(40)]
-    sensor = opened(FakeLink(frames), layout=layout)
-    topics = run(sensor, 40)
-    assert topics['signal'][-1].samples[:, 0].tolist() == list(range(1, 54, 2))
-    assert len(topics['signal_static'][-1].channels) == 27
-    assert sensor.expected_rates_hz == pytest.approx({'signal': 2200.0, 'signal_static': 4400 / 54})
 
 
 def bridge_frame(sequence: int, time_us: int) -> Frame:

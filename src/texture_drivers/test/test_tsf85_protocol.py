@@ -30,11 +30,7 @@ def test_a_short_stamp_and_a_dynamic_value_are_read() -> None:
 
 def test_a_long_stamp_and_both_fingers_are_read() -> None:
     (packet,) = Tsf85Parser().feed(LONG_STAMP)
-    assert packet.items == (
-        Item(TIMESTAMP, 0, (0x6C1E,)),
-        Item(DYNAMIC, 0, (-2,)),
-        Item(DYNAMIC, 1, (-32768,)),
-    )
+    assert packet.items == (Item(TIMESTAMP, 0, (0x6C1E,)), Item(DYNAMIC, 0, (-2,)), Item(DYNAMIC, 1, (-32768,)))
 
 
 def test_an_image_of_the_second_finger_has_28_big_endian_taxels() -> None:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-import os
+"""The other sensors on the emulator: scene, model, device, line and driver together."""
+
+from __future__ import annotations
+
 import socket
 import threading
 import time
@@ -9,12 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError, UnknownName
-from texture_core.types import FingerState, TactileSignal, lost_samples
+from texture_core.errors import UnknownName
+from texture_core.types import NANOSECONDS, FingerState, TactileSignal, lost_samples
+from texture_drivers.pvdf import Pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import Tsf85
 from texture_simulation.devices.fingers import ByteFaults
-from texture_simulation.emulator import Emulator, EmulatorParams
+from texture_simulation.emulator import LIVE_SENSORS, Emulator, EmulatorParams
+from texture_simulation.path import straight
+from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.realtime
 
@@ -46,7 +52,8 @@ class Arm:
 
 @pytest.fixture
 def emulator(tmp_path: Path) -> Iterator[Emulator]:
-    params = EmulatorParams(surface='ridge_2mm_deep', sensor_link=str(tmp_path / 'tsf85'), finger_port=0)
+    links = {'sensor_link': str(tmp_path / 'tsf85'), 'pvdf_link': str(tmp_path / 'pvdf')}
+    params = EmulatorParams(surface='ridge_2mm_deep', finger_port=0, **links)
     with Emulator(params) as made:
         yield made
 
@@ -79,18 +86,17 @@ def values(batches: list[TactileSignal]) -> np.ndarray:
     return np.concatenate([batch.samples for batch in batches])[:, 0]
 
 
+def peak_hz(samples: np.ndarray, rate_hz: float) -> float:
+    spectrum = np.abs(np.fft.rfft((samples - samples.mean()) * np.hanning(len(samples))))
+    return float(np.fft.rfftfreq(len(samples), 1 / rate_hz)[spectrum.argmax()])
+
+
 def test_the_driver_senses_the_ridges_at_speed_over_pitch(sensor: Tsf85, arm: Arm) -> None:
     read(sensor, 500)
     batches = read(sensor, 2000)
-    signal = values(batches)[:2000]
-    spectrum = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal))))
-    assert np.fft.rfftfreq(len(signal), 1e-3)[spectrum.argmax()] == pytest.approx(50.0, abs=1.0)
+    assert peak_hz(values(batches)[:2000], 1000.0) == pytest.approx(50.0, abs=1.0)
     assert lost_samples(batches) == 0
     assert sensor.counts['bogus'] == 0
-
-
-def test_nothing_is_measured_while_no_arm_reports(sensor: Tsf85) -> None:
-    assert values(read(sensor, 300)).std() < 50
 
 
 def test_the_sample_can_be_swapped_while_the_finger_slides(emulator: Emulator, sensor: Tsf85, arm: Arm) -> None:
@@ -101,23 +107,6 @@ def test_the_sample_can_be_swapped_while_the_finger_slides(emulator: Emulator, s
     with pytest.raises(UnknownName, match="did you mean 'glass'"):
         emulator.set_surface('glas')
     assert emulator.surface == 'glass'
-
-
-def test_replugging_gives_another_device_behind_the_same_link(
-    emulator: Emulator, sensor: Tsf85, tmp_path: Path
-) -> None:
-    before = read(sensor, 200)[-1]
-    emulator.unplug()
-    assert not os.path.lexists(tmp_path / 'tsf85')
-    with pytest.raises(DeviceError):
-        read(sensor, 1000)
-    sensor.close()
-    emulator.replug()
-    sensor.open()
-    after = read(sensor, 200)[0]
-    assert after.first_sample - before.next_sample == sensor.counts['lost'] > 50
-    gap_s = (after.stamp_ns - before.end_ns) / 1e9
-    assert (after.first_sample - before.next_sample) / 1000 == pytest.approx(gap_s, abs=0.02)
 
 
 def test_a_bad_line_costs_samples_and_every_one_is_counted(emulator: Emulator, sensor: Tsf85) -> None:
@@ -152,3 +141,53 @@ def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> No
         sensor.close()
     assert lost_samples(batches) == 0
     assert values(batches).std() > 5
+
+
+FORCE_N = 2.0
+
+
+def test_a_pvdf_finger_beside_it_senses_ridges_and_force(emulator: Emulator, arm: Arm, tmp_path: Path) -> None:
+    sensor = Pvdf(SensorParams(device=str(tmp_path / 'pvdf')))
+    sensor.open()
+    found: dict[str, list[TactileSignal]] = {}
+    deadline_s = time.monotonic() + DEADLINE_S
+    while sum(len(batch.samples) for batch in found.get('signal', [])) < 3 * 4096:
+        assert time.monotonic() < deadline_s
+        for topic, batches in sensor.read().items():
+            found.setdefault(topic, []).extend(batches)
+    sensor.close()
+    assert peak_hz(values(found['signal'])[4096:], 4096.0) == pytest.approx(50.0, abs=1.0)
+    assert values(found['signal_static'])[64:].mean() == pytest.approx(FORCE_N, rel=0.05)
+
+
+def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
+    scene = load_scene('twelve_textures')
+    live = LIVE_SENSORS['daq'](scene, scene.surface('glass'), tmp_path / 'daq', np.random.default_rng(0))
+    live.advance(0)
+    live.advance(10 * NANOSECONDS)
+    assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.75 s, and then 0.25 s of samples
+
+
+def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
+    scene = load_scene('twelve_textures')
+    live = LIVE_SENSORS['biotac'](scene, scene.surface('glass'), tmp_path / 'biotac', np.random.default_rng(0))
+    live.advance(0)
+    live.advance(10 * NANOSECONDS)
+    assert (live.done, live.skipped) == (1000, 975)
+
+
+def test_two_fingers_of_a_board_sense_other_places_of_one_surface_and_its_third_place_nothing(tmp_path: Path) -> None:
+    scene = load_scene('twelve_textures')
+    surface, rng = scene.surface('ridge_2mm_deep'), np.random.default_rng(0)
+    live = LIVE_SENSORS['biotac_hand'](scene, surface, tmp_path / 'biotac', rng)
+    slide = straight((0.0, 0.0, FORCE_N), (0.1, 0.0, FORCE_N), 4400)
+    counts = live.model.advance(slide).astype(float)  # type: ignore[attr-defined]
+    assert counts.shape == (100, 44, 3)
+    assert (counts[..., 2] == 0).all()
+    pac = counts[50:, 1::2].reshape(-1, 3)  # every second slot
+    rough = pac.std(axis=0)
+    assert rough[0] == pytest.approx(rough[1], rel=0.3)
+    assert np.abs(pac[:, 0] - pac[:, 1]).max() > rough[0]
+    live.model.touch.surface = scene.surface('glass')
+    smooth = live.model.advance(slide).astype(float)[50:, 1::2].reshape(-1, 3).std(axis=0)  # type: ignore[attr-defined]
+    assert (smooth[:2] < 0.3 * rough[:2]).all()

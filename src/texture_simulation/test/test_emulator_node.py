@@ -84,13 +84,3 @@ def test_the_plug_and_the_line_are_parameters(bed: Bed) -> None:
     assert bed.set(bed.emulator, bit_flips=0.0).successful
     bed.until(lambda: bed.level == 0)
     assert not bed.set(bed.emulator, bit_flips=2.0).successful
-
-
-def test_deactivating_stops_the_stream_and_activating_brings_it_back(bed: Bed) -> None:
-    bed.until(lambda: len(bed.batches) > 5)
-    bed.sensor.trigger_deactivate()
-    assert not bed.emulator._emulator.device.plugged or bed.sensor._reader is None
-    bed.until(lambda: not bed.emulator._emulator.device.streaming)
-    bed.sensor.trigger_activate()
-    count = len(bed.batches)
-    bed.until(lambda: len(bed.batches) > count + 5)

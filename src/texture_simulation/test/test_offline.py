@@ -1,14 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
+
+from __future__ import annotations
+
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from texture_core.types import NANOSECONDS, Phase, lost_samples
+from texture_core.types import NANOSECONDS, FingerState, Phase, lost_samples
 from texture_drivers import tsf85 as tables
-from texture_simulation.offline import simulate_exploration
-from texture_simulation.scene import load_scene
+from texture_recordings.bags import read_bag
+from texture_recordings.dataset import find_slides
+from texture_simulation.offline import (
+    SlidePlan,
+    record,
+    simulate_exploration,
+    simulate_slide_streams,
+    simulate_slides,
+    write_simulated,
+)
+from texture_simulation.path import FingerTrack, SimulatedSlide
+from texture_simulation.scene import load_scene, scene_from
+from texture_simulation.sensor_models import SENSORS
 
 START_NS = 1_700_000_000 * NANOSECONDS
 SCENE = load_scene('twelve_textures')
@@ -56,3 +71,106 @@ def test_a_circle_meets_the_ridges_at_all_angles() -> None:
     assert states[0].motion == 'circular'
     assert math.isnan(states[0].direction_rad)
     assert np.isfinite(np.concatenate([batch.samples for batch in signals['signal']])).all()
+
+
+def test_each_surface_has_its_slides_without_a_loss(tmp_path: Path) -> None:
+    plan = SlidePlan(slides=2, slide_s=0.5)
+    bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=('leather', 'glass'))
+    assert [(s.surface, s.number) for s in find_slides(bags)] == [
+        ('leather', 1),
+        ('leather', 2),
+        ('glass', 1),
+        ('glass', 2),
+    ]
+    for topic in ('signal', 'signal_static'):
+        assert lost_samples([signal for _, _, signal in read_bag(bags[0], (topic,))]) == 0
+
+
+TABLE = {
+    'surfaces': {'rough': [{'kind': 'self_affine', 'seed': 5}], 'flat': []},
+    'effects': {'noise': {'fast_count': 20.0, 'slow_count': 5.0}, 'slide_error': {}, 'unevenness': {}},
+}
+PAPERS = ('ets_linear', 'ets_circular', 'ets_fine', 'roughness', 'jamali', 'kaboli', 'hu')
+
+
+def table(sensor: str):
+    return scene_from('test', {**TABLE, 'sensor': sensor})
+
+
+@pytest.mark.parametrize('sensor', SENSORS)
+def test_a_recording_and_an_exploration_are_made_with_every_sensor(sensor: str) -> None:
+    scene, rng = table(sensor), np.random.default_rng(0)
+    _, explored = simulate_exploration(scene, 'rough', 0.1, 2.0, 0.5, start_ns=0, exploration_id='one', rng=rng)
+    recorded = record(scene, 'rough', 0.1, 2.0, 0.5, rng=rng)
+    for stream in SENSORS[sensor].streams:
+        for made in (explored, recorded):
+            assert {batch.channels for batch in made[stream.topic]} == {stream.channels}
+            assert {batch.common_unit for batch in made[stream.topic]} == {stream.unit}
+
+
+@pytest.mark.parametrize('sensor', SENSORS)
+def test_a_seed_is_one_set_of_scans_and_a_finger_keeps_its_traits(sensor: str) -> None:
+    def measured(seed: int, finger: int = 0, surface: str = 'rough') -> np.ndarray:
+        sliding = SimulatedSlide(0.1, 2.0, 0.2)
+        return simulate_slide_streams(table(sensor), surface, 2, sliding, np.random.default_rng(seed), finger=finger)
+
+    topics = measured(1)
+    assert all(np.array_equal(topics[topic], measured(1)[topic]) for topic in topics)
+    assert not np.array_equal(measured(1)['signal'], measured(2)['signal'])
+
+
+def test_speed_force_and_direction_may_differ_from_scan_to_scan() -> None:
+    ridges = {'ridges': [{'kind': 'grating', 'pitch_m': 2e-3, 'depth_m': 1e-4}]}
+    scene = scene_from('test', {'surfaces': ridges})
+    speed, angle = np.array([0.1, 0.2, 0.2]), np.array([0.0, 0.0, np.pi / 3])
+    measured = simulate_slides(scene, 'ridges', 3, SimulatedSlide(speed, 2.0, 1.0, angle), np.random.default_rng(0))[
+        ..., 0
+    ]
+    lines = np.abs(np.fft.rfft(measured * np.hanning(1000), axis=1)).argmax(axis=1)
+    assert lines == pytest.approx(speed * np.cos(angle) / 2e-3, abs=1)
+
+
+@pytest.mark.parametrize('name', PAPERS)
+def test_every_surface_of_every_paper_can_be_measured(name: str) -> None:
+    scene = load_scene(name)
+    rng = np.random.default_rng(0)
+    for surface in scene.surfaces:
+        measured = simulate_slides(scene, surface, 1, SimulatedSlide(0.1, 2.0, 0.1), rng)
+        assert np.isfinite(measured).all()
+        assert measured.std() > 0
+
+
+MS = NANOSECONDS // 1000
+
+
+def advance(track: FingerTrack, ms: int):
+    return track.advance(ms * MS, 10, 2000.0)
+
+
+def touching(ms: int, x_m: float = 0.0, vx_m_s: float = 0.0, force_n: float = 2.0) -> FingerState:
+    return FingerState(ms * MS, x_m=x_m, vx_m_s=vx_m_s, force_n=force_n)
+
+
+def test_nothing_is_touched_before_anything_is_reported() -> None:
+    track = FingerTrack()
+    assert not advance(track, 5).force_n.any()
+    assert not track.touching
+
+
+def test_an_arm_silent_for_long_has_stopped_and_still_presses() -> None:
+    track = FingerTrack()
+    track.update(touching(0, 0.0, 0.1))
+    advance(track, 150)
+    moved = advance(track, 250)
+    later = advance(track, 300)
+    assert np.ptp(later.x_m) == 0.0
+    assert later.x_m[0] == moved.x_m[-1]
+    assert later.force_n.tolist() == [2.0] * 10
+
+
+def test_being_put_elsewhere_is_no_slide() -> None:
+    track = FingerTrack()
+    track.update(touching(0))
+    advance(track, 5)
+    track.update(touching(5, x_m=0.2))
+    assert advance(track, 10).x_m.tolist() == [0.2] * 10

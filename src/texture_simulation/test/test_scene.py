@@ -1,25 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
+"""The scenes that the package ships, and what is written about them."""
+
+from __future__ import annotations
+
+import csv
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+from texture_core.config import find_file, shipped
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_simulation.scene import load_scene, scene_from
-
-
-def test_the_bench_has_at_least_ten_surfaces_that_differ() -> None:
-    scene = load_scene('twelve_textures')
-    x_m = np.linspace(0, 0.05, 1000)
-    heights = [surface.height_m(x_m, 0 * x_m, 0 * x_m + 1e-4) for surface in scene.surfaces.values()]
-    assert len(heights) >= 10
-    assert np.corrcoef(heights).shape == np.unique(np.corrcoef(heights), axis=0).shape
-    assert all(np.isfinite(height).all() for height in heights)
-
-
-def test_effects_are_off_unless_named() -> None:
-    effects = scene_from('bare', {'surfaces': {'flat': []}}).effects
-    assert effects == {}
+from texture_simulation.sensor_models import SENSORS
+from texture_simulation.surfaces import KINDS
 
 
 def test_an_unknown_surface_or_scene_gets_the_nearest_name() -> None:
@@ -55,3 +48,34 @@ def test_a_file_that_is_no_yaml_is_refused(tmp_path: Path) -> None:
     path.write_text('surfaces: [')
     with pytest.raises(InvalidParameter, match='no YAML'):
         load_scene(str(path))
+
+
+FILES = sorted(shipped('texture_simulation', 'config/scenes').values())
+SENSOR_OF = {
+    'ets_linear': 'tsf85_3x4', 'ets_circular': 'tsf85_3x4', 'ets_fine': 'tsf85_3x4', 'roughness': 'tsf85',
+    'jamali': 'daq', 'kaboli': 'biotac', 'kaboli_shapes': 'biotac', 'hu': 'pvdf',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
+def test_a_scene_says_what_it_is_and_where_its_sizes_come_from(path: Path) -> None:
+    scene, text = load_scene(str(path)), path.read_text(encoding='utf-8')
+    assert scene.sensor in SENSORS
+    assert scene.sensor == SENSOR_OF.get(path.stem, scene.sensor)
+    assert 'All lengths in metres' in text or 'All values are' in text
+    assert 'guess' in text or 'printed' in text
+    assert ('Experiment:' in text) == (path.stem in SENSOR_OF)
+
+
+def test_all_terms_of_the_library_are_used_by_some_scene() -> None:
+    used = {type(term) for path in FILES for s in load_scene(str(path)).surfaces.values() for term in s.terms}
+    assert used == set(KINDS.values())
+
+
+def test_grades_of_people_lie_apart_one_for_each_texture() -> None:
+    with (find_file('ets_roughness', 'texture_simulation', 'config/grades', 'grades', '.csv')).open(
+        encoding='utf-8'
+    ) as file:
+        rows = list(csv.DictReader(file))
+    assert {row['texture'] for row in rows} == set(load_scene('roughness').surfaces)
+    assert all(1.0 <= float(row['grade']) <= 5.0 for row in rows)

@@ -3,24 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, KeyValue
-from sensor_rig import CASES, Rig, biotac
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.lifecycle import TransitionCallbackReturn
+from sensor_rig import CASES, Rig
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
+from texture_core.errors import InvalidParameter
 from texture_core.ros import SENSOR_QOS, STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import ExplorationState, Phase
 from texture_drivers import health as stream_watch
 from texture_drivers.nodes.sensor import SensorNode
-from texture_simulation.devices.fingers import EmulatedBioTac
+from texture_simulation.devices.fingers import FrameFaults
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -29,26 +32,6 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 def graph() -> Iterator[LocalGraph]:
     with LocalGraph(80) as graph:
         yield graph
-
-
-def test_a_finger_of_a_biotac_board_is_published_and_replugging_survived(graph: LocalGraph, tmp_path: Path) -> None:
-    link = tmp_path / 'biotac'
-    fast, slow = (graph.listen(msg.TactileSignal, topic, SENSOR_QOS) for topic in ('signal', 'signal_static'))
-    reports = graph.listen(DiagnosticArray, '/diagnostics')
-    device = EmulatedBioTac(link, np.random.default_rng(0), ('BT-0', 'BT-1'))
-    with Rig('biotac', link, case=biotac(fingers=2), device=device) as rig:
-        graph.add(SensorNode, sensor='biotac', device=str(link), finger=1, frame_id='tip')
-        graph.until(lambda: len(fast) > 20 and len(slow) > 20)
-        assert (fast[-1].sensor, fast[-1].sampling_rate_hz, fast[-1].header.frame_id) == ('biotac/pac', 2200.0, 'tip')
-        assert set(np.diff(fast[-1].samples) % 4096) == {2.0}
-        assert (slow[-1].channels[:4], len(slow[-1].samples) % 22) == (['tdc', 'tac', 'pdc', 'electrode1'], 0)
-        before = fast[-1].first_sample
-        rig.run_locked(device.unplug)
-        rig.run_locked(device.plug)
-        fast.clear()
-        graph.until(lambda: fast)
-        graph.until(lambda: reports and KeyValue(key='reopened', value='1') in reports[-1].status[0].values)
-        assert fast[-1].first_sample > before
 
 
 def test_the_daq_finger_is_published_in_volts_under_its_names(graph: LocalGraph, tmp_path: Path) -> None:
@@ -135,3 +118,79 @@ def test_a_recording_is_played_as_a_sensor(graph: LocalGraph, tmp_path: Path) ->
     graph.until(lambda: len(signal) > 60)
     assert (signal[-1].sensor, signal[-1].units, signal[-1].channels) == ('file/slide', ['Pa'], ['film'])
     assert all(message.samples[0] == message.first_sample % 500 for message in signal)
+
+
+OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
+
+
+class Ear:
+    """The node, and what it publishes."""
+
+    def __init__(self, graph: LocalGraph, rig: Rig, name: str) -> None:
+        self.node = graph.add(SensorNode, sensor=name, device=str(rig.link), config=rig.case.config, autostart=False)
+        self._batches = graph.listen(msg.TactileSignal, rig.case.topic, SENSOR_QOS)
+        self._reports = graph.listen(DiagnosticArray, '/diagnostics')
+        self._until = graph.until
+
+    def more(self) -> None:
+        self._batches.clear()
+        self._until(lambda: len(self._batches) > 5)
+
+    def level(self, wanted: bytes) -> Any:
+        self._until(lambda: self._reports and self._reports[-1].status[0].level == wanted)
+        return self._reports[-1].status[0]
+
+
+@pytest.fixture
+def make(graph: LocalGraph, tmp_path: Path) -> Iterator[Callable[[str], tuple[Rig, Ear]]]:
+    with ExitStack() as rigs:
+
+        def make(name: str) -> tuple[Rig, Ear]:
+            rig = rigs.enter_context(Rig(name, tmp_path / name))
+            return rig, Ear(graph, rig, name)
+
+        yield make
+
+
+# One of each kind of topics: of a single finger, of several, and beside the signal.
+@pytest.mark.parametrize('name', ['tsf85', 'biotac_hand', 'pvdf', 'anyskin', 'papillarray_pair'])
+def test_a_life_from_configuring_to_cleaning_up(make: Any, name: str) -> None:
+    rig, ear = make(name)
+    turns = 2 if name == 'tsf85' else 1
+    for _ in range(turns):
+        assert ear.node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        for _ in range(turns):
+            assert ear.node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+            ear.more()
+            assert ear.node.trigger_deactivate() == TransitionCallbackReturn.SUCCESS
+            rig.another().open()  # inactive, it lets go of the device
+        assert ear.node.trigger_cleanup() == TransitionCallbackReturn.SUCCESS
+    assert ear.node.trigger_shutdown() == TransitionCallbackReturn.SUCCESS
+
+
+def test_the_level_falls_with_each_fault_and_rises_again(make: Any) -> None:
+    rig, ear = make('daq')
+    ear.level(WARN)  # not active yet
+    ear.node.trigger_configure()
+    ear.node.trigger_activate()
+    ear.level(OK)
+    rig.set(frame_faults=FrameFaults(skip=0.02))
+    assert 'samples lost' in ear.level(WARN).message
+    rig.set(frame_faults=FrameFaults())
+    ear.level(OK)
+    rig.run_locked(rig.device.unplug)
+    assert str(rig.link) in ear.level(ERROR).message
+    rig.run_locked(rig.device.plug)
+    ear.level(OK)
+    rig.set(silent=True)
+    ear.level(ERROR)
+    rig.set(silent=False)
+    values = {value.key: value.value for value in ear.level(OK).values}
+    assert int(values['reopened']) >= 1
+    assert abs(float(values['device clock slow by [ppm]'])) < 5000
+
+
+def test_parameters_that_the_sensor_refuses_end_the_node_with_a_sentence(graph: LocalGraph) -> None:
+    for given, sentence in (({'finger': 2}, 'a TSF-85 has the fingers'), ({'config': '{im: true}'}, "mean 'imu'")):
+        with pytest.raises(InvalidParameter, match=sentence):
+            graph.add(SensorNode, **given)

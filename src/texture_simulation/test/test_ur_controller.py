@@ -3,20 +3,32 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 
 from texture_simulation.devices.ur import (
+    BANNER,
     DONE,
     READY,
+    ContactPlane,
     DashboardSession,
     EmulatedController,
+    EmulatedRobot,
+    ForceMode,
+    InputClaims,
+    LinearMove,
+    RtdeMessage,
+    RtdeSession,
     SafetyMode,
     ScriptCommand,
+    ScriptSession,
+    ServoMove,
+    SpeedMove,
+    StopMove,
     UrControllerParams,
 )
-
-pytestmark = pytest.mark.realtime
 
 SCRIPT = 'def rtde_control():\nend\n'
 
@@ -192,3 +204,241 @@ def test_a_program_of_somebody_else_takes_no_commands_and_can_be_paused(controll
     assert [ask('running'), ask('programState')] == ['Program running: false', 'PAUSED other.urp']
     ask('stop')
     assert ask('programState') == 'STOPPED other.urp'
+
+
+STEP_S = 0.002
+ORIGIN = np.array([0.4, 0.0, 0.1])
+REST = np.zeros(3)
+
+
+def robot_over(**values):
+    return EmulatedRobot(
+        UrControllerParams(**{'force_noise_n': 0.0, 'force_offset_n': 0.0, **values}), np.random.default_rng(0)
+    )
+
+
+def go(robot, seconds):
+    for _ in range(round(seconds / STEP_S)):
+        robot.step(STEP_S)
+
+
+def pressing(newtons):
+    return ForceMode(
+        axes=np.eye(3),
+        selection=np.array([0, 0, 1, 0, 0, 0]),
+        wrench=np.array([0, 0, -newtons, 0, 0, 0.0]),
+        limits=np.array([0.1, 0.1, 0.05, 0.3, 0.3, 0.3]),
+    )
+
+
+def place(*in_surface):
+    return ORIGIN + np.array(in_surface)
+
+
+def vector(*values):
+    return np.array([*values, *[0.0] * (6 - len(values))])
+
+
+def test_the_force_is_stiffness_times_depth():
+    surface = ContactPlane(UrControllerParams(stiffness_n_m=3000.0))
+    assert surface.force_n(place(0, 0, -0.001), REST) == pytest.approx([0, 0, 3.0])
+    assert surface.force_n(place(0, 0, 1e-9), REST) == pytest.approx([0, 0, 0])
+
+
+def test_friction_acts_against_the_movement_with_its_share_of_the_force():
+    surface = ContactPlane(UrControllerParams(friction=0.4))
+    force = surface.force_n(place(0, 0, -0.001), np.array([0.03, 0.04, 0.0]))
+    assert force == pytest.approx([-0.4 * 2.0 * 0.6, -0.4 * 2.0 * 0.8, 2.0])
+
+
+def test_a_slope_pushes_along_its_normal():
+    surface = ContactPlane(UrControllerParams(slope_x=1.0))
+    force = surface.force_n(place(0.01, 0.05, 0.009), REST)  # 1 mm below a plane of 45°
+    assert force == pytest.approx(2000.0 * 0.001 / np.sqrt(2) * np.array([-1, 0, 1]) / np.sqrt(2))
+
+
+def test_a_line_takes_the_time_of_its_trapezoid_and_ends_on_the_goal():
+    robot = robot_over()
+    goal = robot.pose + vector(0.03, 0.04)
+    robot.motion = LinearMove(goal, 0.1, 1.0)
+    steps = 0
+    while not robot.motion.done:
+        robot.step(STEP_S)
+        steps += 1
+    assert steps * STEP_S == pytest.approx(0.05 / 0.1 + 0.1 / 1.0, abs=0.01)
+    assert robot.pose == pytest.approx(goal)
+    robot.step(STEP_S)
+    assert not robot.velocity.any()
+
+
+def test_a_speed_is_gained_and_lost_with_the_acceleration():
+    robot = robot_over()
+    robot.motion = SpeedMove(vector(0.1), 0.5)
+    go(robot, 0.1)
+    assert robot.velocity == pytest.approx(vector(0.05))
+    go(robot, 0.2)
+    assert robot.velocity == pytest.approx(vector(0.1))
+    robot.motion = StopMove(1.0)
+    go(robot, 0.05)
+    assert robot.velocity == pytest.approx(vector(0.05))
+    go(robot, 0.06)
+    assert robot.motion.done
+    assert not robot.velocity.any()
+
+
+def test_a_servo_has_gone_63_percent_of_a_jump_after_its_look_ahead_time():
+    robot = robot_over()
+    start = robot.pose
+    robot.motion = ServoMove(start + vector(0.01), 0.1)
+    go(robot, 0.1)
+    assert robot.pose[0] - start[0] == pytest.approx(0.01 * (1 - np.exp(-1)))
+
+
+@pytest.mark.parametrize('stiffness', [500.0, 2000.0, 10000.0])
+def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
+    robot = robot_over(stiffness_n_m=stiffness, start_height_m=0.002)
+    robot.force_mode = pressing(2.0)
+    go(robot, 2.0)
+    assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
+
+
+def test_force_control_acts_along_the_axes_of_its_frame():
+    robot = robot_over(start_height_m=0.001)
+    mode = pressing(-2.0)
+    robot.force_mode = ForceMode(np.diag([1.0, -1.0, -1.0]), mode.selection, mode.wrench, mode.limits)
+    go(robot, 2.0)
+    assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
+
+
+def test_force_control_follows_a_slope_while_the_finger_slides():
+    robot = robot_over(slope_x=0.1, start_height_m=0.0)
+    robot.force_mode = pressing(2.0)
+    robot.motion = SpeedMove(vector(0.02), 1.0)
+    go(robot, 3.0)
+    assert robot.velocity[0] == pytest.approx(0.02)
+    assert robot.velocity[2] == pytest.approx(0.1 * 0.02, rel=0.05)
+    # A force loop with admittance a lags by v/a behind a surface that rises with v.
+    assert robot.force[2] == pytest.approx(2.0 + 0.1 * 0.02 / 0.01, rel=0.05)
+
+
+def test_a_contact_is_measured_against_its_direction_only():
+    robot = robot_over(start_height_m=0.0)
+    robot.motion = SpeedMove(vector(0, 0, -0.1), 100.0)
+    go(robot, 0.05)
+    down, up, any_direction = np.array([0, 0, -1.0]), np.array([0, 0, 1.0]), np.zeros(3)
+    assert [robot.touches(direction, 3.0) for direction in (down, up, any_direction)] == [True, False, True]
+
+
+@pytest.fixture
+def served():
+    return EmulatedController(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
+
+
+@pytest.fixture
+def session(served):
+    return RtdeSession(served, InputClaims())
+
+
+def message(kind, payload=b''):
+    return struct.pack('>HB', 3 + len(payload), kind) + payload
+
+
+def outputs(names, frequency_hz=500.0):
+    return message(RtdeMessage.SETUP_OUTPUTS, struct.pack('>d', frequency_hz) + names.encode())
+
+
+def test_the_protocol_version_is_accepted_and_another_one_refused(session):
+    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\2')) == message(RtdeMessage.REQUEST_VERSION, b'\1')
+    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\1')) == message(RtdeMessage.REQUEST_VERSION, b'\0')
+
+
+def test_an_unknown_variable_is_not_found(session):
+    answer = session.receive(outputs('timestamp,nonsense,safety_mode,'))
+    assert answer[4:] == b'DOUBLE,NOT_FOUND,INT32'
+
+
+def test_data_come_once_started_and_say_what_was_asked(session, served):
+    session.receive(outputs('actual_TCP_pose,runtime_state,'))
+    assert session.package() == b''
+    session.receive(message(RtdeMessage.START))
+    served.tick()
+    size, kind, recipe, *pose, runtime = struct.unpack('>HBB6dI', session.package())
+    assert (size, kind, recipe, runtime) == (56, RtdeMessage.DATA, 1, 1)
+    assert pose == pytest.approx([0.4, 0.0, 0.11, 0.0, 0.0, 0.0])
+
+
+def test_data_come_at_the_wanted_rate(session, served):
+    session.receive(outputs('timestamp', 125.0) + message(RtdeMessage.START))
+    packages = 0
+    for _ in range(500):
+        served.tick()
+        packages += session.package() != b''
+    assert packages == pytest.approx(125, abs=1)
+
+
+def test_an_input_belongs_to_one_client_until_it_leaves(served):
+    claims = InputClaims()
+    first, second = RtdeSession(served, claims), RtdeSession(served, claims)
+    setup = message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3,')
+    assert first.receive(setup)[4:] == b'INT32,DOUBLE'
+    assert b'IN_USE' in second.receive(setup)
+    first.close()
+    assert second.receive(setup)[4:] == b'INT32,DOUBLE'
+
+
+def test_data_go_to_the_registers_of_their_recipe(session, served):
+    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_1'))
+    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3'))
+    session.receive(message(RtdeMessage.DATA, struct.pack('>Bid', 2, 10, 0.5)))
+    assert (served.registers.int_in[0], served.registers.double_in[3]) == (10, 0.5)
+
+
+@pytest.mark.parametrize('payload', [b'', b'\0', b'\7abc', b'\1', b'\1' + bytes(50)])
+def test_data_of_no_recipe_or_another_length_change_nothing(session, served, payload):
+    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_1'))
+    served.registers.int_in[1] = 7
+    session.receive(message(RtdeMessage.DATA, payload))
+    assert served.registers.int_in[1] == 7
+
+
+def test_messages_may_come_in_pieces(session):
+    request = message(RtdeMessage.REQUEST_VERSION, b'\0\2') * 2
+    answers = b''.join(session.receive(request[place : place + 1]) for place in range(len(request)))
+    assert answers == message(RtdeMessage.REQUEST_VERSION, b'\1') * 2
+
+
+def test_the_dashboard_answers_line_by_line(served):
+    offline, silent = [], []
+    dashboard = DashboardSession(served, offline.append, silent.append)
+    assert dashboard.greeting() == BANNER
+    assert dashboard.receive(b'PolyscopeVersion\nget serial') == b'URSoftware 5.12.0.0 (emulated)\n'
+    assert dashboard.receive(b' number\n').strip().isdigit()
+    assert dashboard.receive(b'make coffee\n') == b'could not understand: make coffee\n'
+    assert dashboard.receive(b'emulate protective stop\nsafetymode\n').endswith(b'Safetymode: PROTECTIVE_STOP\n')
+    assert dashboard.receive(b'unlock protective stop\n').startswith(b'Cannot unlock')
+    assert dashboard.receive(b'emulate offline soon\n').startswith(b"came 'soon'")
+    dashboard.receive(b'emulate offline 1.5\n')
+    assert offline == [1.5]
+    dashboard.receive(b'emulate silence 0.5\n')
+    assert silent == [0.5]
+    assert dashboard.receive(b'emulate drop deep\n') == b"came 'deep'; a number of metres is needed\n"
+
+
+def test_a_surface_that_drops_is_not_touched_any_more_until_it_is_back(served):
+    dashboard = DashboardSession(served, lambda _seconds: None, lambda _seconds: None)
+    plane = served.robot.surface
+    pressed = plane.origin - (0.0, 0.0, 0.001)
+    forces = []
+    for drop in (b'0', b'0.012', b'0'):
+        dashboard.receive(b'emulate drop ' + drop + b'\n')
+        forces.append(float(plane.force_n(pressed, np.zeros(3))[2]))
+    assert forces == [pytest.approx(2.0), 0.0, pytest.approx(2.0)]
+
+
+def test_a_script_starts_when_its_last_line_is_there(served):
+    script = ScriptSession(served)
+    script.receive(b'def rtde_control():\n  if True:\n')
+    script.receive(b'  end\nend\n')
+    for _ in range(50):
+        served.tick()
+    assert served.playing
