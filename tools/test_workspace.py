@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The set-up of the workspace, as far as it decides something."""
 
+import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -41,6 +43,19 @@ def test_the_python_of_an_environment_is_kept_whatever_runs_the_set_up(
     assert workspace.choose_interpreter(workspace.own_interpreter()) == (str(other), (3, 12))
     other.unlink()
     assert workspace.choose_interpreter(workspace.own_interpreter()) == (sys.executable, sys.version_info[:2])
+
+
+def test_only_a_make_that_is_given_a_python_asks_for_another_environment() -> None:
+    environment = {name: value for name, value in os.environ.items() if name not in ('PYTHON', 'MAKEFLAGS')}
+
+    def set_up(*arguments: str) -> str:
+        command = ['make', '--no-print-directory', '-n', *arguments]
+        said = subprocess.run(command, cwd=workspace.ROOT, env=environment, capture_output=True, text=True, check=True)
+        return said.stdout.split('\n')[0].strip()
+
+    assert set_up('setup', 'PYTHON=python3.12') == 'python3.12 tools/workspace.py --python'
+    # Whatever python3 is: the environment of before has the last word (the test above).
+    assert set_up('demo') == set_up('test-pure') == set_up('setup') == 'python3 tools/workspace.py'
 
 
 def test_a_second_set_up_does_nothing_and_another_python_makes_the_environment_anew(

@@ -63,7 +63,10 @@ def rub(arm):
             forces.append({name: tip.force_n for name, tip in arm.hand.state().fingers.items()})
 
     explorer = Explorer(
-        arm, TouchParams(speed_tolerance=0.3, force_tolerance=0.2), SafetyLimits(state_timeout_s=1.0), note
+        arm,
+        TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_share=5.0),  # the machine may be busy
+        SafetyLimits(state_timeout_s=1.0),
+        note,
     )
     explorer.connect()
     request = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, duration_s=1.5)

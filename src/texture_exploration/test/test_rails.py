@@ -85,7 +85,7 @@ def test_something_in_the_way_is_a_fault(rails, arm):
 
 def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):
     states = []
-    explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=1.0), states.append)
+    explorer = Explorer(arm, TouchParams(peak_speed_share=2.0), SafetyLimits(state_timeout_s=1.0), states.append)
     explorer.connect()
     request = ExplorationRequest('linear_slide', speed_m_s=0.0255, force_n=1.5, distance_m=0.02)
     exploration = explorer.begin('one', request)

@@ -190,7 +190,7 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, 
     phases = []
     explorer = Explorer(
         UrArm(UrArmParams(ip=emulator.ip)),
-        TouchParams(),
+        TouchParams(peak_speed_share=2.0),
         SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
     )

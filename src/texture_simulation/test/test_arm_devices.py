@@ -63,13 +63,6 @@ def test_the_end_switches_stop_a_rail_and_let_it_back():
     assert state(firmware)[4] & 0b1111 == 0
 
 
-def test_the_encoders_count_the_way():
-    firmware = RailsFirmware(RailsMachine(acceleration_m_s2=1e6))
-    advance(firmware, 1.0, move(0.0255, -0.01, MOVING, 1000))
-    x, y, z, *_ = state(firmware)
-    assert (x, y, z) == pytest.approx((0.0255 * 200_000, -0.01 * 200_000, 1000), abs=2)
-
-
 def test_an_overload_lifts_the_finger_whatever_is_ordered_until_cleared():
     firmware = RailsFirmware(RailsMachine())
     firmware.surface_m = 0.02
@@ -107,14 +100,6 @@ def test_a_velocity_comes_into_effect_after_the_lag_and_ends_after_the_timeout()
     assert not arm.velocity.any()
 
 
-def test_without_a_timeout_the_last_velocity_holds_for_ever() -> None:
-    arm = EmulatedTwistArm(replace(QUIET, command_timeout_s=0.0), 0)
-    arm.command(0, ALONG)
-    for second in range(1, 60):
-        arm.advance(second * 100 * MS)
-    assert arm.velocity == pytest.approx(ALONG)
-
-
 def test_speed_and_acceleration_stay_within_their_limits() -> None:
     arm = EmulatedTwistArm(replace(QUIET, max_speed_m_s=0.05, max_acceleration_m_s2=1.0), 0)
     arm.command(0, ALONG)
@@ -131,10 +116,3 @@ def test_the_sensor_shows_force_weight_and_offset_in_the_frame_of_the_tool() -> 
     weight_n = QUIET.tool_mass_kg * GRAVITY_M_S2
     # The tool looks down: what pushes it up pushes against its z axis.
     assert arm.reading_n()[2] == pytest.approx(-(2.0 - weight_n) + QUIET.force_offset_n)
-
-
-def test_a_controller_that_is_not_active_moves_nothing() -> None:
-    arm = EmulatedTwistArm(replace(QUIET, active=False), 0)
-    arm.command(0, ALONG)
-    arm.advance(90 * MS)
-    assert not arm.velocity.any()

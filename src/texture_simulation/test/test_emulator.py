@@ -168,14 +168,6 @@ def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
     assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.75 s, and then 0.25 s of samples
 
 
-def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
-    scene = load_scene('twelve_textures')
-    live = LIVE_SENSORS['biotac'](scene, scene.surface('glass'), tmp_path / 'biotac', np.random.default_rng(0))
-    live.advance(0)
-    live.advance(10 * NANOSECONDS)
-    assert (live.done, live.skipped) == (1000, 975)
-
-
 def test_two_fingers_of_a_board_sense_other_places_of_one_surface_and_its_third_place_nothing(tmp_path: Path) -> None:
     scene = load_scene('twelve_textures')
     surface, rng = scene.surface('ridge_2mm_deep'), np.random.default_rng(0)

@@ -97,15 +97,6 @@ def test_a_rate_that_nobody_set_is_measured_and_kept(make_anyskin: Make) -> None
     assert again.sampling_rate_hz == first.sampling_rate_hz == rig.sensor.expected_rates_hz['signal']
 
 
-def test_the_axes_keep_their_order_and_names(make_anyskin: Make) -> None:
-    def feed(device: Any, first: int, ticks: int) -> None:
-        device.sample(np.tile(np.arange(15.0), (ticks, 1)))
-
-    batch = make_anyskin(feed=feed).signal_s(0.2)[-1]
-    assert batch.channels[:4] == ('m0_x', 'm0_y', 'm0_z', 'm1_x')
-    np.testing.assert_array_equal(batch.samples[0], np.arange(15.0))
-
-
 def test_the_temperature_is_published_if_wanted(make_anyskin: Make) -> None:
     assert 'temperature' not in make_anyskin(config='{rate_hz: 250.0}').read_s(0.2)
     temperature = make_anyskin().read_s(0.2)['temperature'][-1]
@@ -192,14 +183,6 @@ def test_the_channels_keep_their_order(make_sampler: Make) -> None:
     np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
 
 
-def test_sequence_and_clock_wrap_without_a_trace(make_sampler: Make) -> None:
-    rig = make_sampler(start_us=2**32 - 1_000_000)
-    rig.device._frames['daq'] = 65_536 - 200
-    batches = rig.signal_s(1.5)
-    assert len(set(rig.offsets(batches))) == 1
-    assert rig.sensor.counts['lost'] == rig.sensor.counts['device restarts'] == 0
-
-
 def test_a_silent_device_and_a_babbling_one_are_reported_apart(make_sampler: Make) -> None:
     rig = make_sampler()
     rig.set(silent=True)
@@ -208,10 +191,6 @@ def test_a_silent_device_and_a_babbling_one_are_reported_apart(make_sampler: Mak
     rig.sensor.open()
     assert 'no valid frame' in (babble := rig.fault())
     assert 'baud' in babble
-
-
-def test_settings_that_name_other_channels_are_refused_in_one_sentence(make_sampler: Make) -> None:
-    assert 'sends 8 channels, and 2 are named' in make_sampler(config='{channels: [{name: a}, {name: b}]}').fault()
 
 
 def swing(device: Any, first: int, ticks: int) -> None:

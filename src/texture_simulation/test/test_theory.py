@@ -144,10 +144,6 @@ def test_a_square_ridge_measured_sharply_is_as_high_and_as_wide_as_asked() -> No
     assert (measured > measured.mean()).mean() == pytest.approx(0.3, abs=0.02)
 
 
-def test_sliding_along_the_ridges_meets_none() -> None:
-    assert np.ptp(height(Grating(2e-3, 1e-4, angle_rad=np.pi / 2))) < 1e-12
-
-
 def test_waves_that_do_not_fit_a_tile_are_refused() -> None:
     with pytest.raises(InvalidParameter, match='at most 32 times'):
         SelfAffine(longest_m=0.05, shortest_m=1e-4)

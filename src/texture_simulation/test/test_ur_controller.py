@@ -24,9 +24,7 @@ from texture_simulation.devices.ur import (
     SafetyMode,
     ScriptCommand,
     ScriptSession,
-    ServoMove,
     SpeedMove,
-    StopMove,
     UrControllerParams,
 )
 
@@ -60,36 +58,6 @@ def state(controller):
 
 def speed_l(controller, *velocity):
     send(controller, ScriptCommand.SPEED_L, [*velocity, 0.0, 0.0, 0.0, 1.0, 0.0])
-
-
-def test_a_program_starts_shortly_after_its_upload():
-    controller = EmulatedController(UrControllerParams(), np.random.default_rng(0))
-    controller.upload(SCRIPT)
-    controller.tick()
-    assert not controller.playing
-    run(controller, 0.1)
-    assert controller.playing
-    assert state(controller) == READY
-
-
-def test_a_command_is_done_once_and_then_waits_for_0(controller):
-    x = controller.robot.pose[0]
-    send(controller, ScriptCommand.MOVE_L, [x + 0.01, *controller.robot.pose[1:], 0.1, 1.0], [0])
-    controller.tick()
-    assert state(controller) == READY
-    run(controller, 1.0)
-    assert state(controller) == DONE
-    assert controller.robot.pose[0] == pytest.approx(x + 0.01)
-    send(controller, ScriptCommand.NONE)
-    controller.tick()
-    assert state(controller) == READY
-
-
-def test_realtime_commands_leave_the_script_ready(controller):
-    speed_l(controller, 0.05, 0.0, 0.0)
-    run(controller, 0.2)
-    assert state(controller) == READY
-    assert controller.robot.velocity[0] == pytest.approx(0.05)
 
 
 def test_a_command_that_is_overwritten_within_a_cycle_is_lost(controller):
@@ -130,15 +98,6 @@ def test_a_controller_that_is_held_up_again_and_again_excuses_a_silent_client_fo
     assert controller.time_s > begin_s + 0.18
 
 
-def test_a_stop_of_the_script_stops_the_arm(controller):
-    speed_l(controller, 0.05, 0.0, 0.0)
-    run(controller, 0.1)
-    send(controller, ScriptCommand.STOP_SCRIPT)
-    run(controller, 0.1)
-    assert not controller.playing
-    assert not controller.robot.velocity.any()
-
-
 def test_a_protective_stop_cannot_be_unlocked_before_its_time(controller):
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 0.1)
@@ -166,17 +125,6 @@ def test_a_stop_is_acknowledged_late_if_it_is_reported_so_but_done_at_once(contr
     assert state(controller) == READY
     run(controller, 0.1)
     assert state(controller) == DONE
-
-
-def test_a_late_acknowledgement_trips_a_watchdog_that_does_not_wait_for_it(controller):
-    controller.acknowledge_s = 0.15
-    send(controller, ScriptCommand.SET_WATCHDOG, [10.0])
-    run(controller, 0.01)
-    send(controller, ScriptCommand.NONE)
-    run(controller, 0.01)
-    send(controller, ScriptCommand.ZERO_FT_SENSOR)
-    run(controller, 0.2)
-    assert not controller.playing
 
 
 def test_zeroing_under_load_hides_the_true_force(controller):
@@ -271,41 +219,10 @@ def test_a_line_takes_the_time_of_its_trapezoid_and_ends_on_the_goal():
     assert not robot.velocity.any()
 
 
-def test_a_speed_is_gained_and_lost_with_the_acceleration():
-    robot = robot_over()
-    robot.motion = SpeedMove(vector(0.1), 0.5)
-    go(robot, 0.1)
-    assert robot.velocity == pytest.approx(vector(0.05))
-    go(robot, 0.2)
-    assert robot.velocity == pytest.approx(vector(0.1))
-    robot.motion = StopMove(1.0)
-    go(robot, 0.05)
-    assert robot.velocity == pytest.approx(vector(0.05))
-    go(robot, 0.06)
-    assert robot.motion.done
-    assert not robot.velocity.any()
-
-
-def test_a_servo_has_gone_63_percent_of_a_jump_after_its_look_ahead_time():
-    robot = robot_over()
-    start = robot.pose
-    robot.motion = ServoMove(start + vector(0.01), 0.1)
-    go(robot, 0.1)
-    assert robot.pose[0] - start[0] == pytest.approx(0.01 * (1 - np.exp(-1)))
-
-
 @pytest.mark.parametrize('stiffness', [500.0, 2000.0, 10000.0])
 def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
     robot = robot_over(stiffness_n_m=stiffness, start_height_m=0.002)
     robot.force_mode = pressing(2.0)
-    go(robot, 2.0)
-    assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
-
-
-def test_force_control_acts_along_the_axes_of_its_frame():
-    robot = robot_over(start_height_m=0.001)
-    mode = pressing(-2.0)
-    robot.force_mode = ForceMode(np.diag([1.0, -1.0, -1.0]), mode.selection, mode.wrench, mode.limits)
     go(robot, 2.0)
     assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
 
@@ -319,14 +236,6 @@ def test_force_control_follows_a_slope_while_the_finger_slides():
     assert robot.velocity[2] == pytest.approx(0.1 * 0.02, rel=0.05)
     # A force loop with admittance a lags by v/a behind a surface that rises with v.
     assert robot.force[2] == pytest.approx(2.0 + 0.1 * 0.02 / 0.01, rel=0.05)
-
-
-def test_a_contact_is_measured_against_its_direction_only():
-    robot = robot_over(start_height_m=0.0)
-    robot.motion = SpeedMove(vector(0, 0, -0.1), 100.0)
-    go(robot, 0.05)
-    down, up, any_direction = np.array([0, 0, -1.0]), np.array([0, 0, 1.0]), np.zeros(3)
-    assert [robot.touches(direction, 3.0) for direction in (down, up, any_direction)] == [True, False, True]
 
 
 @pytest.fixture
@@ -347,24 +256,9 @@ def outputs(names, frequency_hz=500.0):
     return message(RtdeMessage.SETUP_OUTPUTS, struct.pack('>d', frequency_hz) + names.encode())
 
 
-def test_the_protocol_version_is_accepted_and_another_one_refused(session):
-    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\2')) == message(RtdeMessage.REQUEST_VERSION, b'\1')
-    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\1')) == message(RtdeMessage.REQUEST_VERSION, b'\0')
-
-
 def test_an_unknown_variable_is_not_found(session):
     answer = session.receive(outputs('timestamp,nonsense,safety_mode,'))
     assert answer[4:] == b'DOUBLE,NOT_FOUND,INT32'
-
-
-def test_data_come_once_started_and_say_what_was_asked(session, served):
-    session.receive(outputs('actual_TCP_pose,runtime_state,'))
-    assert session.package() == b''
-    session.receive(message(RtdeMessage.START))
-    served.tick()
-    size, kind, recipe, *pose, runtime = struct.unpack('>HBB6dI', session.package())
-    assert (size, kind, recipe, runtime) == (56, RtdeMessage.DATA, 1, 1)
-    assert pose == pytest.approx([0.4, 0.0, 0.11, 0.0, 0.0, 0.0])
 
 
 def test_data_come_at_the_wanted_rate(session, served):
@@ -384,13 +278,6 @@ def test_an_input_belongs_to_one_client_until_it_leaves(served):
     assert b'IN_USE' in second.receive(setup)
     first.close()
     assert second.receive(setup)[4:] == b'INT32,DOUBLE'
-
-
-def test_data_go_to_the_registers_of_their_recipe(session, served):
-    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_1'))
-    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3'))
-    session.receive(message(RtdeMessage.DATA, struct.pack('>Bid', 2, 10, 0.5)))
-    assert (served.registers.int_in[0], served.registers.double_in[3]) == (10, 0.5)
 
 
 @pytest.mark.parametrize('payload', [b'', b'\0', b'\7abc', b'\1', b'\1' + bytes(50)])

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sensor on a pseudo-terminal fed with packets made by hand."""
 
+from __future__ import annotations
+
+import csv
 import fcntl
 import os
 import struct
@@ -9,14 +12,30 @@ import time
 import tty
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace as Message
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from texture_core.errors import DeviceError
+from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import NANOSECONDS, TactileSignal
 from texture_drivers.sensor import SensorParams
-from texture_drivers.tsf85 import Tsf85
+from texture_drivers.tsf85 import (
+    AUTOSEND,
+    DYNAMIC,
+    STATIC,
+    TIMESTAMP,
+    Item,
+    Packet,
+    Tsf85,
+    Tsf85MessageConverter,
+    Tsf85Parser,
+    load_vendor_csv,
+    start_command,
+    stop_command,
+)
 
 DEADLINE_S = 10.0
 
@@ -261,3 +280,226 @@ def test_bytes_that_are_no_packets_are_reported_from_silence(wire: Wire, clock: 
             os.write(wire.device, bytes.fromhex('9A 00 58 03 80 0102'))
             sensor.read()
     sensor.close()
+
+
+# Written by hand from the protocol: autosend, 8 bytes of payload: stamp 0x6C1E ms, finger 0: 258, ...
+SHORT_STAMP = bytes.fromhex('9A 00 58 06 70 6C1E 20 0102')
+LONG_STAMP = bytes.fromhex('9A 00 58 0F 70 0000000000006C1E 20 FFFE 24 8000')
+IMAGE = bytes.fromhex('9A 00 58 39 14') + bytes(range(56))
+INERTIAL = bytes.fromhex('9A 7F 61 07 30 0001 FFFF 4000')
+
+
+def test_a_short_stamp_and_a_dynamic_value_are_read() -> None:
+    assert Tsf85Parser().feed(SHORT_STAMP) == [
+        Packet(AUTOSEND, (Item(TIMESTAMP, 0, (0x6C1E,)), Item(DYNAMIC, 0, (258,))))
+    ]
+
+
+def test_a_long_stamp_and_both_fingers_are_read() -> None:
+    (packet,) = Tsf85Parser().feed(LONG_STAMP)
+    assert packet.items == (Item(TIMESTAMP, 0, (0x6C1E,)), Item(DYNAMIC, 0, (-2,)), Item(DYNAMIC, 1, (-32768,)))
+
+
+def test_an_image_of_the_second_finger_has_28_big_endian_taxels() -> None:
+    (packet,) = Tsf85Parser().feed(IMAGE)
+    (item,) = packet.items
+    assert (item.kind, item.finger) == (STATIC, 1)
+    assert item.values[:2] == (0x0001, 0x0203)
+    assert len(item.values) == 28
+
+
+def test_a_packet_comes_out_with_its_last_byte_wherever_the_stream_is_cut() -> None:
+    stream = SHORT_STAMP + LONG_STAMP + IMAGE + INERTIAL
+    parser = Tsf85Parser()
+    came = [len(parser.feed(stream[i : i + 1])) for i in range(len(stream))]
+    assert sum(came) == 4
+    assert came[len(SHORT_STAMP) - 1] == 1
+    assert parser.refused_bytes == 0
+
+
+@pytest.mark.parametrize(
+    ('reason', 'packet'),
+    [
+        ("one finger's dynamic value twice, the other's with a flipped bit", '9A 00 58 06 20 0102 20 0304'),
+        ('no data command', '9A 00 E3 03 20 0102'),
+        ('unknown type 0x80', '9A 00 58 03 80 0102'),
+        ('index bits', '9A 00 58 03 21 0102'),
+        ('third finger', '9A 00 58 03 28 0102'),
+        ('items too short for the payload', '9A 00 58 04 20 0102 00'),
+        ('items too long for the payload', '9A 00 58 02 20 01'),
+        ('no item', '9A 00 58 00'),
+    ],
+)
+def test_a_packet_is_refused_for(reason: str, packet: str) -> None:
+    parser = Tsf85Parser()
+    assert parser.feed(bytes.fromhex(packet) + SHORT_STAMP) == Tsf85Parser().feed(SHORT_STAMP), reason
+    assert parser.refused >= 1
+    assert parser.refused_bytes == len(bytes.fromhex(packet))
+
+
+def test_a_packet_that_lost_a_byte_is_refused_even_if_the_stream_pauses_there() -> None:
+    parser = Tsf85Parser()
+    assert parser.feed(SHORT_STAMP[:-1] + b'\x9a') == []
+    assert len(parser.feed(SHORT_STAMP[1:])) == 1
+    assert parser.packets == 1
+
+
+@given(st.binary(max_size=600))
+def test_the_stream_is_found_again_after_any_noise(noise: bytes) -> None:
+    packets = Tsf85Parser().feed(noise + SHORT_STAMP * 60)
+    assert packets[-20:] == Tsf85Parser().feed(SHORT_STAMP) * 20
+
+
+def test_the_commands_are_those_of_the_vendor() -> None:
+    assert start_command() == bytes.fromhex('9A 00 58 01 01')
+    assert start_command(16) == bytes.fromhex('9A 00 58 01 10')
+    assert stop_command() == bytes.fromhex('9A 00 58 01 00')
+    with pytest.raises(ValueError, match='1 to 255'):
+        start_command(0)
+
+
+MS = 1_000_000
+START_NS = 1_700_000_000_000_000_000
+
+
+class Driver:
+    """The vendor's driver: for each packet a message on each topic, a few microseconds apart."""
+
+    def __init__(self, stream):
+        self.stream = stream
+        self.stamp = 65_500  # wraps soon
+        self.now_ns = START_NS
+        self.signals = []
+        self.others = {}
+
+    def packet(self, value, *, lose=(), step=1, image=None):
+        self.stamp += step
+        self.now_ns += step * MS or 50_000
+        messages = {
+            'Dynamic': Message(data=[Message(value=0), Message(value=value)]),
+            'StaticData': Message(taxels=[Message(values=[0] * 28), Message(values=image or [value % 100] * 28)]),
+            'Accelerometer': Message(data=[Message(values=[0, 0, 0]), Message(values=[0, 0, 16384])]),
+            'Gyroscope': Message(data=[Message(values=[0, 0, 0])] * 2),
+            'Timestamp': Message(values=[0, self.stamp % 2**16]),
+        }
+        for number, (topic, message) in enumerate(messages.items()):
+            if topic not in lose:
+                self.stream.take(topic, message, self.now_ns + number * 5000)
+
+    def collect(self):
+        for topic, batches in self.stream.batches().items():
+            self.others.setdefault(topic, []).extend(batches)
+        self.signals = self.others.get('signal', [])
+
+
+@pytest.fixture
+def driver():
+    return Driver(Tsf85MessageConverter(finger=1))
+
+
+def found(driver):
+    return {
+        batch.first_sample + i: int(value) for batch in driver.signals for i, value in enumerate(batch.samples[:, 0])
+    }
+
+
+def run(driver, packets, **faults):
+    for number in range(packets):
+        driver.packet(number, **faults.get(f'at_{number}', {}))
+        if number % 10 == 9:
+            driver.collect()
+
+
+def test_messages_become_batches_numbered_by_the_stamps_and_timed_by_when_they_were_sent(driver):
+    run(driver, 500)
+    values = found(driver)
+    assert len({value - index for index, value in values.items()}) == 1
+    assert driver.stream.counts['lost'] == 0
+    last = driver.signals[-1]
+    assert last.stamp_ns == pytest.approx(START_NS + (last.samples[0, 0] + 1) * MS, abs=20_000)
+    assert len(driver.others['signal_static']) == pytest.approx(24, abs=2)
+    assert driver.others['imu'][-1].samples[-1] == pytest.approx([0, 0, 9.80665, 0, 0, 0])
+
+
+def test_a_lost_sample_leaves_a_gap_and_a_lost_stamp_none(driver):
+    run(driver, 500, at_200={'lose': ('Dynamic',)}, at_300={'lose': ('Timestamp',)})
+    values = found(driver)
+    assert len({value - index for index, value in values.items()}) == 1
+    assert 200 not in values.values()
+    assert 300 in values.values()
+    counts = driver.stream.counts
+    assert (counts['lost'], counts['unpaired'], counts['unstamped']) == (1, 1, 1)
+
+
+def test_a_packet_with_an_image_alone_is_no_sample(driver):
+    run(driver, 500, at_200={'step': 0})
+    assert driver.stream.counts['repeated'] == 1
+    assert driver.stream.counts['lost'] == 0
+
+
+def test_after_a_long_silence_the_gap_is_that_of_the_clock(driver):
+    run(driver, 500)
+    driver.now_ns += 70_000 * MS  # the stamps of 16 bits have wrapped
+    driver.stamp += 70_000
+    before = driver.signals[-1]
+    run(driver, 500)
+    after = next(batch for batch in driver.signals if batch.first_sample > before.next_sample)
+    gap_s = (after.stamp_ns - before.end_ns) / 1e9
+    assert gap_s > 70
+    assert (after.first_sample - before.next_sample) / 1000 == pytest.approx(gap_s, abs=0.01)
+
+
+def test_an_image_of_another_kind_is_refused(driver):
+    with pytest.raises(InvalidData, match='12 taxels; a TSF-85 has 28'):
+        driver.packet(0, image=[1] * 12)
+
+
+HEADER = (
+    ['Time(ms)', 'D0_0', 'D0_1']
+    + [f'S{taxel}_{finger}' for finger in (0, 1) for taxel in range(28)]
+    + [f'{kind}{axis}{finger}' for kind in 'AG' for finger in (0, 1) for axis in 'xyz']
+)
+
+
+def write(path, rows):
+    with path.open('w', newline='') as file:
+        csv.writer(file, delimiter=';').writerows([HEADER, *rows])
+    return path
+
+
+def row(ms, static=5):
+    return [1_700_000_000_000 + ms, ms, -ms, *[static] * 28, *[2 * static] * 28, 0, 0, 16384, 0, 0, -16384, *[0] * 6]
+
+
+@pytest.fixture
+def recording(tmp_path):
+    baseline = [1_699_999_999_000, 0, 0, *[9000] * 28, *[9100] * 28, *[0] * 12]
+    return load_vendor_csv(write(tmp_path / 'slide.csv', [baseline, *(row(ms) for ms in range(600))]))
+
+
+def test_each_finger_becomes_signals_in_the_units_of_the_driver(recording):
+    signals = recording.signals(finger=1)
+    (dynamic,), (static,), (imu,) = signals['signal'], signals['signal_static'], signals['imu']
+    assert dynamic.samples[:3, 0].tolist() == [0, -1, -2]
+    assert (dynamic.stamp_ns, dynamic.sampling_rate_hz) == (1_700_000_000_000_000_000, 1000.0)
+    assert static.samples.shape == (36, 28)
+    assert imu.samples[0] == pytest.approx([0, 0, -9.80665, 0, 0, 0])
+    assert recording.rate_hz == pytest.approx(1000.0)
+
+
+def test_the_first_line_is_the_baseline_and_no_sample(recording):
+    assert recording.baseline[:, 0].tolist() == [9000, 9100]
+    assert len(recording.time_ms) == 600
+
+
+def test_a_line_in_which_the_image_alone_changed_is_no_sample(tmp_path):
+    rows = [row(0), *(line for ms in range(100) for line in (row(ms), row(ms, static=6 + ms)))]
+    recording = load_vendor_csv(write(tmp_path / 'slide.csv', rows))
+    assert np.array_equal(recording.signals()['signal'][0].samples[:, 0], np.arange(100))
+
+
+@pytest.mark.parametrize('text', ['', 'a;b\n1;2\n', 'Time(ms);D0_0\n1;2\n3;4\n5;6\n', ';'.join(HEADER) + '\nx;y\n'])
+def test_another_file_is_refused_with_a_sentence(tmp_path, text):
+    (tmp_path / 'other.csv').write_text(text)
+    with pytest.raises(InvalidData, match=r'other\.csv'):
+        load_vendor_csv(tmp_path / 'other.csv')

@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
+
+from __future__ import annotations
+
+import errno
+import termios
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import serial
 
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, pack
 from texture_core.types import lost_samples
-from texture_drivers.serial_line import FramedStream, StreamDecoder
+from texture_drivers.serial_line import FramedStream, SerialPort, StreamDecoder, reason_of, resolve, serial_number
+from texture_drivers.tsf85 import USB_IDS
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -81,16 +90,6 @@ def test_sequence_and_time_wrap_without_a_trace():
     np.testing.assert_allclose(steps_ns, 4e6, rtol=0.02)
 
 
-def test_a_device_that_begins_again_goes_on_at_the_index_of_the_hosts_clock():
-    line = StreamDecoder([stream()])
-    before = run(line, range(1000))['signal'][-1]
-    after = run(line, range(200), offset_ns=START + 10 * SECOND)['signal'][0]  # it started again 6 s later
-    assert line.restarts == 1
-    assert (after.stamp_ns - before.stamp_ns) / SECOND * 2500 == pytest.approx(
-        after.first_sample - before.first_sample, abs=1
-    )
-
-
 def test_two_streams_of_one_line_share_its_clock_and_lose_on_their_own():
     fast, slow = stream(), stream(kind=2, rate_hz=50.0, channels=('f',), topic='signal_static')
     line = StreamDecoder([fast, slow])
@@ -117,3 +116,60 @@ def test_a_device_that_speaks_differently_is_reported_in_one_sentence():
         StreamDecoder([stream()]).feed(pack(Frame(1, 1, 0, 0, 1, 3, bytes(6))), START)
     with pytest.raises(DeviceError, match='sends frames of version 2, and 1 is known'):
         StreamDecoder([stream()]).feed(pack(Frame(1, 2, 0, 0, 1, 2, bytes(4))), START)
+
+
+def test_a_missing_device_is_named_once_with_the_reason_of_the_operating_system(tmp_path):
+    path = str(tmp_path / 'missing')
+    with pytest.raises(DeviceError) as refusal:
+        SerialPort(path)
+    assert str(refusal.value).startswith(
+        f"device '{path}' cannot be used (No such file or directory); check that it is"
+    )
+    assert str(refusal.value).count(path) == 1
+
+
+@pytest.mark.parametrize(
+    ('error', 'reason'),
+    [
+        (PermissionError(errno.EACCES, 'Permission denied', '/dev/x'), 'Permission denied'),
+        (termios.error(errno.EIO, 'Input/output error'), 'Input/output error'),
+        (serial.SerialException('Write timeout'), 'Write timeout'),
+    ],
+)
+def test_the_reason_of_a_fault_holds_no_path(error, reason):
+    assert reason_of(error) == reason
+
+
+NEW = SimpleNamespace(device='/dev/ttyACM0', vid=0x16D0, pid=0x14CC, serial_number='A7')
+OLD = SimpleNamespace(device='/dev/ttyACM3', vid=0x04B4, pid=0xF232, serial_number=None)
+OTHER = SimpleNamespace(device='/dev/ttyUSB0', vid=0x0403, pid=0x6001, serial_number='FT')
+BOARD = SimpleNamespace(device='/dev/ttyS0', vid=None, pid=None, serial_number=None)
+
+
+@pytest.mark.parametrize('wanted', [NEW, OLD])
+def test_the_only_one_is_found_by_its_numbers(wanted):
+    assert resolve('auto', USB_IDS, 'TSF-85', lambda: [BOARD, OTHER, wanted]) == wanted.device
+
+
+def test_a_path_is_taken_as_it_is():
+    assert resolve('/dev/mine', USB_IDS, 'TSF-85', lambda: []) == '/dev/mine'
+
+
+def test_when_there_is_none_the_ports_are_listed():
+    with pytest.raises(DeviceError, match=r'no TSF-85 \(16D0:14CC or 04B4:F232\).* none; plug it in'):
+        resolve('auto', USB_IDS, 'TSF-85', lambda: [])
+    with pytest.raises(DeviceError, match=r'are /dev/ttyS0, /dev/ttyUSB0 \(0403:6001\); plug it in'):
+        resolve('auto', USB_IDS, 'TSF-85', lambda: [OTHER, BOARD])
+
+
+def test_among_several_one_must_be_chosen():
+    with pytest.raises(DeviceError, match=r'any of 2 TSF-85s: /dev/ttyACM0, /dev/ttyACM3; set the parameter device'):
+        resolve('auto', USB_IDS, 'TSF-85', lambda: [OLD, NEW])
+
+
+def test_the_serial_number_is_that_of_the_port_behind_a_link(tmp_path):
+    port = SimpleNamespace(device=str(tmp_path / 'ttyACM0'), vid=1, pid=1, serial_number='A7')
+    (tmp_path / 'ttyACM0').touch()
+    (tmp_path / 'link').symlink_to(port.device)
+    assert serial_number(str(tmp_path / 'link'), lambda: [BOARD, port]) == 'A7'
+    assert serial_number('/dev/nothing', lambda: [BOARD, port]) == ''

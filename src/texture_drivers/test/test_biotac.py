@@ -1,0 +1,518 @@
+# SPDX-License-Identifier: Apache-2.0
+
+from __future__ import annotations
+
+import sys
+from collections import deque
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from texture_core.errors import DeviceError, InvalidData
+from texture_core.framing import Frame
+from texture_core.types import NANOSECONDS, TactileSignal, lost_samples
+from texture_drivers.biotac import (
+    ERROR_WORDS,
+    LAYOUTS,
+    MESSAGES,
+    QUEUED_FRAMES,
+    REPLY,
+    BioTac,
+    BioTacLayout,
+    BioTacMessageConverter,
+    Cheetah,
+    FrameTracker,
+    SpiFrame,
+    decode,
+    sampling_command,
+)
+from texture_drivers.sensor import SensorParams
+
+BIOTAC, BIOTAC_SP = LAYOUTS['biotac'], LAYOUTS['biotac_sp']
+# Words worked out by hand: seven bits and odd parity, five bits, 00 and odd parity.
+WORDS = {
+    0: bytes([0b0000000_1, 0b00000_00_1]),
+    4095: bytes([0b1111111_0, 0b11111_00_0]),
+    2021: bytes([0b0111111_1, 0b00101_00_1]),  # 63 * 32 + 5
+    1739: bytes([0b0110110_1, 0b01011_00_0]),  # 54 * 32 + 11
+}
+
+
+def slot(command: int, *values: int) -> bytes:
+    return bytes([command, 0]) + b''.join(WORDS[value] for value in values)
+
+
+def test_sampling_commands_are_those_of_the_header_file() -> None:
+    known = {
+        'pac': 0x80, 'pdc': 0x83, 'tac': 0x85, 'tdc': 0x86, 'electrode1': 0xA2, 'electrode2': 0xA4,
+        'electrode3': 0xA7, 'electrode19': 0xC7, 'electrode20': 0xC8, 'electrode24': 0xD0,
+    }  # fmt: skip
+    assert {channel: sampling_command(channel) for channel in known} == known
+
+
+def test_a_frame_samples_pac_in_every_second_slot() -> None:
+    assert len(BIOTAC.slots) == 44
+    assert BIOTAC.slots[:4] == ('electrode1', 'pac', 'electrode2', 'pac')
+    assert BIOTAC.slots[36:] == ('electrode19', 'pac', 'pdc', 'pac', 'tac', 'pac', 'tdc', 'pac')
+    assert (BIOTAC.frame_rate_hz, BIOTAC.pac_rate_hz, BIOTAC.pac_per_frame) == (100.0, 2200.0, 22)
+    assert (len(BIOTAC_SP.slots), BIOTAC_SP.pac_per_frame, BIOTAC_SP.pac_rate_hz) == (54, 27, 2200.0)
+    assert BIOTAC_SP.frame_rate_hz == pytest.approx(81.48, abs=0.01)
+
+
+@pytest.mark.parametrize('value', WORDS)
+def test_words_written_by_hand_give_their_values(value: int) -> None:
+    replies = decode(slot(0x80, value) * 44, BIOTAC, fingers=1)
+    assert replies.pac.shape == (22, 1)
+    assert (replies.pac == value).all()
+    assert not replies.damaged.any()
+
+
+def test_each_channel_and_finger_gets_its_own_word() -> None:
+    frame = [slot(0xA2, 0, 0, 0), slot(0x80, 1739, 1739, 1739)] * 22
+    frame[0] = slot(0xA2, 1739, 2021, 4095)  # electrode 1
+    frame[38] = slot(0x83, 4095, 0, 0)  # PDC
+    frame[42] = slot(0x86, 0, 0, 2021)  # TDC
+    replies = decode(b''.join(frame), BIOTAC, fingers=3)
+    assert replies.slow.shape == (1, 22, 3)
+    slow = dict(zip(BIOTAC.slow_channels, replies.slow[0].tolist(), strict=True))
+    assert slow['electrode1'] == [1739, 2021, 4095]
+    assert slow['pdc'] == [4095, 0, 0]
+    assert slow['tdc'] == [0, 0, 2021]
+    assert slow['tac'] == slow['electrode19'] == [0, 0, 0]
+    assert (replies.pac == 1739).all()
+
+
+def test_a_parity_error_is_counted_and_leaves_the_other_fingers_alone() -> None:
+    frame = bytearray(slot(0x80, 2021, 1739, 4095) * 44)
+    frame[1 * 8 + 2] ^= 0x80  # slot 1 (PAC 0), first finger, first byte
+    frame[3 * 8 + 5] ^= 0x01  # slot 3 (PAC 1), second finger, the parity bit of the second byte
+    replies = decode(bytes(frame), BIOTAC, fingers=3)
+    assert np.argwhere(np.isnan(replies.pac)).tolist() == [[0, 0], [1, 1]]
+    assert replies.pac[0, 1:].tolist() == [1739, 4095]
+    assert replies.pac[1, [0, 2]].tolist() == [2021, 4095]
+    assert replies.damaged.tolist() == [1, 1, 0]
+    assert replies.refused.tolist() == [0, 0, 0]
+
+
+def test_a_place_without_a_biotac_gives_no_numbers() -> None:
+    for line in (b'\x00', b'\xff'):
+        replies = decode((b'\x80\x00' + WORDS[2021] + line * 2) * 44, BIOTAC, fingers=2)
+        assert replies.damaged.tolist() == [0, 44]
+        assert np.isnan(replies.pac[:, 1]).all()
+
+
+@pytest.mark.parametrize('word', ERROR_WORDS)
+def test_error_words_are_no_values(word: int) -> None:
+    replies = decode((b'\x80\x00' + word.to_bytes(2, 'big')) * 44, BIOTAC, fingers=1)
+    assert replies.refused.tolist() == replies.damaged.tolist() == [44]
+    assert np.isnan(replies.slow).all()
+
+
+def test_every_single_flipped_bit_is_noticed() -> None:
+    for bit in range(16):
+        word = (int.from_bytes(WORDS[2021], 'big') ^ 1 << bit).to_bytes(2, 'big')
+        assert decode((b'\x80\x00' + word) * 44, BIOTAC, fingers=1).damaged.tolist() == [44]
+
+
+FRAME_NS = 10_000_000
+START_NS = 1_700_000_000_000_000_000
+ABSENT = None
+
+
+def odd(byte: int) -> int:
+    return byte | (byte.bit_count() + 1) % 2
+
+
+def word(value: int | None) -> bytes:
+    return bytes(2) if value is ABSENT else bytes([odd(value >> 5 << 1), odd((value & 31) << 3)])
+
+
+def reply(layout: BioTacLayout = BIOTAC, *, fingers: Sequence[int | None] = (0,), step: int = 0) -> bytes:
+    """Each slot holds its number times `step`, plus a number that tells the finger."""
+    values = [
+        [ABSENT if base is ABSENT else base + step * slot for base in fingers] for slot in range(len(layout.slots))
+    ]
+    return b''.join(b'\x80\x00' + b''.join(map(word, row)) for row in values)
+
+
+class FakeLink:
+    """Frames that come one a read, 10 ms apart; None is a frame that never comes."""
+
+    max_drift = 5e-3
+    serials = ('BT-1', '')
+
+    def __init__(self, frames: Sequence[SpiFrame | None]) -> None:
+        self._coming: Iterator[SpiFrame | None] = iter(frames)
+        self.now_ns = START_NS
+        self.counts = {'bogus': 3}
+
+    def open(self) -> None:
+        pass
+
+    def read(self) -> list[SpiFrame]:
+        frame = next(self._coming, None)
+        self.now_ns += FRAME_NS
+        return [] if frame is None else [frame]
+
+    def close(self) -> None:
+        pass
+
+
+def numbered(numbers: range, content: bytes, *, epoch: int = 1, fingers: int = 1) -> list[SpiFrame]:
+    return [SpiFrame(epoch, number, 10_000 * number, fingers, content) for number in numbers]
+
+
+def opened(link: FakeLink, *, finger: int = 0, **options: object) -> BioTac:
+    params = SensorParams(finger=finger, frame_id='tip')
+    sensor = BioTac(params, lambda: link.now_ns, link=link, **options)
+    sensor.open()
+    return sensor
+
+
+def run(sensor: BioTac, reads: int) -> dict[str, list[TactileSignal]]:
+    topics: dict[str, list[TactileSignal]] = {}
+    for _ in range(reads):
+        for topic, batches in sensor.read().items():
+            topics.setdefault(topic, []).extend(batches)
+    return topics
+
+
+def test_each_sample_has_the_time_of_its_slot() -> None:
+    link = FakeLink(numbered(range(50), reply(step=1)))
+    start_ns = link.now_ns  # of the first frame: it comes when it is complete, at the first reading
+    topics = run(opened(link), 50)
+    signal, static = topics['signal'][-1], topics['signal_static'][-1]
+    assert abs(static.stamp_ns - (start_ns + 49 * FRAME_NS)) < 1000
+    assert signal.stamp_ns - static.stamp_ns == 227_273
+    # Slot numbers are the values: PAC comes from slots 1, 3 … 43, so sample k was taken at (2k + 1) slots.
+    assert signal.samples[:, 0].tolist() == list(range(1, 44, 2))
+    times_s = 227.273e-6 + np.arange(22) / signal.sampling_rate_hz
+    assert times_s == pytest.approx(signal.samples[:, 0] / 4400, abs=1e-6)
+    assert static.samples[0].tolist() == [42, 40, 38, *range(0, 38, 2)]  # TDC, TAC, PDC, electrodes
+    assert static.channels == ('tdc', 'tac', 'pdc', *(f'electrode{number}' for number in range(1, 20)))
+    assert (signal.sensor, signal.channels, signal.frame_id) == ('biotac/pac', ('pac',), 'tip')
+    assert signal.units == ('count',)
+    assert (signal.sampling_rate_hz, static.sampling_rate_hz) == (2200.0, 100.0)
+    assert signal.first_sample == 22 * static.first_sample
+
+
+def test_a_lost_frame_is_a_jump_of_22_samples() -> None:
+    frames = numbered(range(60), reply())
+    sensor = opened(FakeLink([*frames[:40], None, None, *frames[42:]]))
+    topics = run(sensor, 60)
+    assert lost_samples(topics['signal']) == 44
+    assert lost_samples(topics['signal_static']) == 2
+    assert sensor.counts['lost'] == 44
+    assert sensor.counts['samples'] == sum(len(batch.samples) for batch in topics['signal'])
+    assert sensor.counts['bogus'] == 3
+
+
+def test_a_damaged_word_is_nan_in_its_own_channel_and_finger() -> None:
+    content = bytearray(reply(fingers=(100, 200)))
+    content[6 * 38 + 4] ^= 1  # slot 38 is PDC; the second finger
+    sensor = opened(FakeLink(numbered(range(40), bytes(content), fingers=2)), fingers=(0, 1))
+    topics = run(sensor, 40)
+    first, second = topics['finger0/signal_static'][-1].samples[0], topics['finger1/signal_static'][-1].samples[0]
+    assert (first == 100).all()
+    assert np.flatnonzero(np.isnan(second)).tolist() == [2]
+    assert (topics['finger1/signal'][-1].samples == 200).all()
+    assert sensor.counts['damaged_words'] == len(topics['finger1/signal_static'])
+
+
+def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:
+    sensor = opened(FakeLink(numbered(range(200), reply(fingers=(7, ABSENT)), fingers=2)), finger=1)
+    with pytest.raises(DeviceError, match='no BioTac answers as finger 1'):
+        assert not any(run(sensor, 200).values())
+
+
+def bridge_frame(sequence: int, time_us: int) -> Frame:
+    return Frame(REPLY, 1, sequence % 2**16, time_us % 2**32, 44, 1, b'')
+
+
+def test_numbers_and_time_go_on_over_their_wrapping() -> None:
+    run_ = FrameTracker(BIOTAC)
+    first_us = 2**32 - 15_000
+    frames = [run_.place(bridge_frame(65_534 + n, first_us + 10_000 * n)) for n in range(4)]
+    assert [frame.number for frame in frames] == [65_534, 65_535, 65_536, 65_537]
+    assert [frame.time_us - first_us for frame in frames] == [0, 10_000, 20_000, 30_000]
+    assert run_.restarts == 0
+
+
+def test_a_device_that_begins_again_or_pauses_begins_another_epoch() -> None:
+    run_ = FrameTracker(BIOTAC)
+    epochs = [
+        run_.place(bridge_frame(number, time_us)).epoch
+        for number, time_us in [(100, 10**6), (101, 1_010_000), (0, 0), (1, 10_000), (5, 50_000), (6, 300_000)]
+    ]
+    assert epochs == [1, 1, 2, 2, 2, 3]
+    assert run_.restarts == 2
+
+
+def test_a_bridge_of_another_pace_is_reported() -> None:
+    run_ = FrameTracker(BIOTAC)
+    with pytest.raises(DeviceError, match=r'takes 10\.40 ms for a frame, and 10\.00 ms are needed'):
+        for number in range(120):
+            run_.place(bridge_frame(number, 10_400 * number))
+    steady = FrameTracker(BIOTAC)
+    jitter_us = (0, 2000, -2000)
+    for number in range(500):
+        steady.place(bridge_frame(number, 10_050 * number + jitter_us[number % 3]))
+    assert steady.restarts == 0
+
+
+HAND, ALL = MESSAGES['BioTacHand'], MESSAGES['BiotacAll']
+
+
+def header(stamp_ns: int) -> SimpleNamespace:
+    sec, nanosec = divmod(stamp_ns, NANOSECONDS)
+    return SimpleNamespace(stamp=SimpleNamespace(sec=sec, nanosec=nanosec), frame_id='')
+
+
+def hand(stamp_ns: int, **changes: Any) -> SimpleNamespace:
+    """A BioTacHand with BioTacs at positions 1 and 3."""
+    fingers = [
+        SimpleNamespace(
+            bt_serial=f'BT-{position}',
+            bt_position=position,
+            tdc_data=1000 * position,
+            tac_data=2000,
+            pdc_data=2200,
+            pac_data=np.arange(22, dtype=np.uint16) + 100 * position,
+            electrode_data=np.arange(1, 20, dtype=np.uint16),
+        )
+        for position in (1, 3)
+    ]
+    for name, value in changes.items():
+        setattr(fingers[0], name, value)
+    # The times of the samples in these messages are wrong, so nothing may depend on them.
+    return SimpleNamespace(header=header(stamp_ns), hand_id='left', bt_data=fingers, bt_time=None)
+
+
+def biotac_all(stamp_ns: int, n_pac: int) -> SimpleNamespace:
+    finger = SimpleNamespace(
+        pac0=1, pac1=2, pac=list(range(n_pac)), pdc=2200, tac=2000, tdc=1000, electrodes=list(range(1, 20))
+    )
+    return SimpleNamespace(header=header(stamp_ns), tactiles=[finger] * 5)
+
+
+def converted(stream: BioTacMessageConverter, messages: list[Any]) -> dict[str, list[TactileSignal]]:
+    topics: dict[str, list[TactileSignal]] = {'signal': [], 'signal_static': []}
+    for message in messages:
+        for topic, batch in stream.update(message).items():
+            topics[topic].append(batch)
+    return topics
+
+
+def test_biotac_hand_gives_pac_with_the_times_of_its_slots() -> None:
+    stream = BioTacMessageConverter(HAND, finger=2, frame_id='tip')
+    topics = converted(stream, [hand(START_NS + n * 10_000_000) for n in range(50)])
+    pac, slow = topics['signal'][-1], topics['signal_static'][-1]
+    frame_start_ns = START_NS + 48 * 10_000_000  # the stamp of a message is the end of its frame
+    assert abs(slow.stamp_ns - frame_start_ns) < 1000
+    assert abs(pac.stamp_ns - frame_start_ns - 227_273) < 1000
+    assert pac.samples[:, 0].tolist() == list(range(300, 322))
+    assert slow.samples[0].tolist() == [3000, 2000, 2200, *range(1, 20)]
+    assert slow.channels[:4] == ('tdc', 'tac', 'pdc', 'electrode1')
+    assert (pac.sampling_rate_hz, slow.sampling_rate_hz, pac.frame_id) == (2200.0, 100.0, 'tip')
+    assert (pac.units, slow.units) == (('count',), ('count',) * 22)
+    assert lost_samples(topics['signal']) == lost_samples(topics['signal_static']) == 0
+    assert stream.serial == 'BT-3'
+
+
+def test_jitter_of_the_host_makes_no_losses_and_hardly_moves_the_times() -> None:
+    rng = np.random.default_rng(0)
+    late_ns = rng.integers(0, 4_000_000, 300)
+    topics = converted(
+        BioTacMessageConverter(HAND), [hand(START_NS + n * 10_000_000 + int(late_ns[n])) for n in range(300)]
+    )
+    assert lost_samples(topics['signal']) == 0
+    stamps = np.array([batch.stamp_ns for batch in topics['signal']][100:])
+    assert np.ptp(stamps - 10_000_000 * np.arange(len(stamps))) < 1_000_000
+
+
+def test_a_gap_in_the_stamps_is_a_loss() -> None:
+    stream = BioTacMessageConverter(HAND)
+    topics = converted(stream, [hand(START_NS + n * 10_000_000) for n in range(60) if not 30 <= n < 34])
+    assert lost_samples(topics['signal']) == stream.lost == 4 * 22
+    assert lost_samples(topics['signal_static']) == 4
+
+
+@pytest.mark.parametrize('period_ns', [9_000_000, 10_000_000])
+def test_biotac_all_may_hold_any_number_of_pac_samples(period_ns: int) -> None:
+    # Two samples a millisecond, published at 111 or 100 Hz.
+    stamps = [START_NS + n * period_ns for n in range(100)]
+    counts = [period_ns // 500_000 + (1, -1, 0)[n % 3] for n in range(100)]
+    topics = converted(BioTacMessageConverter(ALL), [biotac_all(*item) for item in zip(stamps, counts, strict=True)])
+    pac = topics['signal']
+    assert [len(batch.samples) for batch in pac] == counts[-len(pac) :]
+    assert lost_samples(pac) == 0
+    assert pac[-1].sampling_rate_hz == 2000.0
+    # The last sample is as new as the message.
+    assert abs(pac[-1].stamp_ns + (counts[-1] - 1) * 500_000 - stamps[-1]) < 1_500_000
+    assert topics['signal_static'][-1].samples[0].tolist() == [1000, 2000, 2200, *range(1, 20)]
+
+
+@pytest.mark.parametrize(
+    ('message', 'finger', 'sentence'),
+    [
+        (hand(START_NS), 1, r'fingers \[0, 2\]'),
+        (hand(START_NS, pac_data=[1] * 21), 0, '21 PAC samples'),
+        (hand(START_NS, electrode_data=[1] * 24), 0, '24 electrodes'),
+    ],
+)
+def test_a_message_that_does_not_fit_is_refused_in_one_sentence(message: Any, finger: int, sentence: str) -> None:
+    with pytest.raises(InvalidData, match=sentence):
+        BioTacMessageConverter(HAND, finger).update(message)
+
+
+SERIAL = b'BT2P0220B11E0004'
+
+
+class StandIn:
+    """A Cheetah with one BioTac at the first place, at the level of the calls of the vendor's module."""
+
+    CH_PORT_NOT_FREE, CH_SPI_BITORDER_MSB, CH_TARGET_POWER_ON = 0x8000, 0, 1
+
+    def __init__(self) -> None:
+        self.ports = [0x8000, 1]
+        self.queue: list[tuple[str, int]] = []
+        self.slept_ns = 0
+        self.pending: deque[bytes] = deque()
+        self.opened = self.closed = 0
+        self.status = 0
+
+    def ch_find_devices_ext(self, ports: int, ids: int) -> tuple[int, list[int], list[int]]:
+        return len(self.ports), self.ports, [0] * len(self.ports)
+
+    def ch_open(self, port: int) -> int:
+        self.opened = port
+        return 5
+
+    def ch_close(self, handle: int) -> int:
+        self.closed += 1
+        return 0
+
+    def ch_spi_configure(self, handle: int, polarity: int, phase: int, order: int, selects: int) -> int:
+        assert (polarity, phase, order, selects) == (0, 0, 0, 0)
+        return 0
+
+    def ch_spi_bitrate(self, handle: int, khz: int) -> int:
+        assert khz == 4400
+        return khz
+
+    def ch_target_power(self, handle: int, on: int) -> int:
+        return on
+
+    def ch_sleep_ms(self, ms: int) -> int:
+        return ms
+
+    def ch_spi_queue_clear(self, handle: int) -> int:
+        self.queue, self.slept_ns = [], 0
+        return 0
+
+    def ch_spi_queue_oe(self, handle: int, on: int) -> int:
+        return 0
+
+    def ch_spi_queue_ss(self, handle: int, select: int) -> int:
+        self.queue.append(('select', select))
+        return 0
+
+    def ch_spi_queue_byte(self, handle: int, count: int, byte: int) -> int:
+        self.queue += [('byte', byte)] * count
+        return 0
+
+    def ch_spi_queue_delay_ns(self, handle: int, ns: int) -> int:
+        self.slept_ns += ns
+        return ns
+
+    def ch_spi_batch_shift(self, handle: int, size: int) -> tuple[int, bytes]:
+        data = self.shift()
+        return len(data), data
+
+    def ch_spi_async_submit(self, handle: int) -> int:
+        self.pending.append(self.shift())
+        return self.status
+
+    def ch_spi_async_collect(self, handle: int, size: int) -> tuple[int, bytes]:
+        data = self.pending.popleft()
+        return len(data), data
+
+    def ch_status_string(self, status: int) -> str:
+        return 'communication error'
+
+    def shift(self) -> bytes:
+        """What comes back: the BioTac at select 1 answers with its serial number, or with the command it was given."""
+        answer, heard, select, out = deque[int](), [], 0, []
+        for kind, value in self.queue:
+            if kind == 'select':
+                if value == 0 and heard[:2] == [0x61, 0x15]:
+                    answer, heard = deque(SERIAL), []
+                elif value == 0 and heard and heard[0] & 0x80:
+                    answer, heard = deque([odd(heard[0] & 0x7E), odd(0)]), []
+                select = value
+            elif select == 1 and answer:
+                out.append(answer.popleft())
+            else:
+                heard += [value] if select in (1, 7) else []
+                out.append(0xFF)
+        return bytes(out)
+
+
+@pytest.fixture
+def api(monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    stand_in = StandIn()
+    monkeypatch.setitem(sys.modules, 'cheetah_py', stand_in)
+    return stand_in
+
+
+def test_frames_hold_what_the_biotac_answered_to_each_command(api: StandIn) -> None:
+    link = Cheetah(BIOTAC)
+    link.open()
+    frames = [frame for _ in range(3) for frame in link.read()]
+    assert [(frame.number, frame.time_us, frame.fingers) for frame in frames] == [
+        (0, 0, 3),
+        (1, 10_000, 3),
+        (2, 20_000, 3),
+    ]
+    replies = decode(frames[0].reply, BIOTAC, 3)
+    assert replies.damaged.tolist() == [0, 44, 44]
+    # The stand-in answers with bits 6..1 of the command: twice the index, in the upper seven bits of the word.
+    slow = dict(zip(BIOTAC.slow_channels, replies.slow[0, :, 0].tolist(), strict=True))
+    assert (slow['tdc'], slow['pdc'], slow['electrode1']) == (3 * 32, 1 * 32, 17 * 32)
+    assert (replies.pac[:, 0] == 0).all()
+    assert link.serials == (SERIAL.decode(), '', '')
+    assert (api.opened, len(api.pending)) == (1, QUEUED_FRAMES)
+    link.close()
+    link.close()
+    assert api.closed == 1
+
+
+def test_after_a_pause_of_the_host_a_new_epoch_begins_behind_the_queue(api: StandIn) -> None:
+    clock = SimpleNamespace(now=0.0)
+    link = Cheetah(BIOTAC, lambda: clock.now)
+    link.open()
+    before = link.read()[0].epoch
+    clock.now += 1.0
+    epochs = [link.read()[0].epoch for _ in range(QUEUED_FRAMES + 2)]
+    assert epochs == [before] * QUEUED_FRAMES + [before + 1] * 2
+    assert link.counts == {'pauses': 1}
+
+
+def test_without_the_vendors_module_the_sentence_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'cheetah_py', None)
+    with pytest.raises(DeviceError, match=r"Total Phase's Python module 'cheetah_py'.*serial bridge"):
+        Cheetah(BIOTAC).open()
+
+
+def test_an_adapter_in_use_or_failing_is_reported(api: StandIn) -> None:
+    link = Cheetah(BIOTAC)
+    link.open()
+    api.status = -8
+    with pytest.raises(DeviceError, match=r'submitting commands failed.*communication error'):
+        link.read()
+    api.ports = [0x8000]
+    with pytest.raises(DeviceError, match='no free Cheetah adapter'):
+        Cheetah(BIOTAC).open()
