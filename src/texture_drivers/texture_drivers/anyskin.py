@@ -288,15 +288,12 @@ class AnySkinDecoder(Decoder):
             return {}
         blocks = [(run.missing, len(run.values)) for run in runs]
         if self._numbering is None:
-            self._measure(sum(map(sum, blocks)), arrival_ns)
+            rate_hz = self._meter.update(sum(map(sum, blocks)), arrival_ns)
+            if rate_hz:
+                self._rate_hz = float(max(1, round(rate_hz)))
+                self._numbering = self._make_numbering()
             return {}
         return self._batches(runs, self._numbering.place(blocks, arrival_ns), self._numbering)
-
-    def _measure(self, frames: int, arrival_ns: int) -> None:
-        rate_hz = self._meter.update(frames, arrival_ns)
-        if rate_hz:
-            self._rate_hz = float(max(1, round(rate_hz)))
-            self._numbering = self._make_numbering()
 
     def _make_numbering(self) -> ArrivalNumbering:
         return ArrivalNumbering(self._rate_hz, block_s=self._batch_s, max_drift=MAX_DRIFT)

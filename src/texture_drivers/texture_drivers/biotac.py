@@ -162,10 +162,6 @@ class BioTacLayout:
         """Rate of PAC."""
         return SLOT_RATE_HZ / 2
 
-    def slot_time_ns(self, slot: int) -> int:
-        """Return the time of a slot after the start of its frame."""
-        return round(slot * SLOT_NS)
-
     def frame_bytes(self, fingers: int) -> int:
         """Return the length of the reply to one frame from a board with so many BioTacs."""
         return len(self.slots) * (ECHO_BYTES + WORD_BYTES * fingers)
@@ -905,7 +901,7 @@ class BioTac:
                 continue  # nobody there
             self._last_received_ns[finger] = now_ns
             pac, slow = self._signals
-            stamp_ns, first = start_ns + self._layout.slot_time_ns(1), index * self._layout.pac_per_frame
+            stamp_ns, first = start_ns + round(SLOT_NS), index * self._layout.pac_per_frame
             samples = replies.pac[:, finger : finger + 1]
             topics[f'{prefix}signal'].append(pac(stamp_ns=stamp_ns, first_sample=first, samples=samples))
             samples = replies.slow[:, :, finger]

@@ -160,10 +160,6 @@ def load_recording(path: Path) -> FileRecording:
         raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
     except READ_ERRORS as error:
         raise InvalidData(f"recording '{path}' is not usable: {error}") from error
-    return _checked(path, recording)
-
-
-def _checked(path: Path, recording: FileRecording) -> FileRecording:
     if recording.samples.ndim != 2 or 0 in recording.samples.shape:
         raise InvalidData(
             f"recording '{path}' holds an array of shape {recording.samples.shape}; (n_samples, n_channels) is needed"

@@ -106,35 +106,24 @@ class Tare:
         self._batches.append(batch)
         if batch.end_ns < self._begin_ns + self._duration_s * NANOSECONDS:
             return None
-        return baseline_of(self._batches)
-
-
-def baseline_of(batches: Sequence[TactileSignal]) -> Baseline:
-    """Return the baseline out of the batches of a stream, without load.
-
-    Raises
-    ------
-    InvalidData
-        If they hold too few samples, no valid one of a channel, or a level that moved.
-    """
-    first = batches[0]
-    samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
-    if len(samples) < LEAST_SAMPLES or np.isnan(samples).all(axis=0).any():
-        raise InvalidData(
-            f"tare of '{first.sensor}': {len(samples)} samples came, or a channel without any valid one; "
-            'check the sensor, or tare for longer'
-        )
-    halves = np.array_split(samples, 2)
-    begun, ended = (np.nanmean(half, axis=0) for half in halves)
-    noise = np.sqrt(np.mean([np.nanvar(half, axis=0) for half in halves], axis=0))
-    moved = np.abs(ended - begun) > MOST_MOVED * np.maximum(noise, RELATIVE_FLOOR * np.abs(begun)) + 1e-12
-    if moved.any():
-        names = ', '.join(name for name, has in zip(first.channels, moved, strict=True) if has)
-        raise InvalidData(
-            f"tare of '{first.sensor}': the level of {names} moved meanwhile; let nothing touch the finger and tare "
-            'again'
-        )
-    return Baseline(np.nanmean(samples, axis=0), noise, first.stamp_ns, first)
+        first = self._batches[0]
+        samples = np.concatenate([batch.samples for batch in self._batches]).astype(np.float64)
+        if len(samples) < LEAST_SAMPLES or np.isnan(samples).all(axis=0).any():
+            raise InvalidData(
+                f"tare of '{first.sensor}': {len(samples)} samples came, or a channel without any valid one; "
+                'check the sensor, or tare for longer'
+            )
+        halves = np.array_split(samples, 2)
+        begun, ended = (np.nanmean(half, axis=0) for half in halves)
+        noise = np.sqrt(np.mean([np.nanvar(half, axis=0) for half in halves], axis=0))
+        moved = np.abs(ended - begun) > MOST_MOVED * np.maximum(noise, RELATIVE_FLOOR * np.abs(begun)) + 1e-12
+        if moved.any():
+            names = ', '.join(name for name, has in zip(first.channels, moved, strict=True) if has)
+            raise InvalidData(
+                f"tare of '{first.sensor}': the level of {names} moved meanwhile; let nothing touch the finger and "
+                'tare again'
+            )
+        return Baseline(np.nanmean(samples, axis=0), noise, first.stamp_ns, first)
 
 
 def saturated(

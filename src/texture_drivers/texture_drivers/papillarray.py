@@ -443,16 +443,11 @@ class PapillArrayDecoder(Decoder):
                 rows = rows[1:]  # noqa: PLW2901
                 if not len(rows):
                     continue
-            elif self._last and not self._follows(first):
+            elif self._last and not (first[0] > self._last[0] and 0 < first[1] - self._last[1] <= LONGEST_STEP_US):
                 self._restarts += 1
                 self._interrupt()
             self._last = int(found.counters[rows[-1]]), int(found.times_us[rows[-1]])
             yield rows
-
-    def _follows(self, packet: tuple[int, int]) -> bool:
-        """Return whether counter and time of a packet go on from those of the last one."""
-        counter, time_us = self._last or packet
-        return packet[0] > counter and 0 < packet[1] - time_us <= LONGEST_STEP_US
 
     def _interrupt(self) -> None:
         self._numbering.interrupt()

@@ -65,25 +65,6 @@ class FramedStream:
         ends = np.array([self.gains * end + self.offsets for end in (counts.min, counts.max)], dtype=np.float32)
         return ends.min(axis=0), ends.max(axis=0)
 
-    def check(self, frame: Frame) -> None:
-        """Raise DeviceError if a frame is of another version or another number of channels.
-
-        Raises
-        ------
-        DeviceError
-            If it is.
-        """
-        if frame.version != VERSION:
-            raise DeviceError(
-                f"'{self.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update the device "
-                'or this driver'
-            )
-        if frame.columns != len(self.channels):
-            raise DeviceError(
-                f"'{self.sensor}' sends {frame.columns} channels, and {len(self.channels)} are named "
-                f'{list(self.channels)}; correct the channels in the settings'
-            )
-
 
 # --------------------
 # A serial port that fails in one way: DeviceError, whatever pyserial, the kernel or termios raise.
@@ -518,7 +499,17 @@ class StreamDecoder(Decoder):
         if tracker is None:
             self.other_frames += 1
             return False
-        tracker.stream.check(frame)
+        stream = tracker.stream
+        if frame.version != VERSION:
+            raise DeviceError(
+                f"'{stream.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update the device "
+                'or this driver'
+            )
+        if frame.columns != len(stream.channels):
+            raise DeviceError(
+                f"'{stream.sensor}' sends {frame.columns} channels, and {len(stream.channels)} are named "
+                f'{list(stream.channels)}; correct the channels in the settings'
+            )
         if not frame.rows or frame.rows * frame.columns * SAMPLE.itemsize != len(frame.body):
             self.malformed += 1
             return False

@@ -286,18 +286,9 @@ class SoundCard:
         self._next_published = first + len(samples)
         self._samples += len(samples)
         stamp_ns = self._numbering.clock.time_ns(first * self._settings.decimation)
-        return [
-            TactileSignal(
-                stamp_ns=stamp_ns,
-                sensor=SENSOR,
-                channels=self._channels,
-                units=(self._settings.unit,) * len(self._channels),
-                sampling_rate_hz=self._rate_hz,
-                first_sample=first,
-                samples=samples * self._settings.gain,
-                frame_id=self._params.frame_id,
-            )
-        ]
+        units = (self._settings.unit,) * len(self._channels)
+        scaled, frame_id = samples * self._settings.gain, self._params.frame_id
+        return [TactileSignal(stamp_ns, SENSOR, self._channels, units, self._rate_hz, first, scaled, frame_id)]
 
     def _missing(self, block: AudioBlock) -> int:
         """Return how many samples an overflow has cost: those by which the block is late."""

@@ -91,7 +91,7 @@ LAYOUTS: Mapping[str, Tsf85Layout] = {
     'tsf85_3x4': Tsf85Layout(3, 4, 25.0),
 }
 TSF85 = LAYOUTS['tsf85']
-STATIC_ROWS, STATIC_COLUMNS, STATIC_RATE_HZ = TSF85.rows, TSF85.columns, TSF85.static_rate_hz
+STATIC_RATE_HZ = TSF85.static_rate_hz
 STATIC_CHANNELS = TSF85.static_channels
 TAXELS = len(STATIC_CHANNELS)
 
@@ -877,20 +877,15 @@ class Tsf85:
         data = self._port.read()
         arrival_ns = self._now_ns()
         packets = self._without_duplicates(self._parser.feed(data))
-        topics, alive = self._place(packets, arrival_ns)
-        self._watch_silence(self._port, alive, len(data))
-        return topics
-
-    def _place(self, packets: Sequence[Packet], arrival_ns: int) -> tuple[dict[str, Sequence[TactileSignal]], bool]:
-        """Return the batches of each topic, and whether any finger sent a frame."""
         topics: dict[str, Sequence[TactileSignal]] = {}
         alive = False
         for number, finger in self._fingers.items():
             frames = self._splitters[number].frames(packets)
             alive = alive or bool(frames)
-            for topic, batches in finger.place(frames, arrival_ns).items():
-                topics[f'{self._prefixes[number]}{topic}'] = batches
-        return topics, alive
+            placed = finger.place(frames, arrival_ns)
+            topics |= {f'{self._prefixes[number]}{topic}': batches for topic, batches in placed.items()}
+        self._watch_silence(self._port, alive, len(data))
+        return topics
 
     def close(self) -> None:
         """Stop the stream and close the device."""

@@ -219,8 +219,7 @@ class SkinContact:
         longest = np.abs(step_x).max(initial=0.0) + np.abs(step_y).max(initial=0.0)
         if MIN_BLUR_PER_STEP * longest < self._contact.blur_m / 2:
             return np.zeros_like(placed.x_m[..., :1])
-        steps: Array = np.hypot(step_x, step_y)
-        return steps
+        return np.asarray(np.hypot(step_x, step_y))
 
 
 def constant(values: Array) -> Array:

@@ -31,7 +31,6 @@ from texture_simulation.devices.fingers import (
     EmulatedDevice,
     EmulatedPapillArray,
     EmulatedPvdf,
-    EmulatedSampler,
     EmulatedTsf85,
 )
 from texture_simulation.path import FingerTrack
@@ -229,19 +228,19 @@ def live_biotac(
 def live_daq(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 3."""
     model, device, rate_hz = sensor_models.DaqModel(scene, surface, rng), EmulatedDaq(link, rng), daq.RATE_HZ
-    skip = partial(_skip_samples, device, rate_hz)
-    return LiveSensor(model, device, device.sample, skip, (rate_hz, sensor_models.DAQ_OVERSAMPLING))
+    pace = rate_hz, sensor_models.DAQ_OVERSAMPLING
+    return LiveSensor(model, device, device.sample, lambda samples: device.skip(samples / rate_hz), pace)
 
 
 def live_pvdf(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 5."""
     model, device, rate_hz = sensor_models.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng), pvdf.FILM_RATE_HZ
-    skip, pace = partial(_skip_samples, device, rate_hz), (rate_hz, sensor_models.PVDF_OVERSAMPLING)
+    pace = rate_hz, sensor_models.PVDF_OVERSAMPLING
+
+    def skip(samples: int) -> None:
+        device.skip(samples / rate_hz)
+
     return LiveSensor(model, device, lambda both: device.sample(*both), skip, pace)
-
-
-def _skip_samples(device: EmulatedSampler, rate_hz: float, samples: int) -> None:
-    device.skip(samples / rate_hz)
 
 
 def live_anyskin(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:

@@ -351,8 +351,7 @@ def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
     (..., n)
         Force in N.
     """
-    pull: Array = friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s)
-    return pull
+    return np.asarray(friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s))
 
 
 def check_drive(speed_m_s: Array, force_n: Array) -> None:

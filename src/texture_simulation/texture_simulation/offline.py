@@ -237,23 +237,20 @@ def simulate_exploration(
         travelled_m, pressed_n, SimulatedSlide(speed_m_s, force_n, slide_s, direction_rad, radius_m)
     )
     streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
+    friction = scene.surface(surface).friction
+    # What a wrist sensor without errors would measure; NaN of a surface whose friction nobody states.
+    tangential_n = math.nan if friction is None else float(force[0] * sliding_coefficient(friction, speed)[0])
     slide = {
         'speed_m_s': speed_m_s,
         'force_n': force_n,
         'direction_rad': direction_rad,
-        'tangential_force_n': _tangential_n(scene, surface, float(speed[0]), float(force[0])),
+        'tangential_force_n': tangential_n,
     }
     motion = 'circular' if radius_m else 'linear_slide'
     begun = ExplorationState(start_ns, exploration_id, motion, Phase.APPROACH, 0.0, surface=surface)
     return _states(begun, slide_s, radius_m, slide), {
         stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams
     }
-
-
-def _tangential_n(scene: Scene, surface: str, speed_m_s: float, force_n: float) -> float:
-    """Return what a wrist sensor without errors would measure; NaN of a surface whose friction nobody states."""
-    friction = scene.surface(surface).friction
-    return math.nan if friction is None else force_n * float(sliding_coefficient(friction, np.array(speed_m_s)))
 
 
 def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind) -> tuple[Array, Array]:

@@ -426,17 +426,12 @@ def _pairs(random: RandomRelief) -> AnyArray:
     All are made at once, 4.8 MB a relief: what a emulator holds does not grow with what it has measured.
     """
     spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
-    blurred = [_blurred(spectrum, wave_1_m, blur_m) for blur_m in BLURS_M]
+    weak = [np.exp(-0.5 * (2 * np.pi * wave_1_m * blur_m) ** 2) for blur_m in BLURS_M]
+    blurred = [np.fft.irfft2(spectrum * share, s=(SIDE, SIDE)) for share in weak]
     both = [sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]
     # One after the other, each with its first row and column again at its end.
     flat = [np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in both]
     return np.asarray(np.concatenate(flat), dtype=np.complex64)
-
-
-def _blurred(spectrum: NDArray[np.complex128], wave_1_m: Array, blur_m: float) -> Array:
-    """Return a tile, (SIDE, SIDE) m, under one of the blurs."""
-    weak = np.exp(-0.5 * (2 * np.pi * wave_1_m * blur_m) ** 2)
-    return np.asarray(np.fft.irfft2(spectrum * weak, s=(SIDE, SIDE)))
 
 
 def waves_1_m(spacing_m: float) -> Array:

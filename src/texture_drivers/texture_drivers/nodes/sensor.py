@@ -26,7 +26,7 @@ from texture_core.ros import (
 )
 from texture_core.types import Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.health import Baseline, ChannelWatch, SensorHealth, TareParams
+from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
 
 # Phases of an exploration in which nothing touches the finger; after an abort it may still.
@@ -125,7 +125,8 @@ class SensorNode(PatientLifecycleNode):
         published, baseline = self._watch.add(topic, batch)
         self._topics[topic].publish(self._message(topic, published))
         if baseline is not None:
-            self._publish_baseline(topic, baseline)
+            self._baselines[topic].publish(self._message(topic, baseline.as_signal()))
+            self.get_logger().info(f"'{topic}' is tared")
 
     def _message(self, topic: str, signal: TactileSignal) -> msg.TactileSignal:
         """Return the message of a signal, in the frame of its fingertip as tf names it: 'left/finger0/fingertip'."""
@@ -133,10 +134,6 @@ class SensorNode(PatientLifecycleNode):
         finger = f'{self.get_namespace()}/{topic.rpartition("/")[0]}'
         message.header.frame_id = frame_name(finger, signal.frame_id)
         return message
-
-    def _publish_baseline(self, topic: str, baseline: Baseline) -> None:
-        self._baselines[topic].publish(self._message(topic, baseline.as_signal()))
-        self.get_logger().info(f"'{topic}' is tared")
 
     def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start a tare: its result comes on the topics of the baselines, a refusal on /diagnostics."""
@@ -155,9 +152,8 @@ class SensorNode(PatientLifecycleNode):
         return response
 
     def _on_exploration(self, state: msg.ExplorationState) -> None:
-        if self._reader is None:
-            return
-        self._watch.set_unloaded(state.phase in UNLOADED)
+        if self._reader is not None:
+            self._watch.set_unloaded(state.phase in UNLOADED)
 
     def _start_tare(self) -> None:
         """Let the device set its own bias, if it has one, and then measure what is left."""
