@@ -215,7 +215,7 @@ class SerialSensor:
         self._stop_command = stop_command
         self._port: SerialPort | None = None
         self._opened = 0
-        self._silent_s = 0.0
+        self._silent_s, self._babbles = 0.0, False
 
     def open(self) -> None:
         """Open the device and start its stream; DeviceError if it cannot be reached."""
@@ -223,7 +223,7 @@ class SerialSensor:
         self._port = SerialPort(self._params.device, self._baud)
         self.send(self._start_command)
         self._opened += 1
-        self._silent_s = 0.0
+        self._silent_s, self._babbles = 0.0, False
         self._decoder.restart()
 
     def send(self, command: bytes) -> None:
@@ -291,12 +291,14 @@ class SerialSensor:
 
     def _watch_silence(self, *, alive: bool, any_bytes: bool) -> None:
         self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
+        self._babbles = not alive and (self._babbles or any_bytes)  # since the last valid frame, not in the last read
         if self._silent_s < SILENCE_S:
             return
-        what = 'bytes but no valid frame' if any_bytes else 'nothing'
+        what, check = 'nothing', 'that its firmware runs'
+        if self._babbles:
+            what, check = 'bytes but no valid frame', f'its baud rate ({self._baud} is set)'
         raise DeviceError(
-            f"device '{self._params.device}' is open and sends {what}; check that it is the right device"
-            + (f', and its baud rate ({self._baud} is set)' if any_bytes else ', and that its firmware runs')
+            f"device '{self._params.device}' is open and sends {what}; check that it is the right device, and {check}"
         )
 
 

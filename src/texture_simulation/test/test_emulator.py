@@ -91,11 +91,11 @@ def peak_hz(samples: np.ndarray, rate_hz: float) -> float:
     return float(np.fft.rfftfreq(len(samples), 1 / rate_hz)[spectrum.argmax()])
 
 
-def test_the_driver_senses_the_ridges_at_speed_over_pitch(sensor: Tsf85, arm: Arm) -> None:
+def test_the_driver_senses_the_ridges_at_speed_over_pitch(emulator: Emulator, sensor: Tsf85, arm: Arm) -> None:
     read(sensor, 500)
     batches = read(sensor, 2000)
     assert peak_hz(values(batches)[:2000], 1000.0) == pytest.approx(50.0, abs=1.0)
-    assert lost_samples(batches) == 0
+    assert lost_samples(batches) <= emulator.counts['skipped samples']  # none, unless the machine stalls
     assert sensor.counts['bogus'] == 0
 
 
@@ -115,7 +115,8 @@ def test_a_bad_line_costs_samples_and_every_one_is_counted(emulator: Emulator, s
     batches = read(sensor, 3000)
     emulator.device.faults = ByteFaults()
     batches += read(sensor, 200)
-    share = lost_samples(batches) / (batches[-1].next_sample - batches[0].first_sample)
+    lost = lost_samples(batches) - emulator.counts['skipped samples']  # what a machine that stalls leaves out
+    share = lost / (batches[-1].next_sample - batches[0].first_sample)
     # A packet has 47 bytes, so 1 − 0.999^47 = 4.6 % are hit; each may take its forerunner or successor along.
     assert 0.02 < share < 0.1
     assert sensor.counts['bogus'] > 0
