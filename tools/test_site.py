@@ -53,7 +53,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.ros
 def test_every_page_is_in_the_site_and_reached_from_the_first(site: Path) -> None:
     first = (site / 'docs' / 'index.html').read_text()
-    folders = ('.', 'robots', 'reference', 'appendix')
+    folders = ('.', 'reference', 'appendix')
     for page in [path for folder in folders for path in DOCS.glob(f'{folder}/*.md')]:
         name = page.relative_to(DOCS).with_suffix('.html')
         assert (site / 'docs' / name).exists()

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = ('README.md', 'CONTRIBUTING.md', 'docs/*.md', 'docs/appendix/*.md', 'docs/robots/*.md', 'src/*/README.md')
+PAGES = ('README.md', 'CONTRIBUTING.md', 'docs/*.md', 'docs/appendix/*.md', 'src/*/README.md')
 LEFT_OUT = re.compile(r'<!--.*?-->|^```.*?^```|^    .*?$', re.DOTALL | re.MULTILINE)
 
 
