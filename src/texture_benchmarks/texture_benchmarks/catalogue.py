@@ -20,6 +20,7 @@ from texture_benchmarks import (
     motion,
     next_motion,
     overview,
+    papers,
     peers,
     places,
     recipes,
@@ -43,6 +44,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'borders': borders.run,  # at another place, on another day, with another finger
     'places': places.run,  # trained at six places against six slides of one track, simulated samples that vary
     'finger_check': finger_check.run,  # another finger and another day, before and after `texture check`
+    'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'roughness': latency.run_roughness,  # from window to grade

@@ -42,10 +42,11 @@ PAIRS = {
         'ets-linear-ann-vote',
         'ets-linear-svm-pairs',
         'ets-linear-ann-pairs',
+        'ets-linear-svm-pairs-vote',
     ),
     'ets-linear-headings': ('ets-linear-svm', 'ets-linear-ann'),
     'ets-circular': ('ets-circular-svm', 'ets-circular-ann'),
-    'ets-ten-textures': ('ets-fine-svm', 'ets-fine-ann'),
+    'ets-ten-textures': ('ets-fine-svm', 'ets-fine-ann', 'ets-fine-svm-pairs'),
     'ets-roughness': (
         'ets-roughness-ann1',
         'ets-roughness-ann5',

@@ -133,7 +133,7 @@ class EvidenceAccumulator:
         self._trusted_ns = 0.0
         self._message = '' if self.model else NO_MODEL
         self._evidence = GroupedEvidence(
-            self.model.n_trained if self.model else 0, self.model.recipe.evidence.group if self.model else 0
+            self.model.n_predicted if self.model else 0, self.model.recipe.evidence.group if self.model else 0
         )
         self._moments = SlideMoments(len(self.model.names)) if self.model and self.model.added_slides else None
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)

@@ -126,8 +126,23 @@ class TextureModel:
 
     @cached_property
     def predictor(self) -> Predictor:
-        """Predictor of the trained textures."""
-        return self.recipe.learner.predictor(self.parameters)
+        """Predictor of the trained textures; of all textures, with what was added, if the learner learns online."""
+        learner, parameters = self.recipe.learner, self.parameters
+        if self.learns_online:
+            for added in self.added_slides:
+                code = self.labels.index(added.label)
+                parameters = learner.partial_fit(parameters, added.values, code)  # type: ignore[attr-defined]
+        return learner.predictor(parameters)
+
+    @property
+    def learns_online(self) -> bool:
+        """Whether added slides update the learner itself; otherwise Gaussians of whole slides tell them."""
+        return hasattr(self.recipe.learner, 'partial_fit')
+
+    @property
+    def n_predicted(self) -> int:
+        """Number of textures that the predictor tells."""
+        return len(self.labels) if self.learns_online else self.n_trained
 
     @cached_property
     def active_novelty_detector(self) -> NoveltyDetector | None:
@@ -261,6 +276,8 @@ class TextureModel:
         """
         trained = self.trained_labels
         labels = (*trained, *dict.fromkeys(slide.label for slide in added_slides if slide.label not in trained))
+        if self.learns_online and self.examples is not None:
+            return replace(self, labels=labels, added_slides=added_slides)
         gaussians = self.slide_gaussians or self._fit_slide_gaussians()
         if added_slides:
             codes = np.array([labels.index(slide.label) for slide in added_slides])

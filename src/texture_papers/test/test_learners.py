@@ -12,6 +12,9 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import FeatureVector
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.model import load_model
 from texture_estimation.numerics import is_tied
@@ -353,3 +356,30 @@ def test_two_directions_have_components_of_their_own_and_odd_features_are_refuse
     assert not ((components[:3] != 0).any(axis=0) & (components[3:] != 0).any(axis=0)).any()
     with pytest.raises(InvalidParameter, match="'blocks' of svm_max_wins is 4"):
         SvmMaxWins(blocks=4).fit(examples.values, codes, groups)
+
+
+def test_one_added_slide_moves_the_planes_themselves_and_is_taken_back(make_examples):
+    examples = make_examples(labels=('cork', 'felt', 'slate'))
+    learner = {'texture_papers.kaboli:PassiveAggressive': {'multiclass': 'crammer_singer', 'passes': 20}}
+    model = train(
+        Recipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner}, 'online'), examples
+    )
+    wood = make_examples(seed=2)
+    rows = wood.values[wood.labels == 'wood']
+    online = IncrementalClassifier(model)
+    for number, values in enumerate(np.split(rows, 4)):  # four slides
+        for row in values:
+            online.observe(FeatureVector(0, f'{number}', 0.5, 0.25, model.names, row, feature_set=model.feature_set))
+        online.add('wood', f'{number}')
+    planes = CrammerSingerClassifier(np.vstack((model.parameters['planes'], np.zeros(7))))
+    for row in rows:
+        planes.update((row - model.parameters['mean']) / model.parameters['scale'], 3)
+    np.testing.assert_allclose(online.model.predictor.planes, planes.planes, atol=1e-12)
+    assert np.mean(np.array(online.model.decide(rows)) == 'wood') > 0.9
+    estimate = EvidenceAccumulator(online.model)
+    vector = FeatureVector(0, 'new', 0.5, 0.25, model.names, rows[0], feature_set=model.feature_set)
+    assert estimate.update(vector).labels == ('cork', 'felt', 'slate', 'wood')
+    online.remove('wood')
+    np.testing.assert_array_equal(
+        online.model.predict_log_proba(examples.values), model.predict_log_proba(examples.values)
+    )

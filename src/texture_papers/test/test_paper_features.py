@@ -6,10 +6,12 @@ import pytest
 from scipy import signal as scipy_signal
 from scipy import stats
 
+from texture_core.types import Window
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES, FeatureSet
 from texture_features.features.spectral import ShortTimeFourier
 from texture_features.spectra import hann, long_densities
+from texture_features.windows import CutWindow
 from texture_papers.hu import Spectrum
 from texture_papers.jamali import (
     DB4,
@@ -263,3 +265,29 @@ def test_integral_and_arc_length_have_their_closed_forms():
     ramp = np.arange(11.0)[:, None] * 3.0
     line = WindowBatch(ramp, rate_hz=0.25)  # steps of 4 s and 3 units: 5 long
     assert ArcLength()(line)[0, 0] == pytest.approx(50.0)
+
+
+def test_joined_inputs_see_both_windows_and_are_cut_from_both_topics():
+    recipe = {
+        'inputs': {
+            'finger1/signal': {'features': ['hjorth']},
+            'finger1/signal_static': {'features': ['texture_papers.kaboli:MeanHjorth']},
+            'finger1/signal+finger1/signal_static': {'features': ['texture_papers.kaboli:Correlation']},
+        }
+    }
+    feature_set = FeatureSet.from_mapping(recipe)
+    assert feature_set.topics == ('finger1/signal', 'finger1/signal_static')
+    rng = np.random.default_rng(0)
+    windows = {
+        'finger1/signal': Window(rng.normal(size=(500, 1)), 1000.0, ('pac',)),
+        'finger1/signal_static': Window(rng.normal(size=(50, 19)), 100.0, tuple(map(str, range(19)))),
+    }
+    events = [CutWindow(0, 'e', 0.5, 0.1, windows, speed_m_s=0.1)] * 2
+    vector = feature_set.extract_many(events)[1]
+    assert vector.names[-2:] == tuple(
+        f'finger1/signal+finger1/signal_static/texture_papers.kaboli:Correlation/{kind}'
+        for kind in ('pearson', 'spearman')
+    )
+    assert len(vector.names) == 8
+    np.testing.assert_array_equal(vector.values, feature_set.extract(events[0]).values)
+    assert FeatureSet.from_mapping(feature_set.as_mapping()) == feature_set

@@ -3,32 +3,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from texture_core.config import find
 from texture_papers import hu_experiment, jamali_experiment, kaboli_experiment, rispal_experiment, roberge_experiment
 from texture_papers.protocol import Experiment, ExperimentResult, Run, over_seeds
-from texture_papers.report import run
+from texture_papers.report import charts_of, digests, run
 
-PROTOCOLS = (
-    roberge_experiment.LINEAR,
-    roberge_experiment.CIRCULAR,
-    roberge_experiment.FINE,
-    jamali_experiment.PROTOCOL,
-    kaboli_experiment.PROTOCOL,
-    kaboli_experiment.SHAPES,
-    hu_experiment.PROTOCOL,
-)
+PROTOCOLS = {
+    protocol.name: protocol
+    for protocol in (
+        roberge_experiment.LINEAR,
+        roberge_experiment.CIRCULAR,
+        roberge_experiment.FINE,
+        jamali_experiment.PROTOCOL,
+        kaboli_experiment.PROTOCOL,
+        kaboli_experiment.SHAPES,
+        hu_experiment.PROTOCOL,
+    )
+}
 EXPERIMENTS: Mapping[str, Run] = {
-    **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
+    **{name: partial(run, protocol) for name, protocol in PROTOCOLS.items()},
     'friction': roberge_experiment.run_friction,  # the further question of Roberge et al.
+    'kaboli-online': kaboli_experiment.run_online,  # new objects added slide by slide: forgetting and cost
     'hu-components': hu_experiment.run_components,  # how many components one linen takes
     'roughness': rispal_experiment.run,  # Rispal et al.: grades of textures never touched
 }
+# Of each row of figures, by its name, as it is now: a stored row with another one is neither kept nor published.
+DIGESTS: Mapping[str, Callable[[], Mapping[str, str]]] = {
+    **{name: partial(digests, protocol) for name, protocol in PROTOCOLS.items()},
+    'friction': roberge_experiment.friction_digests,
+    'kaboli-online': kaboli_experiment.online_digests,
+    'hu-components': hu_experiment.component_digests,
+    'roughness': rispal_experiment.digests,
+}
 
-__all__ = ['EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment', 'run_over_seeds']
+__all__ = ['DIGESTS', 'EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment', 'run_over_seeds']
 
 
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
@@ -65,5 +78,7 @@ def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[Exper
     TextureError
         If there is no such experiment, it cannot be run, or there are fewer than two seeds.
     """
-    result = over_seeds(find(EXPERIMENTS, name, 'experiment'), name, experiment, count)
+    result = over_seeds(find(EXPERIMENTS, name, 'experiment'), name, experiment, count, DIGESTS[name]())
+    if name in PROTOCOLS:
+        result = replace(result, charts=charts_of(PROTOCOLS[name], result.numbers, name, experiment.out))
     return result, result.write(experiment.out)

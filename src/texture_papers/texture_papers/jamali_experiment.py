@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from texture_papers.protocol import (
-    OURS,
     Anchor,
     Figures,
     Finding,
@@ -17,7 +14,7 @@ from texture_papers.protocol import (
     Visits,
     folds,
 )
-from texture_papers.report import higher, more_spread, most_errors, seldom
+from texture_papers.report import built_in, higher, more_spread, most_errors, seldom
 from texture_simulation.path import SimulatedSlide
 
 TASK = 'eight surfaces'
@@ -71,16 +68,15 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     amplitudes = {reading: outcomes[TASK, name] for name, reading in READINGS.items()}
     return [
         higher('five peaks are better than three (83.5 against 78 %)', five, three),
-        *(higher(f'five peaks are better than the mean amplitude (83.5 against 65.75 %): {reading}', five, amplitude)
-          for reading, amplitude in amplitudes.items()),
-        *(higher(f'three peaks are better than the mean amplitude (78 against 65.75 %): {reading}', three, amplitude)
-          for reading, amplitude in amplitudes.items()),
-        most_errors(
+        *built_in('the press varies from run to run so much that it is so', *(
+            higher(f'{count} peaks are better than the mean amplitude ({paper:g} against 65.75 %): {reading}', one, of)
+            for count, paper, one in (('five', 83.5, five), ('three', 78, three))
+            for reading, of in amplitudes.items())),
+        *built_in('which surfaces are alike was chosen', most_errors(
             'with three peaks most errors are within a material: carpet 1 and 2, tile 1 and 2',
             three,
             [('carpet_1', 'carpet_2'), ('tile_1', 'tile_2')],
-        ),
-        seldom('vinyl 1 and 2 are hardly taken for each other (2 of 100 with three peaks)', three, VINYLS, 0.05),
+        ), seldom('vinyl 1 and 2 are hardly taken for each other (2 of 100 with three peaks)', three, VINYLS, 0.05)),
         *(more_spread(f'by amplitude, errors go to unlike materials more often: {reading}', amplitude, three, ALIKE)
           for reading, amplitude in amplitudes.items()),
     ]  # fmt: skip
@@ -101,7 +97,6 @@ PROTOCOL = PaperProtocol(
                 Method(AMPLITUDE, features={'texture_papers.jamali:MeanAmplitude': {'of': 'signal'}}, label=SIGNAL),
                 Method('jamali-amplitude-deviation'),
                 *(Method(name) for name in FUTURE),
-                replace(OURS, splits=2),
             ),
         ),
     ),

@@ -392,6 +392,30 @@ class PassiveAggressive:
             {'mean': mean, 'scale': scale, 'planes': online.planes}, None, 'not calibrated: distances from the planes'
         )
 
+    def partial_fit(self, parameters: Mapping[str, Any], X: Array, code: int) -> Mapping[str, Any]:
+        """Return the parameters after one more slide of a label, whose windows each move the planes once.
+
+        Parameters
+        ----------
+        parameters
+            As `fit` returns them; they stay as they are.
+        X : (n, n_features)
+            Features of the windows of one slide.
+        code
+            Number of the label; the next free one adds a plane. The scale stays that of the training.
+
+        Returns
+        -------
+        Mapping
+            For `predictor`.
+        """
+        known = np.asarray(parameters['planes'])
+        planes = np.vstack((known, np.zeros((max(0, code + 1 - len(known)), known.shape[1]))))
+        online = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')(planes, self.c)
+        for standard in (X - parameters['mean']) / parameters['scale']:
+            online.update(standard, code)
+        return {**parameters, 'planes': online.planes}
+
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> LinearPredictor:
         """Return the predictor made from the stored parameters."""

@@ -3,29 +3,46 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from texture_core.errors import InvalidParameter
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes
 from texture_papers.protocol import (
-    OURS,
+    ON_ALL,
     Anchor,
+    Experiment,
+    ExperimentResult,
     Figures,
     Finding,
+    Interval,
+    Mask,
     Method,
+    MethodResult,
     MethodResults,
     PaperProtocol,
     RecognitionTask,
     Table,
     View,
     Visits,
+    digest_of_row,
+    gather,
+    mean,
+    recipe_of,
+    reduced,
+    share,
     training_in,
 )
-from texture_papers.report import at_least, higher, kept_in, most_errors
+from texture_papers.report import at_least, built_in, higher, kept_in, most_errors, right_of
 from texture_simulation.path import SimulatedSlide
+from texture_simulation.scene import load_scene
 
-SLIDE_S = 2.0
-SLIDING = SimulatedSlide(0.05, 1.0, SLIDE_S)
+# Time is the paper's; speed and force are not told. 0.02 m/s is what `in_hand_sliding` and the preset `kaboli` do.
+SLIDING = SimulatedSlide(0.02, 1.0, duration_s=2.0)
 THUMB, INDEX, MIDDLE = View(finger=0), View(finger=1), View(finger=2)
 TRAINED = 'index and middle finger'
 VISITS = (Visits(TRAINED, 10, SLIDING, (INDEX, MIDDLE)), Visits('thumb and index finger', 20, SLIDING, (THUMB, INDEX)))
@@ -48,31 +65,41 @@ ALIKE = (
 SAME, DIFFERENT, ALL = TASKS = ('same shape', 'various shapes', 'all 20 objects')
 SURFACES = (ROUND, VARIOUS, ROUND + VARIOUS)
 PAPER_SVM, PAPER_EM = (0.97, 0.975, 0.96), (0.8223, 0.835, 0.8058)
-PAPER_PA = 0.87  # t = 10, on average
+PAPER_PA = 0.87  # t = 10, the average of the three sets
 SVM, PA, OVR, EM = 'kaboli-svm', 'kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em'
 # Not of the paper, whose means are those of the electrodes: temperatures and pressure of the BioTac, too.
 ALL_SLOW = {'texture_papers.kaboli:MeanHjorth': {'omit': ''}, 'texture_papers.kaboli:Correlation': {'omit': ''}}
-ROUNDS = (1, 2, 5, 10)
+ROUNDS = tuple(range(1, 11))  # section V.B: after each slide of each object
+PASSES = (5, 20, 50, 200)  # the paper names no number; online learning sees each slide once
+SETS = dict(zip(TASKS, SURFACES, strict=True))
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section V tells."""
     svm = outcomes[ALL, SVM]
     em = {task: outcomes[task, EM] for task in TASKS}
-    first, last = (outcomes[ALL, pa(t)] for t in (ROUNDS[0], ROUNDS[-1]))
+    first, last, often = (outcomes[ALL, name] for name in (pa(ROUNDS[0]), pa(ROUNDS[-1]), passes(PASSES[-1])))
     return [
         higher('online learning goes on: after ten slides of each object PA knows more than after one', last, first),
-        at_least('PA recognises 87 % after ten slides of each object', last, 0.87),
-        higher('the SVM is better than PA', svm, last),
+        _on_average('PA recognises 87 % after ten slides of each object, one pass', last),
+        _on_average(f'PA recognises 87 % after ten slides of each object, {PASSES[-1]} passes', often),
+        higher('the SVM is better than PA, one pass', svm, last),
         higher('not of the paper: planes that learn together know more than each by itself', last, outcomes[ALL, OVR]),
         *(at_least(f'clusters named by majority recognise {task}, EM ({100 * value:g} %)', em[task], value)
           for task, value in zip(TASKS, PAPER_EM, strict=True)),
-        most_errors(
-            'most errors of the SVM are between objects that the paper calls alike',
-            svm,
-            ALIKE,
-        ),
+        *built_in('which objects are alike was chosen', most_errors(
+            'most errors of the SVM are between objects that the paper calls alike', svm, ALIKE)),
     ]  # fmt: skip
+
+
+def _on_average(claim: str, outcome: MethodResult) -> Finding:
+    """Check that the mean of the three sets reaches the paper's."""
+    shares = [mean(right_of(outcome, surfaces)) for surfaces in SURFACES]
+    centre = sum(one.value for one in shares) / len(shares)
+    reach = max(one.high - one.value for one in shares)  # the sets share their slides
+    over = Interval(centre - PAPER_PA, centre - reach - PAPER_PA, centre + reach - PAPER_PA)
+    named = ', '.join(f'{task} {100 * one.value:.1f}' for task, one in zip(TASKS, shares, strict=True))
+    return Finding(claim, f'{100 * centre:.1f} % ({named})', over)
 
 
 def _table(surfaces: tuple[str, ...], errors: Mapping[tuple[str, str], int]) -> Table:
@@ -113,19 +140,28 @@ def pa(rounds: int) -> str:
     return f'{PA}, t = {rounds}'
 
 
+def passes(count: int) -> str:
+    """Return the name of learning that goes through the ten slides of each object so often."""
+    return f'{PA}, {count} passes'
+
+
+# Section V.B trains on all objects and tests the three sets.
+ONLINE = (
+    *(Method(PA, Figures(test=PAPER_PA if n == ROUNDS[-1] else None), learner={'rounds': n}, label=pa(n), sets=SETS)
+      for n in ROUNDS),
+    *(Method(PA, learner={'passes': n}, label=passes(n), sets=SETS) for n in PASSES),
+    Method(OVR),
+)  # fmt: skip
+
+
 def _methods(svm: float, em: float, table: Table | None) -> tuple[Method, ...]:
-    online = [
-        Method(PA, Figures(test=PAPER_PA if n == ROUNDS[-1] else None), learner={'rounds': n}, label=pa(n))
-        for n in ROUNDS
-    ]
+    """Return the machines and, of all slides ("the entire unsupervised data set"), the clusters."""
     return (
         Method(SVM, Figures(test=svm), confusion=table),
-        *online,
-        Method(OVR),
-        Method(EM, Figures(test=em)),
-        Method(EM, features=ALL_SLOW, label=f'{EM}, all slow channels'),
-        OURS,
-        Method('vibration-and-taxels'),
+        Method(EM, Figures(test=em), training=ON_ALL),
+        Method(EM, training=ON_ALL, learner={'clusters_per_label': 2}, label=f'{EM}, two clusters an object'),
+        Method(EM, label=f'{EM}, clusters of the training slides'),
+        Method(EM, features=ALL_SLOW, training=ON_ALL, label=f'{EM}, all slow channels'),
     )
 
 
@@ -134,7 +170,7 @@ PROTOCOL = PaperProtocol(
     scene='kaboli',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section V',
     tasks=tuple(
-        RecognitionTask(name, VISITS, _methods(svm, em, table), surfaces)
+        RecognitionTask(name, VISITS, (*_methods(svm, em, table), *(ONLINE if name == ALL else ())), surfaces)
         for name, svm, em, table, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, TABLES, SURFACES, strict=True)
     ),
     divide=training_in(TRAINED),
@@ -144,7 +180,6 @@ PROTOCOL = PaperProtocol(
         SVM,
         0.96,
         'section V.A',
-        shortfall='reached within the interval: this is the noise of a resting BioTac, and less does not help',
         parts={SAME: PAPER_SVM[0], DIFFERENT: PAPER_SVM[1]},
     ),
     findings=findings,
@@ -152,7 +187,6 @@ PROTOCOL = PaperProtocol(
 )
 
 
-SHAPE_SLIDING = SimulatedSlide(0.02, 1.0, SLIDE_S)  # as `in_hand_sliding` goes without a request: no paper tells it
 TRAINING, TEST = 10, 5  # trials of each object, for training and under each condition of the test
 OTHER_RADIUS_M = 0.015  # of all objects where their shape is another than in training
 SPREAD = 0.4  # of speed and force, of random movements
@@ -160,12 +194,12 @@ SHAPE_TRAINED, SAME_FINGERS = 'training', 'as in training'
 FINGERS, SHAPE, RANDOM, AT_ONCE = 'other finger', 'other shape', 'random movements', 'all three'
 OF_TRAINING, OF_TEST = (INDEX, MIDDLE), (THUMB, INDEX)
 SHAPE_VISITS = (
-    Visits(SHAPE_TRAINED, TRAINING, SHAPE_SLIDING, OF_TRAINING),
-    Visits(SAME_FINGERS, TEST, SHAPE_SLIDING, OF_TRAINING),
-    Visits(FINGERS, TEST, SHAPE_SLIDING, OF_TEST),
-    Visits(SHAPE, TEST, SHAPE_SLIDING, OF_TRAINING, radius_m=OTHER_RADIUS_M),
-    Visits(RANDOM, TEST, SHAPE_SLIDING, OF_TRAINING, random=SPREAD),
-    Visits(AT_ONCE, TEST, SHAPE_SLIDING, OF_TEST, radius_m=OTHER_RADIUS_M, random=SPREAD),
+    Visits(SHAPE_TRAINED, TRAINING, SLIDING, OF_TRAINING),
+    Visits(SAME_FINGERS, TEST, SLIDING, OF_TRAINING),
+    Visits(FINGERS, TEST, SLIDING, OF_TEST),
+    Visits(SHAPE, TEST, SLIDING, OF_TRAINING, radius_m=OTHER_RADIUS_M),
+    Visits(RANDOM, TEST, SLIDING, OF_TRAINING, random=SPREAD),
+    Visits(AT_ONCE, TEST, SLIDING, OF_TEST, radius_m=OTHER_RADIUS_M, random=SPREAD),
 )
 CLAIMS = {
     FINGERS: 'another finger than in training costs at most five points',
@@ -179,9 +213,14 @@ SHORT = {SVM: 'SVM', PA: 'PA', EM: 'EM'}
 def shape_findings(outcomes: MethodResults) -> list[Finding]:
     """Check the claim of section VI, for each learner of the paper."""
     return [
-        kept_in(f'{claim}, {short}', outcomes[ALL, method], condition, SAME_FINGERS)
-        for condition, claim in CLAIMS.items()
-        for method, short in SHORT.items()
+        *built_in(
+            'radii and spreads of the fingers are guesses',
+            *(
+                kept_in(f'{claim}, {short}', outcomes[ALL, method], condition, SAME_FINGERS)
+                for condition, claim in CLAIMS.items()
+                for method, short in SHORT.items()
+            ),
+        )
     ]
 
 
@@ -207,10 +246,80 @@ SHAPES = PaperProtocol(
         SVM,
         PAPER_SVM[-1],
         'section V.A',
-        setting='noise of the fast channels, not set again',
+        setting='noise of the fast channels, twice that of the experiment kaboli',
         experiment='kaboli',
     ),
     findings=shape_findings,
     quick_count=12,
     by_condition=True,
 )
+
+
+OLD, NEW = 15, 5  # objects that are trained, and those added later
+
+
+def run_online(experiment: Experiment) -> ExperimentResult:
+    """Train on 15 objects, add one slide of each of five others in turn, and test all: forgetting and cost.
+
+    Raises
+    ------
+    InvalidParameter
+        If a search is asked for.
+    """
+    if experiment.tune:
+        raise InvalidParameter("experiment 'kaboli-online' has nothing to tune; leave --tune out")
+    task = RecognitionTask(ALL, VISITS, (), ROUND + VARIOUS)
+    slides = gather(load_scene('kaboli'), reduced(task, 40) if experiment.quick else task, experiment.seed, slow=True)
+    recipe = recipe_of(Method(PA, learner={'passes': PASSES[-1]}))
+    learner: Any = recipe.learner
+    X, owner = slides.extract(recipe.feature_set)
+    trained = (slides.conditions == TRAINED)[owner]
+    order = np.random.default_rng(experiment.seed).permutation(OLD + NEW)  # which objects are new differs by seed
+    y = np.argsort(order)[slides.codes[owner]]
+    old = trained & (y < OLD)
+    parameters = learner.fit(X[old], y[old], owner[old]).parameters
+    rows = [np.flatnonzero(trained & (y == code)) for code in range(OLD, OLD + NEW)]
+    figures, taken_s = {'none': _right(learner, parameters, X, y, ~trained)}, []
+    for given in range(min(map(len, rows))):
+        for row in (own[given] for own in rows):
+            began = time.perf_counter()
+            parameters = learner.partial_fit(parameters, X[[row]], int(y[row]))
+            taken_s.append(time.perf_counter() - began)
+        figures[f'{given + 1} of each'] = last = _right(learner, parameters, X, y, ~trained)
+    again = learner.fit(X[trained], y[trained], owner[trained]).parameters
+    figures['trained again with all'] = _right(learner, again, X, y, ~trained)
+    tasks = {
+        kind: {given: {'test': right[kind].as_json()} for given, right in figures.items() if kind in right}
+        for kind in last
+    }
+    lost = figures['none']['old objects'].value - last['old objects'].value
+    return ExperimentResult(
+        name='kaboli-online',
+        measured='test slides recognised after slides of five new objects, one pass each; 95 % over slides',
+        data=f"simulated: scene 'kaboli'; {OLD} objects trained, 10 slides of each, {PASSES[-1]} passes",
+        split='training: 10 slides with index and middle finger; test: 20 with thumb and index finger',
+        numbers={
+            'seed': experiment.seed,
+            'digests': online_digests(),
+            'tasks': tasks,
+            'forgotten': round(lost, 4),
+            'update_us': round(1e6 * float(np.median(taken_s)), 1),
+            'findings': [],
+        },
+        lines=tuple(
+            f'{kind}: {name}: {100 * one["test"][0]:.1f} %' for kind, of in tasks.items() for name, one in of.items()
+        ),
+    )
+
+
+def _right(learner: Any, parameters: Mapping[str, Any], X: Array, y: Codes, tested: Mask) -> dict[str, Interval]:
+    right = (learner.predictor(parameters)(X).argmax(axis=1) == y).astype(np.float64)
+    known = len(parameters['planes'])
+    kinds = {'old objects': tested & (y < OLD), 'new objects': tested & (y >= OLD)}
+    return {kind: share(right[rows]) for kind, rows in kinds.items() if known > OLD or kind == 'old objects'}
+
+
+def online_digests() -> dict[str, str]:
+    """Return the digest of the experiment as it is now."""
+    recipe, task = recipe_of(Method(PA, learner={'passes': PASSES[-1]})), RecognitionTask(ALL, VISITS, ())
+    return {'online': digest_of_row(recipe, load_scene('kaboli'), task, OLD, NEW)}

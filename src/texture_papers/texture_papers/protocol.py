@@ -13,7 +13,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold,
 from texture_core.config import find
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_core.types import AnyArray, Array, Samples
-from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_recipe
 from texture_estimation.search import (
@@ -319,6 +319,9 @@ class Figures:
     unclassified: float | None = None  # of the test slides
 
 
+BY_SPLIT, BY_WINDOW, ON_ALL = 'slides of the split', 'half of the windows', 'all slides'
+
+
 @dataclass(frozen=True)
 class Method:
     """A recipe on trial.
@@ -333,15 +336,16 @@ class Method:
         Parameters of the learner that a variation changes; what has no label of its own is the released recipe.
     features
         Parameters of features, by the feature's name, that it changes.
-    stretch_to_m_s, also
-        Speed to which the vibration is stretched, and features of it beside those of the recipe.
     label
         Name in the table; '' for that of the recipe.
     views
         Which views of a slide it is given; () for all.
-    singly
-        Whether the windows are assigned for training one by one, half of them, instead of slide by slide: all slides
-        are then tested though parts of each are in the training set: data leakage on purpose, to measure its effect.
+    training
+        What is trained on: the slides of the split, or half of all windows, whatever their slide (data leakage on
+        purpose, to measure its effect), or all slides, for learners that see no labels. Of the last two, all slides
+        are tested.
+    sets
+        Sets of surfaces for which the fraction recognised is reported apart, by name.
     splits
         It is tried on so many of the splits; 0 for all.
     confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)
@@ -352,11 +356,10 @@ class Method:
     paper: Figures = Figures()
     learner: Mapping[str, Any] = field(default_factory=dict)
     features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    stretch_to_m_s: float = 0.0
-    also: tuple[str, ...] = ()
     label: str = ''
     views: tuple[int, ...] = ()
-    singly: bool = False
+    training: str = BY_SPLIT
+    sets: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     splits: int = 0
     confusion: Table | None = None
 
@@ -366,9 +369,7 @@ class Method:
         return self.label or self.recipe
 
 
-# Decisions do not depend on the calibration, which takes most of the time: two parts will do.
-OURS = Method('default', learner={'folds': 2})
-FEW = 5  # splits: enough for a method that stands beside the paper's, where it takes long
+FEW = 2  # splits: enough for a variation that is shown next to the paper's method, where it takes long
 
 
 @dataclass(frozen=True)
@@ -405,17 +406,22 @@ class Finding:
         What was measured here, in words and numbers.
     interval
         What decides, with 95 %.
-    holds
-        None if the interval does not decide.
-    reaches
-        Whether the claim is that a figure is reached: it holds where the interval does not lie below 0 as a whole.
+    built_in
+        Which choice of the scene makes it so, in a few words; '' where the scene was not made for it.
+    by_texture
+        What decides, texture by texture, where textures and not slides are the draws.
     """
 
     claim: str
     here: str
     interval: Interval
-    holds: bool | None
-    reaches: bool = False
+    built_in: str = ''
+    by_texture: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether the claim holds; None if the interval does not decide."""
+        return self.interval.above()
 
 
 MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what came out
@@ -548,9 +554,9 @@ class Experiment:
     tune
         Search the parameters first, as the paper does; refused where the paper has no search.
     splits
-        Try each method on at most so many of the splits; 0 for all.
-    papers_only
-        Leave our own recipes out.
+        Try each method on at most so many of the splits, and measure nothing but the paper's table; 0 for all.
+    search
+        Size of the search; None for the paper's.
     """
 
     out: Path
@@ -558,7 +564,7 @@ class Experiment:
     quick: bool = False
     tune: bool = False
     splits: int = 0
-    papers_only: bool = False
+    search: SearchParams | None = None
 
 
 @dataclass(frozen=True)
@@ -615,7 +621,48 @@ def digest_of(recipe: str) -> str:
     except UnknownName:
         definition = load_roughness_recipe(recipe).as_mapping()
     text = OWN_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
-    return hashlib.sha256(json.dumps(json.loads(text), sort_keys=True).encode()).hexdigest()[:8]
+    return _letters(json.loads(text))
+
+
+def digest_of_row(recipe: Any, scene: Scene, task: RecognitionTask, *settings: Any) -> str:
+    """Return eight letters of all that decides a row of figures, but for the seed.
+
+    The recipe as it is run, the motions and their number, the settings, and what the simulator makes of one slide of
+    each kind over each surface: this changes with the scene, with the sensor's model and with the simulation.
+
+    Parameters
+    ----------
+    recipe
+        With the overrides of the method.
+    scene
+        What is touched.
+    task
+        How.
+    settings
+        What else decides, such as the split.
+    """
+    definition = _decisive(recipe.as_mapping())
+    return _letters([definition, [asdict(visits) for visits in task.visits], _probed(scene, task), settings])
+
+
+def _letters(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:8]
+
+
+PROBES: dict[Any, list[str]] = {}
+
+
+def _probed(scene: Scene, task: RecognitionTask) -> list[str]:
+    """Return strength and roughness of the signals of one slide of each kind over each surface, to three digits."""
+    key = repr((scene, task.visits, task.surfaces))
+    if key not in PROBES:
+        few = replace(task, visits=tuple(replace(visits, count=1) for visits in task.visits))
+        streams = [stream for view in gather(scene, few, 0, slow=False).views for stream in view.streams.values()]
+        levels = [
+            level for one in streams for level in (one.samples.std(axis=1), np.diff(one.samples, axis=1).std(axis=1))
+        ]
+        PROBES[key] = [f'{value:.3g}' for level in levels for value in np.ravel(level.mean(axis=-1))]
+    return PROBES[key]
 
 
 def _short_name(found: re.Match[str]) -> str:
@@ -694,7 +741,7 @@ class TunedRecipe:
 
 
 def tune(
-    space: RecipeSpace, scans: SlideArrays, task: ClassificationTask | RoughnessTask, seed: int, *, quick: bool
+    space: RecipeSpace, scans: SlideArrays, task: ClassificationTask | RoughnessTask, params: SearchParams
 ) -> TunedRecipe:
     """Return the best recipe of a space on these scans, and what it took to find it.
 
@@ -706,19 +753,16 @@ def tune(
         Slides that the search may use.
     task
         Classification or roughness.
-    seed
-        Seed of the search.
-    quick
-        Whether a short search will do.
+    params
+        Size and seed of the search.
 
     Returns
     -------
     TunedRecipe
     """
-    params = replace(QUICK if quick else FULL, seed=seed)
     began, cpu_began = time.perf_counter(), time.process_time()
     with workers():
-        found = optimise(space, SearchSlides(scans, params.halves, seed), params, task)
+        found = optimise(space, SearchSlides(scans, params.halves, params.seed), params, task)
     return TunedRecipe(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))
 
 
@@ -782,6 +826,13 @@ class Slides:
         chosen = [self._along_axes] if joins else [self.views[n] for n in views or range(len(self.views))]
         values = np.concatenate([view(feature_set.windows).values(feature_set) for view in chosen], axis=1)
         return values, self.views[0](feature_set.windows).slides
+
+    def names(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[str, ...]:
+        """Return the names of what `extract` returns, (n_features,)."""
+        joins = feature_set.window_names != feature_set.topics
+        streams = (self._along_axes if joins else self.views[0]).streams
+        layout = tuple((streams[name].rate_hz, streams[name].channels) for name in feature_set.window_names)
+        return feature_set.names(layout) * (1 if joins else len(views or self.views))
 
 
 def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Slides:
@@ -865,8 +916,7 @@ def _shaped(scene: Scene, surface: str, radius_m: float) -> Scene:
     return replace(scene, surfaces={**scene.surfaces, surface: curved})
 
 
-FAST, SLOW = 'signal', 'signal_static'
-OUR_RECIPES = ('default', 'vibration-and-taxels')
+SLOW = 'signal_static'
 TunedRecipes = Mapping[tuple[str, str], TunedRecipe]  # by task and recipe
 NONE: TunedRecipes = {}
 
@@ -901,15 +951,6 @@ def outcomes(
         for task in protocol.tasks
         for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned, splits=splits)
     }
-
-
-def without_ours(protocol: PaperProtocol) -> PaperProtocol:
-    """Return the protocol with the methods of the paper and their variations alone."""
-    tasks = [
-        replace(task, methods=tuple(method for method in task.methods if method.recipe not in OUR_RECIPES))
-        for task in protocol.tasks
-    ]
-    return replace(protocol, tasks=tuple(tasks))
 
 
 def of_task(
@@ -954,10 +995,10 @@ def of_task(
         found = tuned.get((task.name, method.recipe))
         recipe = found.recipe if found else recipe_of(method)
         most = 1 if found else min(filter(None, (method.splits, splits)), default=len(trained_on))
-        yield method.name, evaluate_method(recipe, slides, trained_on[:most], method.views, singly=method.singly)
+        yield method.name, evaluate_method(recipe, slides, trained_on[:most], method.views, training=method.training)
 
 
-def searched(protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
+def searched(protocol: PaperProtocol, scene: Scene, params: SearchParams, *, quick: bool) -> TunedRecipes:
     """Return the recipes for which the paper has a genetic search, found on what the first split is trained on.
 
     Parameters
@@ -966,10 +1007,10 @@ def searched(protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool) -
         Methods and tasks of the paper.
     scene
         Surfaces, sensor and effects.
-    seed
-        Of everything random.
+    params
+        Size and seed of the search.
     quick
-        Whether a short search will do.
+        Whether fewer slides will do.
 
     Returns
     -------
@@ -992,9 +1033,9 @@ def searched(protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool) -
         )
     found = {}
     for key, (task, method) in methods.items():
-        slides, trained_on = _gathered(protocol, task, scene, seed, quick=quick)
+        slides, trained_on = _gathered(protocol, task, scene, params.seed, quick=quick)
         space = RecipeSpace.load(str(space_for('recipes', method.recipe)), recipe_of(method))
-        found[key] = tune(space, slides.views[0].of(trained_on[0]), ClassificationTask(), seed, quick=quick)
+        found[key] = tune(space, slides.views[0].of(trained_on[0]), ClassificationTask(), params)
     return found
 
 
@@ -1011,8 +1052,6 @@ def _gathered(
 def recipe_of(method: Method) -> Recipe:
     """Return the recipe as the protocol asks for it."""
     recipe = load_recipe(method.recipe)
-    if method.stretch_to_m_s or method.also:
-        recipe = _with_motion(recipe, method)
     inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
     learner: Any = recipe.learner
     return replace(
@@ -1020,14 +1059,6 @@ def recipe_of(method: Method) -> Recipe:
         feature_set=replace(recipe.feature_set, inputs=inputs, _layouts={}),
         learner=replace(learner, **method.learner),
     )
-
-
-def _with_motion(recipe: Recipe, method: Method) -> Recipe:
-    content = recipe.as_mapping()
-    vibration = content['inputs'][FAST]
-    features = [*vibration['features'], *method.also]
-    content['inputs'][FAST] = {'stretch_to_m_s': method.stretch_to_m_s, 'features': features}
-    return Recipe.from_mapping(content, recipe.name)
 
 
 def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
@@ -1048,7 +1079,7 @@ def evaluate_method(
     trained_on: Mask,
     views: Sequence[int] = (),
     *,
-    singly: bool = False,
+    training: str = BY_SPLIT,
     beside: Array | None = None,
 ) -> MethodResult:
     """Learn from the slides of each split and evaluate all.
@@ -1063,7 +1094,7 @@ def evaluate_method(
         Which are used for training.
     views
         Which views of the slides are used; () for all.
-    singly
+    training
         See `Method`.
     beside : (n_slides, n_values) or None
         Values of each slide that its windows have beside the features.
@@ -1078,16 +1109,21 @@ def evaluate_method(
     asked, slide = slides.extract(recipe.feature_set, views)
     if beside is not None:
         trained, asked = np.hstack((trained, beside[owner])), np.hstack((asked, beside[slide]))
+    learner = of_examples(recipe.learner, slides.names(to_learn, views), slides.surfaces)
     windows = recipe.feature_set.windows
-    decided = np.empty(trained_on.shape, dtype=np.intp)
-    rows_of = _halves_of_windows(owner, len(trained_on)) if singly else trained_on[:, owner]
+    rows_of = trained_on[:, owner]
+    if training == BY_WINDOW:
+        rows_of = _halves_of_windows(owner, len(trained_on))
+    elif training == ON_ALL:
+        rows_of = np.ones((1, len(owner)), dtype=bool)
+    decided = np.empty((len(rows_of), len(slides.codes)), dtype=np.intp)
     began = time.perf_counter()
     for number, rows in enumerate(rows_of):
-        fitted = recipe.learner.fit(trained[rows], slides.codes[owner[rows]], owner[rows])
-        scores = recipe.learner.predictor(fitted.parameters)(asked)
+        fitted = learner.fit(trained[rows], slides.codes[owner[rows]], owner[rows])
+        scores = learner.predictor(fitted.parameters)(asked)
         decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
-    taken_s = (time.perf_counter() - began) / len(trained_on)
-    known = np.zeros_like(trained_on) if singly else trained_on
+    taken_s = (time.perf_counter() - began) / len(rows_of)
+    known = trained_on if training == BY_SPLIT else np.zeros(decided.shape, dtype=bool)
     return MethodResult(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
 
 
@@ -1108,12 +1144,11 @@ VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 SEED_SPLITS = 2  # of a further seed: what differs between seeds are the slides
 
 
-def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> ExperimentResult:
+def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests: Mapping[str, str]) -> ExperimentResult:
     """Run an experiment with so many seeds, and add means and intervals over them to the result of the first.
 
-    The first seed is run as the experiment asks, and written. Each further one is run on at most two splits, without
-    our own recipes, and kept in the folder `seeds`. What is there already, with the recipes as they are now, is not run
-    again.
+    The first seed is run as the experiment asks, and written. Each further one is run on at most two splits and kept
+    in the folder `seeds`. What is there already, with the digests of now, is not run again.
 
     Parameters
     ----------
@@ -1125,6 +1160,8 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> Exper
         First seed, folder and options.
     count
         Number of seeds, at least 2.
+    digests
+        Of all rows, as they are now.
 
     Returns
     -------
@@ -1138,20 +1175,20 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> Exper
     """
     if count < 2:
         raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')
-    first = _first(run, name, experiment)
-    further = replace(experiment, splits=SEED_SPLITS, papers_only=True, tune=False)
-    others = [_kept(run, name, replace(further, seed=experiment.seed + number)) for number in range(1, count)]
+    first = _first(run, name, experiment, digests)
+    further = replace(experiment, splits=SEED_SPLITS)
+    others = [_kept(run, name, replace(further, seed=experiment.seed + number), digests) for number in range(1, count)]
     numbers = with_seeds(first.numbers, others)
     return replace(first, numbers=numbers, lines=(*first.lines, *seed_lines(numbers)))
 
 
-def _first(run: Run, name: str, experiment: Experiment) -> ExperimentResult:
+def _first(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> ExperimentResult:
     """Return the result of the first seed, as it was written if it was."""
     path = experiment.out / f'{name}.json'
     if path.is_file() and not experiment.quick and not experiment.tune:
         content = json.loads(path.read_text(encoding='utf-8'))
         numbers = content['numbers']
-        if numbers.get('seed') == experiment.seed and is_current(numbers):
+        if numbers.get('seed') == experiment.seed and numbers.get('digests') == digests:
             texts = {key: content[key] for key in ('name', 'measured', 'data', 'split')}
             return ExperimentResult(**texts, numbers=numbers, charts=tuple(map(Path, content['charts'])))
     result = run(experiment)
@@ -1159,18 +1196,13 @@ def _first(run: Run, name: str, experiment: Experiment) -> ExperimentResult:
     return result
 
 
-def is_current(numbers: Mapping[str, Any]) -> bool:
-    """Return whether numbers are those of the recipes as they are defined now."""
-    recipes = numbers.get('recipes', {})
-    return bool(recipes) and all(digest_of(recipe) == stored for recipe, stored in recipes.items())
-
-
-def _kept(run: Run, name: str, experiment: Experiment) -> Mapping[str, Any]:
+def _kept(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> Mapping[str, Any]:
     """Return the numbers of one further seed, from the folder if they are there."""
-    path = experiment.out / 'seeds' / f'{name}-{experiment.seed}{"-reduced" if experiment.quick else ""}.json'
+    kind = f'{"-tuned" if experiment.tune else ""}-{experiment.seed}{"-reduced" if experiment.quick else ""}'
+    path = experiment.out / 'seeds' / f'{name}{kind}.json'
     if path.is_file():
         numbers: Mapping[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        if is_current(numbers):
+        if numbers.get('digests') == digests:
             return numbers
     with tempfile.TemporaryDirectory() as folder:
         numbers = run(replace(experiment, out=Path(folder))).numbers
@@ -1188,40 +1220,35 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
         for method, figures in methods.items():
             found = [run['tasks'][task][method]['test'][0] for run in runs if method in run['tasks'][task]]
             _add(figures, found)
-            for name, part in figures.get('conditions', {}).items():
-                same = [run['tasks'][task].get(method, {}).get('conditions', {}).get(name) for run in runs]
-                _add(part, [one['test'][0] for one in same if one])
+            for kind in ('conditions', 'sets'):
+                for name, part in figures.get(kind, {}).items():
+                    same = [run['tasks'][task].get(method, {}).get(kind, {}).get(name) for run in runs]
+                    _add(part, [one['test'][0] for one in same if one])
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
-            found = [
-                run['regressors'][regressor][part]['error']
-                for run in runs
-                if part in run['regressors'].get(regressor, {})
-            ]
-            _add(figures, found)
+            same = [run['regressors'][regressor][part] for run in runs if part in run['regressors'].get(regressor, {})]
+            _add(figures, [one['error'] for one in same])
+            if len(same) > 1:
+                figures['means'] = {
+                    key: mean_over_seeds([one[key] for one in same]).as_json() for key in ('error_none_as_0', 'std')
+                }
+            errors = [float(np.mean([one['by_texture'][name] for one in same if name in one['by_texture']]))
+                      for name in figures['by_texture']]  # fmt: skip
+            figures['over_textures'] = mean_over_seeds(errors).as_json()
     for finding in numbers['findings']:
         same = [one for run in runs for one in run['findings'] if one['claim'] == finding['claim']]
         _add(finding, [one['interval'][0] for one in same])
+        if finding.get('by_texture') and len(same) > 1:  # seeds are other slides over the same few textures
+            names = [name for name in finding['by_texture'] if all(name in one['by_texture'] for one in same)]
+            means = [float(np.mean([one['by_texture'][name] for one in same])) for name in names]
+            finding['over_seeds'] = mean_over_seeds(means).as_json()
         if 'over_seeds' in finding:
-            finding['verdict'] = VERDICTS[verdict(Interval(*finding['over_seeds']), reaches=finding['reaches'])]
+            finding['verdict'] = VERDICTS[Interval(*finding['over_seeds']).above()]
     return numbers
 
 
-def verdict(interval: Interval, *, reaches: bool) -> bool | None:
-    """Return whether a claim holds; None if the interval does not decide.
-
-    Parameters
-    ----------
-    interval
-        Of what decides.
-    reaches
-        Whether the claim is that a figure is reached; else it is that the interval lies above 0.
-    """
-    return interval.high >= 0.0 if reaches else interval.above()
-
-
 def mean_over_seeds(values: Sequence[float]) -> Interval:
-    """Return the mean of one figure of each seed, and the interval of the mean by Student's t, 95 %."""
+    """Return the mean of one figure of each seed or texture, and its interval by Student's t, 95 %."""
     array = np.asarray(values, dtype=np.float64)
     centre, n = float(array.mean()), len(array)
     reach = float(t.ppf(0.5 + LEVEL / 2.0, n - 1) * array.std(ddof=1) / np.sqrt(n))

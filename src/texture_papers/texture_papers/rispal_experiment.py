@@ -27,12 +27,25 @@ from texture_estimation.roughness import (
     read_grades,
     train_grades,
 )
-from texture_estimation.search import ArrayStream, RecipeSpace, RoughnessTask, SlideArrays
+from texture_estimation.search import ArrayStream, RecipeSpace, RoughnessTask, SearchParams, SlideArrays
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow
-from texture_papers.protocol import Experiment, ExperimentResult, Finding, TunedRecipe, digest_of, mean, tune
+from texture_papers.protocol import (
+    FULL,
+    QUICK,
+    Experiment,
+    ExperimentResult,
+    Finding,
+    RecognitionTask,
+    TunedRecipe,
+    Visits,
+    digest_of_row,
+    mean,
+    mean_over_seeds,
+    tune,
+)
 from texture_papers.report import finding_as_json
 from texture_simulation.effects import Skids
 from texture_simulation.offline import simulate_slides
@@ -73,6 +86,7 @@ class Answers:
             # the paper writes 0 for no grade, and does not say whether it counts
             'error_none_as_0': float(np.where(given, errors, self.true).mean()),
             'coverage_90': float(within[given].mean()) if given.any() else None,
+            'by_texture': {name: round(error, 4) for name, error in self.error_by_texture().items()},
         }
 
     def by_texture(self) -> dict[str, dict[str, float]]:
@@ -273,9 +287,7 @@ class TunedRegressor(TunedRecipe):
         return {**figures, **errors}
 
 
-def tune_regressor(
-    recipe: RoughnessRecipe, scans: SlideArrays, grades: Grades, seed: int, *, quick: bool
-) -> TunedRegressor:
+def tune_regressor(recipe: RoughnessRecipe, scans: SlideArrays, grades: Grades, params: SearchParams) -> TunedRegressor:
     """Return the best recipe of the search space that is named like this one.
 
     As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
@@ -288,16 +300,14 @@ def tune_regressor(
         Slides that the search may use.
     grades
         Grade of each texture.
-    seed
-        Seed of the search.
-    quick
-        Whether a short search will do.
+    params
+        Size and seed of the search.
 
     Returns
     -------
     TunedRegressor
     """
-    found = tune(RecipeSpace.load(recipe.name, recipe), scans, RoughnessTask(grades), seed, quick=quick)
+    found = tune(RecipeSpace.load(recipe.name, recipe), scans, RoughnessTask(grades), params)
     return TunedRegressor(found.found, found.seconds, found.cpu_seconds, found.scans)
 
 
@@ -515,9 +525,9 @@ def run(experiment: Experiment) -> ExperimentResult:
     setup = _setup(experiment)
     recipes = {name: load_roughness_recipe(recipe) for name, recipe in RECIPES.items()}
     train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
-    tuned = _tuned(setup, recipes, experiment) if experiment.tune else {}
-    recipes |= {name: one.recipe for name, one in tuned.items()}
-    if experiment.papers_only:
+    if experiment.tune:
+        return _after_search(setup, {name: recipes[name] for name in PAPER}, experiment)
+    if experiment.splits:
         return _table_2(setup, {name: recipe for name, recipe in recipes.items() if recipe.name != OURS})
     models = {name: train_grades(one, setup.examples(one, train), setup.grades, name) for name, one in recipes.items()}
     answers = {
@@ -530,7 +540,7 @@ def run(experiment: Experiment) -> ExperimentResult:
     }
     numbers: dict[str, Any] = {
         'seed': experiment.seed,
-        'recipes': {recipe: digest_of(recipe) for recipe in RECIPES.values()},
+        'digests': digests(),
         'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
         'one_person': ONE_PERSON,
         'targets': TARGETS,
@@ -543,7 +553,6 @@ def run(experiment: Experiment) -> ExperimentResult:
         'skids': _skids(setup, models['ours'], test),
         'ours_other_splits': _other_splits(setup, recipes['ours']),
         'window_to_grade_us': _latency(setup, models['ours'], test[0], QUICK_TIMED if experiment.quick else TIMED),
-        'tuning': {name: one.figures() for name, one in tuned.items()},
         'findings': [finding_as_json(finding) for finding in findings(answers)],
         'by_texture': {name: _by_texture(parts) for name, parts in answers.items()},
         'ours_left_out_by_texture': answers['ours']['left_out'].by_texture(),
@@ -581,7 +590,7 @@ def _table_2(setup: Setup, recipes: Mapping[str, RoughnessRecipe]) -> Experiment
         split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
         numbers={
             'seed': setup.seed,
-            'recipes': {recipe: digest_of(recipe) for name, recipe in RECIPES.items() if name in recipes},
+            'digests': digests(),
             'regressors': {
                 name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
             },
@@ -590,11 +599,21 @@ def _table_2(setup: Setup, recipes: Mapping[str, RoughnessRecipe]) -> Experiment
     )
 
 
-def findings(answers: Mapping[str, Mapping[str, Answers]]) -> list[Finding]:
+def digests() -> dict[str, str]:
+    """Return the digest of each regressor's rows as they are now."""
+    sliding = SimulatedSlide(SPEED_M_S, FORCE_N, SCAN_S)
+    scene, task = load_scene(SCENE), RecognitionTask('grades', (Visits('', SCANS, sliding),), ())
+    grades = read_grades(GRADES).grades
+    return {
+        name: digest_of_row(load_roughness_recipe(one), scene, task, USED_S, grades) for name, one in RECIPES.items()
+    }
+
+
+def findings(answers: Mapping[str, Mapping[str, Answers]], *, after_search: bool = False) -> list[Finding]:
     """Check what Table II tells, with a hidden layer as in the text and with a sigmoid one."""
     return [
         finding
-        for suffix in ('', ', sigmoid')
+        for suffix in (('',) if after_search else ('', ', sigmoid'))
         for ann1, ann5 in [(answers[f'ANN1{suffix}'], answers[f'ANN5{suffix}'])]
         for claim, rival, part in (
             ('five networks know trained textures better than one (0.24 to 0.65)', ann1, 'seen'),
@@ -609,9 +628,10 @@ def _better(claim: str, first: Mapping[str, Answers], second: Mapping[str, Answe
     """Check that the error of one is smaller, texture by texture: windows of one texture are one opinion."""
     errors = [one[part].error_by_texture() for one in (first, second)]
     both = [name for name in errors[0] if name in errors[1]]
-    gain = mean(np.array([errors[1][name] - errors[0][name] for name in both]))
+    gains = {name: round(errors[1][name] - errors[0][name], 4) for name in both}
+    gain = mean_over_seeds(list(gains.values())) if len(both) > 1 else mean(np.array([*gains.values()]))
     here = ' against '.join(f'{one[part].figures()["error"]:.2f}' for one in (first, second))
-    return Finding(claim, f'{here} grades, {len(both)} textures', gain, gain.above())
+    return Finding(claim, f'{here} grades, {len(both)} textures', gain, by_texture=gains)
 
 
 def _by_texture(parts: Mapping[str, Answers]) -> dict[str, dict[str, float]]:
@@ -631,16 +651,46 @@ def _setup(experiment: Experiment) -> Setup:
     )
 
 
-def _tuned(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment) -> dict[str, TunedRegressor]:
-    """Return the paper's regressors after its search, and write their recipes; ours has no search."""
-    scans = setup.simulated.scans(setup.grades.used_for(TRAIN), setup.scans, SPEED_M_S, FORCE_N)
-    tuned = {
-        name: tune_regressor(recipes[name], scans, setup.grades, experiment.seed, quick=experiment.quick)
-        for name in PAPER
-    }
+SEARCHED_SCANS = 40  # of each texture, of the 200, for a search
+
+
+def _after_search(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment) -> ExperimentResult:
+    """Search the variables of the paper's regressors on its 15 textures, then grade the ten unseen ones.
+
+    The recipes that were found are written next to the result.
+    """
+    train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
+    params = replace(experiment.search or (QUICK if setup.quick else FULL), seed=setup.seed)
+    scans = setup.simulated.scans(train, min(SEARCHED_SCANS, setup.scans), SPEED_M_S, FORCE_N)
+    tuned = {name: tune_regressor(recipe, scans, setup.grades, params) for name, recipe in recipes.items()}
+    answers = {}
     for name, one in tuned.items():
-        one.write(experiment.out / f'{RECIPES[name]}.yaml')
-    return tuned
+        one.write(experiment.out / f'{RECIPES[name]}-tuned.yaml')
+        model = train_grades(_quickly(one.recipe, setup), setup.examples(one.recipe, train), setup.grades, name)
+        parts = {'seen': train, 'unseen': test}
+        answers[name] = {part: setup.ask(model, setup.examples(one.recipe, of)) for part, of in parts.items()}
+    size = f'{params.population} individuals, {params.generations} generations, {params.search_halves} halves'
+    own = digests()
+    return ExperimentResult(
+        name='roughness-tuned',
+        measured=f'mean absolute error in grades after a search of {size}, {len(scans.labels)} scans',
+        data=f'simulated: {len(setup.textures)} surfaces, {setup.scans} scans each',
+        split=f"by texture, the paper's: {len(train)} for training and search, {len(test)} for test",
+        numbers={
+            'seed': setup.seed,
+            'digests': {name: own[name] for name in recipes},
+            'regressors': {
+                name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
+            },
+            'tuning': {name: one.figures() for name, one in tuned.items()},
+            'findings': [finding_as_json(finding) for finding in findings(answers, after_search=True)],
+        },
+        lines=tuple(
+            f'{name}: trained {number(parts["seen"].figures()["error"])}, '
+            f'unseen {number(parts["unseen"].figures()["error"])} grades'
+            for name, parts in answers.items()
+        ),
+    )
 
 
 def _leave_one_out(setup: Setup, recipe: RoughnessRecipe) -> Answers:

@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from texture_core.cli import add_seed
+from texture_estimation.search import SearchParams
 from texture_papers.catalogue import EXPERIMENTS, run_experiment, run_over_seeds
 from texture_papers.protocol import Experiment
 
@@ -22,12 +23,23 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--seeds', type=int, default=1, metavar='N', help='so many seeds from --seed on: mean and interval over them'
     )
+    parser.add_argument(
+        '--search',
+        type=int,
+        nargs=3,
+        metavar=('INDIVIDUALS', 'GENERATIONS', 'HALVES'),
+        help="size of the search with --tune, instead of the paper's 20 30 20",
+    )
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment, print its table and name the files."""
-    experiment = Experiment(options.out, options.seed, options.quick, options.tune)
+    search = None
+    if options.search:
+        population, generations, halves = options.search
+        search = SearchParams(population, generations, halves, min(SearchParams.search_halves, halves))
+    experiment = Experiment(options.out, options.seed, options.quick, options.tune, search=search)
     if options.seeds == 1:
         result, path = run_experiment(options.name, experiment)
     else:

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the recipes of the papers recognise on recordings: on the same track, and at another place of it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_benchmarks.borders import (
+    EARLIER,
+    LATER,
+    PLACE,
+    SAME,
+    SlideAnswer,
+    across_places,
+    figures,
+)
+from texture_benchmarks.recipes import DATA
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
+from texture_core.types import Array
+from texture_estimation.learners.learner import Codes, of_examples
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.training import train
+from texture_evaluation.cross_validation import interval, predict_slides
+from texture_evaluation.train import training_examples
+from texture_features.examples import LabelledFeatures
+from texture_recordings.dataset import SlideDataset
+
+# Word for word, or with what is named; half of a slide is shorter than the 3 s of Hu et al.
+RECIPES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
+    'ets-linear-svm': ('ets-linear-svm', {}),
+    'ets-linear-svm-vote': ('ets-linear-svm-vote', {}),
+    'jamali-naive-bayes-5': ('jamali-naive-bayes-5', {}),
+    'hu-pca-svm, windows of 2 s': ('hu-pca-svm', {'length_s': 2.0}),
+    'kaboli-svm': ('kaboli-svm', {}),
+    'kaboli-pa': ('kaboli-pa', {}),
+    'kaboli-pa, 200 passes': ('kaboli-pa', {'passes': 200}),
+    'kaboli-em': ('kaboli-em', {}),
+    'default, ours': ('default', {}),
+}
+# One finger gives 8 numbers; two slides over one material stand for the two fingers of the paper.
+OF_TWO = ('kaboli-svm', 'kaboli-pa', 'kaboli-pa, 200 passes', 'kaboli-em')
+QUICK = ('ets-linear-svm-vote', 'kaboli-pa')
+PLACES = ('1/2', '2/2')
+
+
+def recipe_of(name: str) -> Recipe:
+    """Return a recipe of the table."""
+    released, changed = RECIPES[name]
+    recipe = load_recipe(released)
+    windows = replace(recipe.feature_set.windows, length_s=changed.get('length_s', recipe.feature_set.windows.length_s))
+    learner: Any = recipe.learner
+    passes = {'passes': changed['passes']} if 'passes' in changed else {}
+    feature_set = replace(recipe.feature_set, windows=windows, _layouts={})
+    return replace(recipe, feature_set=feature_set, learner=replace(learner, **passes))
+
+
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train recipes of the papers on slides over one half of a track, and test other slides over both halves.
+
+    Fraction of the slides that are right at their end, of one finger; of two, where two slides stand for two fingers.
+    Intervals of 95 % by bootstrap over material × half.
+    """
+    some = ('1-12', ('material01', 'material02', 'material03')) if options.quick else ()
+    with imported(options, 'biotac20', *some) as bags:
+        slides = SlideDataset.from_bags(bags, '1-12' if options.quick else '21-40').in_parts(2)
+    earlier, later = ('1-8', '9-12') if options.quick else (EARLIER, LATER)
+    numbers: dict[str, dict[str, Any]] = {SAME: {}, PLACE: {}}
+    for name in QUICK if options.quick else RECIPES:
+        for border, answers in _tried(slides, earlier, later, recipe_of(name)).items():
+            known = figures(answers)
+            numbers[border][name] = {
+                'slides': len(answers),
+                'right': known['right'],
+                'interval': known['interval']['right'],
+            }
+        if name in OF_TWO:
+            for border, right in _of_two(slides, earlier, later, recipe_of(name)).items():
+                numbers[border][f'{name}, two fingers'] = right
+    return BenchmarkResult(
+        name='papers',
+        measured=run.__doc__,
+        data=f'{DATA["biotac20"]}; PAC at 2.2 kHz and 19 electrodes',
+        split=f'one half of the track of slides {earlier} trained, slides {later} tested, and the other way round',
+        numbers=numbers,
+    )
+
+
+def _halves(
+    slides: SlideDataset, earlier: str, later: str
+) -> Iterator[tuple[SlideDataset, Mapping[str, SlideDataset]]]:
+    """Yield what is trained, and what is tested by border, for each half of the track."""
+    for place in PLACES:
+        trained = slides.select(earlier, where=lambda one, place=place: one.place == place)  # type: ignore[misc]
+        yield trained, across_places(slides.select(later), trained)
+
+
+def _tried(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> Mapping[str, list[SlideAnswer]]:
+    found: defaultdict[str, list[SlideAnswer]] = defaultdict(list)
+    for trained, tested in _halves(slides, earlier, later):
+        model = train(recipe, training_examples(recipe, trained))
+        for border, others in tested.items():
+            clusters = {one.name: f'{one.surface} {one.place}' for one in others}
+            results = predict_slides(model, others.features(recipe.feature_set))
+            found[border] += [SlideAnswer(clusters[name], result) for name, result in results.items()]
+    return found
+
+
+def _of_two(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> Mapping[str, dict[str, Any]]:
+    """Return the fraction of right pairs of slides, each pair joined to one vector."""
+    right: defaultdict[str, list[tuple[str, bool]]] = defaultdict(list)
+    for trained, tested in _halves(slides, earlier, later):
+        X, labels = _joined(trained.features(recipe.feature_set))
+        names, codes = np.unique(labels, return_inverse=True)
+        learner = of_examples(recipe.learner, [f'{n}' for n in range(X.shape[1])], names.tolist())
+        predictor = learner.predictor(learner.fit(X, codes, np.arange(len(codes))).parameters)
+        for border, others in tested.items():
+            asked, true = _joined(others.features(recipe.feature_set))
+            said = names[predictor(asked).argmax(axis=1)]
+            half = others[0].place
+            right[border] += [(f'{label} {half}', bool(label == one)) for label, one in zip(true, said, strict=True)]
+    return {border: _share(pairs) for border, pairs in right.items()}
+
+
+def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:
+    """Return the first windows of each two following slides over one material side by side."""
+    first = np.unique(features.groups, return_index=True)[1]
+    rows, labels = [], []
+    for label in np.unique(features.labels):
+        own = [row for row in first if features.labels[row] == label]
+        pairs = list(pairwise(own))
+        rows += [np.concatenate((features.values[one], features.values[other])) for one, other in pairs]
+        labels += [label] * len(pairs)
+    return np.stack(rows), np.array(labels)
+
+
+def _share(pairs: list[tuple[str, bool]]) -> dict[str, Any]:
+    names = sorted({cluster for cluster, _ in pairs})
+    row: Codes = np.array([names.index(cluster) for cluster, _ in pairs])
+    which = np.array([right for _, right in pairs])
+    counts = np.stack([np.bincount(row, which), np.bincount(row)], axis=1).astype(np.float64)
+    return {'slides': len(pairs), 'right': float(which.mean()), 'interval': interval(counts)}
