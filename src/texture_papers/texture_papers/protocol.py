@@ -1219,11 +1219,11 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
     for task, methods in numbers.get('tasks', {}).items():
         for method, figures in methods.items():
             found = [run['tasks'][task][method]['test'][0] for run in runs if method in run['tasks'][task]]
-            _add(figures, found)
+            _add(figures, found, share=True)
             for kind in ('conditions', 'sets'):
                 for name, part in figures.get(kind, {}).items():
                     same = [run['tasks'][task].get(method, {}).get(kind, {}).get(name) for run in runs]
-                    _add(part, [one['test'][0] for one in same if one])
+                    _add(part, [one['test'][0] for one in same if one], share=True)
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
             same = [run['regressors'][regressor][part] for run in runs if part in run['regressors'].get(regressor, {})]
@@ -1269,10 +1269,12 @@ def seed_lines(numbers: Mapping[str, Any]) -> Iterator[str]:
             yield f'  {finding["verdict"]:14} {finding["claim"]}: {mean:+.3f} ({low:+.3f} to {high:+.3f})'
 
 
-def _add(figures: dict[str, Any], found: Sequence[float]) -> None:
+def _add(figures: dict[str, Any], found: Sequence[float], *, share: bool = False) -> None:
+    """Add values and interval of the seeds, which is cut where no share can lie."""
     if len(found) > 1:
         figures['by_seed'] = list(found)
-        figures['over_seeds'] = mean_over_seeds(found).as_json()
+        interval = mean_over_seeds(found).as_json()
+        figures['over_seeds'] = [min(max(value, 0.0), 1.0) for value in interval] if share else interval
 
 
 def _over_seeds(groups: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Sequence[float]]]:
