@@ -83,7 +83,6 @@ class Paper:
     robot: str = 'emulator'
     scene: str = 'twelve_textures'
     surfaces: tuple[str, str] = (SMOOTH, ROUGH)
-    launch: tuple[tuple[str, str], ...] = ()  # further arguments
 
 
 PAPERS = {
@@ -226,7 +225,6 @@ class Rig:
             'watch_signal': False,
             'explorer_params': parameters,
             **place.get(paper.robot, {'robot': out / paper.robot}),
-            **dict(paper.launch),
         }
         self.launcher = self.started(paper.robot, given)
         self.operator = Operator(domain_id=DOMAIN, guard=self.launcher.check)
@@ -316,20 +314,6 @@ def test_recipes_of_a_paper_train_from_its_motion_and_name_the_surface_live(pape
         right = paper.surfaces if recipe in EITHER else paper.surfaces[-1:]
         assert np.mean([estimate.label in right for estimate in estimates]) > 0.5, (recipe, estimates)
         assert estimates[0].evidence_s >= load_recipe(recipe).feature_set.windows.length_s
-
-
-def test_a_model_of_two_fingers_names_a_surface_by_two_others_on_the_emulated_hand(tmp_path: Path) -> None:
-    board = {'thumb': 'finger0', 'index': 'finger1', 'middle': 'finger2'}  # its places
-    paper = PAPERS['Kaboli et al. 2015, two fingers of the emulated hand']
-    trained = (('first_finger', board['index']), ('second_finger', board['middle']))
-    with running(replace(paper, launch=trained, slides=3), tmp_path) as rig:
-        model = train(load_recipe(paper.recipe), rig.examples(), 'model').save(tmp_path / 'model')
-    others = (('finger_set', 'kaboli-test'), ('first_finger', board['thumb']), ('second_finger', board['index']))
-    with running(replace(paper, launch=others), tmp_path) as rig:
-        rig.operator.set_parameters('emulator', {'surface': ROUGH})
-        rig.operator.set_parameters('classifier', {'model': str(model)})
-        named = [rig.named()[paper.recipe] for _ in range(3)]
-    assert np.mean([estimate.label == ROUGH for estimate in named]) > 0.5, named
 
 
 def test_recipes_of_rispal_et_al_train_from_their_motion_and_grade_the_surface_live(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ from texture_papers.report import at_least, built_in, higher, kept_in, most_erro
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 
-# Time is the paper's; speed and force are not told. 0.02 m/s is the default of `in_hand_sliding`; the preset `kaboli` has 0.008.
+# Time is the paper's; speed and force are not told. The preset `kaboli` is slower, so that 2 s pass without a turn.
 SLIDING = SimulatedSlide(0.02, 1.0, duration_s=2.0)
 THUMB, INDEX, MIDDLE = View(finger=0), View(finger=1), View(finger=2)
 TRAINED = 'index and middle finger'
