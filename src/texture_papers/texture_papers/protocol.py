@@ -13,7 +13,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -642,7 +642,14 @@ def digest_of_row(recipe: Any, scene: Scene, task: RecognitionTask, *settings: A
         What else decides, such as the split.
     """
     definition = _decisive(recipe.as_mapping())
-    return _letters([definition, [asdict(visits) for visits in task.visits], _probed(scene, task), settings])
+    visits = [{**asdict(visits), 'sliding': _set(visits.sliding)} for visits in task.visits]
+    return _letters([definition, visits, _probed(scene, task), settings])
+
+
+def _set(sliding: SimulatedSlide) -> dict[str, Any]:
+    """Return what of a motion is not as by default: a field that is new changes no digest."""
+    values = {one.name: (getattr(sliding, one.name), one.default) for one in fields(sliding)}
+    return {name: value for name, (value, default) in values.items() if value is not default and value != default}
 
 
 def _letters(content: Any) -> str:
