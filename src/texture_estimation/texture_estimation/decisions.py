@@ -62,7 +62,7 @@ class ClassDistance:
     >>> classes = np.repeat([0, 1], 10)
     >>> means = 5.0 * classes[:, None] + 0.1 * rng.standard_normal((20, 2))
     >>> distance = ClassDistance.fit(means, classes)
-    >>> distance.score(np.array([0.0, 0.0]), 0) < distance.score(np.array([0.0, 0.0]), 1)
+    >>> bool(distance.score(np.array([0.0, 0.0]), 0) < distance.score(np.array([0.0, 0.0]), 1))
     True
     """
 

@@ -126,7 +126,7 @@ def test_a_gap_in_time_is_a_jump_of_the_index_and_counted(tmp_path: Path, mappin
     assert (report.streams['signal'].gaps, report.streams['signal'].lost) == (3, 21)
     batches = SlideDataset.from_bags([tmp_path / 'out'])[0].signals['signal']
     jumps = [b.first_sample - a.next_sample for a, b in pairwise(batches)]
-    assert sorted(jumps)[-2:] == [0, 7]
+    assert [jump for jump in jumps if jump] == [7]
 
 
 def test_times_that_go_back_within_a_slide_are_left_out_and_counted(tmp_path: Path, mapping: TableMapping) -> None:

@@ -136,13 +136,13 @@ class AugmentedBatches:
         block = np.empty((BLOCK, count, len(self._mean)), dtype=np.float32)
         codes = np.empty((BLOCK, count), dtype=np.intp)
         clean, copies = self._clean.take(BLOCK * n_clean), self._copies.take(total - BLOCK * n_clean)
-        block[:, :n_clean] = self._inputs[clean].reshape(BLOCK, n_clean, -1)
+        block[:, :n_clean] = self._inputs[clean].reshape(BLOCK, n_clean, len(self._mean))
         changed = self._augmented.values[copies]
         changed -= self._mean
         changed *= self._factor
-        block[:, n_clean:] = changed.reshape(BLOCK, count - n_clean, -1)
-        codes[:, :n_clean] = self._codes[clean].reshape(BLOCK, -1)
-        codes[:, n_clean:] = self._augmented.codes[copies].reshape(BLOCK, -1)
+        block[:, n_clean:] = changed.reshape(BLOCK, count - n_clean, len(self._mean))
+        codes[:, :n_clean] = self._codes[clean].reshape(BLOCK, n_clean)
+        codes[:, n_clean:] = self._augmented.codes[copies].reshape(BLOCK, count - n_clean)
         widest = math.log(params.gain_range)
         louder = self._rng.random((BLOCK, count, 1), dtype=np.float32) < params.gain_probability
         louder = louder * self._rng.uniform(-widest, widest, louder.shape).astype(np.float32)
