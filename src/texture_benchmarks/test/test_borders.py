@@ -6,7 +6,7 @@ import numpy as np
 from texture_benchmarks import borders
 from texture_benchmarks.borders import PEERS, SAME, SlideAnswer, across_places, figures, for_recipe, middles, recipe_of
 from texture_benchmarks.study import BenchmarkOptions
-from texture_core.types import TextureEstimate
+from texture_core.types import Rejection, TextureEstimate
 from texture_evaluation.metrics import SlideResult
 from texture_recordings.dataset import SlideDataset
 
@@ -19,7 +19,8 @@ def slides(seconds: float = 4.0, topic: str = 'signal') -> SlideDataset:
 
 
 def ended(surface: str, label: str, *, known: bool, cluster: str) -> SlideAnswer:
-    said = [TextureEstimate(0, 'e', label, known, 0.9, decided=known, evidence_s=s, windows=1) for s in (0.5, 1.0)]
+    rejection = Rejection.NONE if known else Rejection.NOVEL
+    said = [TextureEstimate(0, 'e', label, rejection, 0.9, decided=known, evidence_s=s, windows=1) for s in (0.5, 1.0)]
     return SlideAnswer(cluster, SlideResult(surface, [label] * 2, said))
 
 

@@ -44,7 +44,7 @@ from texture_benchmarks.trust import (
     grid_panels,
     run,
 )
-from texture_core.types import ExplorationState, Phase, TactileSignal, TextureEstimate
+from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
 from texture_estimation.decisions import ErrorBound
 from texture_estimation.recipe import load_recipe, with_channels
 from texture_evaluation.metrics import SlideResult
@@ -225,17 +225,18 @@ def test_the_same_other_finger_touches_all_slides(slide: LabelledSlide) -> None:
 
 def estimate(label: str, *, known: bool, decided: bool, evidence_s: float, final: bool = False) -> TextureEstimate:
     return TextureEstimate(
-        stamp_ns=0, exploration_id='e', final=final, label=label, known=known, decided=decided, windows=1,
+        stamp_ns=0, exploration_id='e', final=final, label=label, decided=decided, windows=1,
+        rejection=Rejection.NONE if known else Rejection.NOVEL,
         evidence_s=evidence_s,
     )  # fmt: skip
 
 
-def test_outcomes_are_counted_at_the_first_certain_estimate_and_at_the_end() -> None:
-    unsure = estimate('felt', known=True, decided=False, evidence_s=0.5)
+def test_outcomes_are_counted_at_the_first_decided_estimate_and_at_the_end() -> None:
+    undecided = estimate('felt', known=True, decided=False, evidence_s=0.5)
     right = estimate('cork', known=True, decided=True, evidence_s=1.0)
     wrong = estimate('felt', known=True, decided=True, evidence_s=1.5)
     rejected = estimate('cork', known=False, decided=False, evidence_s=2.0)
-    slides = [[unsure, right, wrong], [unsure, wrong, rejected], [unsure, rejected], []]
+    slides = [[undecided, right, wrong], [undecided, wrong, rejected], [undecided, rejected], []]
     outcome = Outcome.of([SlideResult('cork', [], estimates) for estimates in slides])
     assert dataclasses.astuple(outcome) == (4, 1, 1, 0, 1, pytest.approx(1.5), 2)
 

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_info
 from texture_benchmarks import study
 from texture_benchmarks.study import BenchmarkOptions, decided_at, imported, importing_once, map_forked
 from texture_core.errors import InvalidData
-from texture_core.types import TextureEstimate
+from texture_core.types import Rejection, TextureEstimate
 from texture_evaluation.metrics import SlideResult
 
 
@@ -111,7 +111,7 @@ def test_the_evidence_chart_is_drawn_without_a_display(tmp_path: Path) -> None:
 def slide(surface: str, decisions: str, confidences: tuple[float, ...]) -> SlideResult:
     """Return a slide whose windows of 0.5 s every 0.1 s decide letter by letter."""
     estimates = [
-        TextureEstimate(0, 'e', label, True, confidences[k], windows=k + 1, evidence_s=0.5 + 0.1 * k)
+        TextureEstimate(0, 'e', label, Rejection.NONE, confidences[k], windows=k + 1, evidence_s=0.5 + 0.1 * k)
         for k, label in enumerate(decisions)
     ]
     return SlideResult(surface, list(decisions), estimates)

@@ -178,7 +178,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes and peers on one side of a border, and test them on slides of the other side and of the same.
 
     Slides whose label is right at the end, that are right and known, and that are wrong and known; the same after
-    given times; slides that are wrong at the first certain estimate. 95 % intervals by bootstrap over surfaces × parts
+    given times; slides that are wrong at the first decided estimate. 95 % intervals by bootstrap over surfaces × parts
     (or dates): slides over one track are no independent draws.
     """
     found: dict[Cell, list[SlideAnswer]] = {}

@@ -38,7 +38,7 @@ class AccuracyCurve:
     # right then, 0 to 1
     seconds: Sequence[float]
     shares: Sequence[float]
-    # Mean time and share right when each slide ends as soon as it is certain; None where it does not
+    # Mean time and share right when each slide ends as soon as it is decided; None where it does not
     ends: tuple[float, float] | None = None
 
 
@@ -50,7 +50,7 @@ def overview_chart(methods: Sequence[AccuracyCurve], path: str | Path) -> Path:
             axes.plot(each.seconds, [100 * share for share in each.shares], **STYLES[each.kind])
             if each.ends:
                 axes.plot(each.ends[0], 100 * each.ends[1], '*', color=COLOURS[0], markersize=13)
-                axes.annotate('ends when certain', each.ends, (each.ends[0] * 0.98, 103.0), fontsize=8, ha='center')
+                axes.annotate('ends when decided', each.ends, (each.ends[0] * 0.98, 103.0), fontsize=8, ha='center')
         for each, height in zip(methods, spread_heights([100 * each.shares[0] for each in methods]), strict=True):
             style = {'color': STYLES[each.kind]['color'], 'weight': 'bold' if each.kind == OURS else 'normal'}
             axes.text(0.475, height, each.name, ha='right', va='center', fontsize=8.5, **style)
@@ -104,7 +104,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         name='overview',
         measured=(
             'share of slides recognised, against the sliding time used and the computing time of one window (s); and '
-            'where each slide ends when the recipe is certain. From '
+            'where each slide ends when the label is decided. From '
             + ', '.join(f'{name}.json' for name, found in stored.items() if found)
         ),
         data=f'{DATA["biotac20"]}; PAC at 1 kHz; {ALL_CHANNELS}: all channels',

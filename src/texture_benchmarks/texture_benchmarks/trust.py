@@ -168,20 +168,20 @@ class Outcome:
     """How the slides of one cell ended."""
 
     slides: int  # How many
-    # early_right, early_wrong: slides with a right and with a wrong label at the first certain estimate; the
-    # others were never certain
+    # early_right, early_wrong: slides with a right and with a wrong label at the first decided estimate; the
+    # others were never decided
     early_right: int
     early_wrong: int
     # final_right, final_wrong: slides with a right and with a wrong label that were taken for known at the end;
     # the others were rejected
     final_right: int
     final_wrong: int
-    mean_s: float  # Mean sliding time until the first certain estimate, or to the end
+    mean_s: float  # Mean sliding time until the first decided estimate, or to the end
     label_right: int  # Slides with the right label at the end, whether they were taken for known or not
 
     @property
     def worst_wrong(self) -> float:
-        """The larger share of slides that were wrong and known: at the first certain estimate, or at the end."""
+        """The larger share of slides that were wrong and known: at the first decided estimate, or at the end."""
         return max(self.early_wrong, self.final_wrong) / self.slides
 
     @classmethod
@@ -241,7 +241,7 @@ Ticks = list[tuple[str, str]]  # below a pair of bars, and the row that it shows
 def trust_chart(recipes: Outcomes, title: str, path: str | Path) -> Path:
     """Draw one grid: a column for each recipe, a row for each disturbance, a pair of stacked bars for each strength.
 
-    Of each pair the left bar is the first certain estimate, the right one the end of the slide: right and known,
+    Of each pair the left bar is the first decided estimate, the right one the end of the slide: right and known,
     unknown or undecided, wrong and known.
     """
     panels = grid_panels(list(next(iter(recipes.values()))))
@@ -306,7 +306,7 @@ MAX_WRONG_KNOWN = 2 / 60
 ALLOWED = {'wrong_known_of_60': 2, 'undisturbed_unknown': 0.03}
 TITLE = (
     'Where it fails: % of slides by how they end when something differs from the training. {}\n'
-    'Of each pair of bars: left the first certain estimate, right the end of the slide'
+    'Of each pair of bars: left the first decided estimate, right the end of the slide'
 )
 
 Outcomes = dict[str, dict[str, Outcome]]  # by recipe and row
@@ -350,7 +350,7 @@ class _Data:
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes on undisturbed slides, and test them on later ones under disturbances, one at a time.
 
-    Slides that are right and known, unknown, or wrong and known, at the first certain estimate and at the end; the
+    Slides that are right and known, unknown, or wrong and known, at the first decided estimate and at the end; the
     estimates are told nothing of the disturbance.
     """
     data = _Data.simulated(options.seed) if options.quick else _Data.recorded(options)

@@ -40,12 +40,12 @@ def test_the_sensor_is_activated_before_the_explorer(graph, recording):
     assert (label(sensor), label(explorer)) == ('unconfigured', 'unconfigured')
     explore = graph.peer.create_client(srv.Explore, 'explore')
     graph.until(explore.service_is_ready)
-    refused = explore.call_async(srv.Explore.Request(motion='linear_slide'))
+    refused = explore.call_async(srv.Explore.Request(request=msg.ExplorationRequest(motion='linear_slide')))
     bring_up = graph.add(BringUp, nodes='sensor explorer')
     graph.until(lambda: refused.done() and label(sensor) == 'active')
     assert label(explorer) != 'active'
-    assert (refused.result().success, refused.result().exploration_id) == (False, '')
-    assert 'no control of the arm' in refused.result().message
+    assert refused.result().result.error_code == msg.ExplorationResult.ERROR_NOT_ACTIVE
+    assert 'no control of the arm' in refused.result().result.message
     graph.until(lambda: label(explorer) == 'active')
     assert list(bring_up._waiting) in ([], ['explorer'])
 
@@ -63,13 +63,13 @@ def test_a_deactivated_explorer_lifts_lets_go_and_refuses_until_it_is_activated_
     states = graph.listen(msg.ExplorationState, 'exploration')
     graph.until(lambda: states)
     exploration = explorer._explorer.begin('one', ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1))
-    graph.until(lambda: any(state.phase_name == 'slide' for state in states))
+    graph.until(lambda: any(state.phase == msg.ExplorationState.PHASE_SLIDE for state in states))
     explorer.trigger_deactivate()
     assert exploration.ended.is_set()
     assert (exploration.outcome.success, exploration.outcome.message) == (False, 'the explorer let go of the arm')
     with pytest.raises(DeviceError, match='not connected'):
         explorer._explorer.arm.command(ArmCommand())
-    recover = graph.peer.create_client(Trigger, 'recover')
+    recover = graph.peer.create_client(Trigger, 'explorer/recover')
     graph.until(recover.service_is_ready)
     answer = recover.call_async(Trigger.Request())
     graph.until(answer.done)

@@ -20,7 +20,9 @@ from texture_core.errors import MotionRefused
 from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
+    ModelInfo,
     Phase,
+    Rejection,
     RoughnessEstimate,
     TactileSignal,
     TextureEstimate,
@@ -76,7 +78,7 @@ def test_before_an_estimate_the_page_shows_why_there_is_none(reports, expected) 
         feed.node_statuses.update(name, level, message, 0.0)
     feed.on_state(sliding('a'))
     assert json.loads(feed.frame(1.0))['texture']['missing'] == expected
-    feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.9))
+    feed.on_texture(TextureEstimate(2, 'a', 'felt', Rejection.NONE, 0.9))
     assert json.loads(feed.frame(1.0))['texture']['missing'] == ''
 
 
@@ -84,7 +86,8 @@ def test_a_frame_shows_what_came_and_stays_small() -> None:
     feed = Feed()
     feed.on_signal(batch(0, np.random.default_rng(0).normal(size=5000)))
     feed.on_state(sliding('a'))
-    feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.9, ('cork', 'felt'), (0.1, 0.9), 4, 1.0))
+    feed.on_model(ModelInfo(1, 'm', 3, ('cork', 'felt')))
+    feed.on_texture(TextureEstimate(2, 'a', 'felt', Rejection.NONE, 0.9, (0.1, 0.9), model='m', revision=3))
     feed.on_roughness(RoughnessEstimate(2, 'a', True, 3.25, 0.5))
     text = feed.frame(0.0)
     frame = json.loads(text)
@@ -97,9 +100,9 @@ def test_a_frame_shows_what_came_and_stays_small() -> None:
 def test_a_new_exploration_begins_without_evidence_and_a_late_estimate_enters_only_its_own_summary() -> None:
     feed = Feed()
     feed.on_state(sliding('a'))
-    feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.6))
+    feed.on_texture(TextureEstimate(2, 'a', 'felt', Rejection.NONE, 0.6))
     feed.on_state(sliding('b'))
-    feed.on_texture(TextureEstimate(3, 'a', 'cork', True, 0.9))
+    feed.on_texture(TextureEstimate(3, 'a', 'cork', Rejection.NONE, 0.9))
     frame = json.loads(feed.frame(0.0))
     assert frame['texture']['label'] == ''
     assert [(past['id'], past.get('label')) for past in frame['past']] == [('b', None), ('a', 'cork')]

@@ -17,9 +17,9 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo import ATTEMPTS, DemoPlan, ProgressLog, demonstrate, explore_patiently, is_refused
 from texture_bringup.operator import ExplorationResult
-from texture_core.errors import MotionAborted
+from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.ros_testing import killed_on_error
-from texture_core.types import ExplorationRequest, RoughnessEstimate, TextureEstimate
+from texture_core.types import ExplorationRequest, Rejection, RoughnessEstimate, TextureEstimate
 
 pytestmark = pytest.mark.realtime
 
@@ -35,8 +35,8 @@ def started(log: Path) -> list[int]:
 @pytest.mark.parametrize(
     ('estimate', 'refused'),
     [
-        (TextureEstimate(0, 'a', 'glass', message='outside what was trained: speed 0.02 m/s, trained 0.05 m/s'), True),
-        (TextureEstimate(0, 'a', 'glass', True, message='outside what was trained: speed 0.02 m/s'), False),
+        (TextureEstimate(0, 'a', 'glass', Rejection.OUTSIDE_TRAINING), True),
+        (TextureEstimate(0, 'a', 'glass', Rejection.NONE), False),
         (TextureEstimate(0, 'a', 'glass'), False),
     ],
 )
@@ -47,8 +47,10 @@ def test_a_refusal_names_the_condition_and_claims_nothing(estimate: TextureEstim
 @pytest.mark.parametrize('aborted', range(ATTEMPTS + 1))
 def test_an_aborted_slide_is_made_again_and_that_is_said(aborted: int) -> None:
     nothing = TextureEstimate(0, '', ''), RoughnessEstimate(0, '')
-    results = [ExplorationResult(False, 'the arm has not answered for 135 ms', 'late', *nothing)] * aborted
-    results.append(ExplorationResult(True, 'the motion ended as asked', 'good', *nothing))
+    results = [
+        ExplorationResult(ExplorationError.ARM_FAULT, 'the arm has not answered for 135 ms', 'late', *nothing)
+    ] * aborted
+    results.append(ExplorationResult(ExplorationError.NONE, 'the motion ended as asked', 'good', *nothing))
     said: list[str] = []
     made = iter(results)
     if aborted == ATTEMPTS:

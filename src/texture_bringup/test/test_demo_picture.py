@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from texture_bringup.demo import Recorded
-from texture_core.types import FeatureVector, TextureEstimate
+from texture_core.types import FeatureVector, Rejection, TextureEstimate
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
 from texture_features.examples import LabelledFeatures
@@ -30,7 +30,7 @@ def test_the_log_odds_of_one_window_are_those_of_the_model_and_further_windows_a
     found.windows['e'] += [
         FeatureVector(start_ns, 'e', 0.5, 0.5, ('mean',), window, feature_set='a1') for start_ns in (0, 500_000_000)
     ]
-    found.estimates['e'] = TextureEstimate(0, 'e', 'wool', True, 0.7, ('cork', 'wool'), (0.3, 0.7))
+    found.estimates['e'] = TextureEstimate(0, 'e', 'wool', Rejection.NONE, 0.7, (0.3, 0.7))
     seconds, log_odds = found.log_odds('e', model)
     cork, wool = model.predict_log_proba(window[None])[0]
     assert seconds.tolist() == [0.5, 1.0]

@@ -7,7 +7,7 @@ from texture_bringup.command import main
 from texture_bringup.commands.explore import explored, texture_text
 from texture_core.cli import run_program
 from texture_core.errors import MotionAborted
-from texture_core.types import ExplorationRequest, ExplorationState, Phase, TextureEstimate
+from texture_core.types import ExplorationRequest, ExplorationState, Phase, Rejection, TextureEstimate
 
 pytestmark = pytest.mark.ros
 
@@ -51,7 +51,8 @@ def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress
     ],
 )
 def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(known, message, text):
-    estimate = TextureEstimate(0, 'one', 'glass', known, 0.78, evidence_s=2.9, message=message)
+    rejection = Rejection.NONE if known else Rejection.NOVEL
+    estimate = TextureEstimate(0, 'one', 'glass', rejection, 0.78, evidence_s=2.9, message=message)
     assert texture_text(estimate) == text
 
 

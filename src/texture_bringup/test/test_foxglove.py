@@ -10,22 +10,38 @@ import pytest
 from std_srvs.srv import Trigger
 from texture_msgs import srv
 
+from texture_bringup.nodes.views import VIEW_TYPES
+from texture_core.ros_testing import filled
 from texture_recordings.ros import TOPICS
 
 pytestmark = pytest.mark.ros  # needs the built messages
 
 LAYOUT = json.loads((Path(__file__).parents[1] / 'config' / 'foxglove.json').read_text())
-FIELD = re.compile(r'^(/\w+)(?:\.(\w+)(\[:\])?)?$')
-# What scripts in the layout make of the topics of the suite, and of which of them.
-SCRIPTS = [script['sourceCode'] for script in LAYOUT['userNodes'].values()]
-MADE = {re.search(r'export const output = "(/\w+)"', code).group(1) for code in SCRIPTS}
+FIELD = re.compile(r'^((?:/\w+)+)(?:\.(\w+)(\[(?::|\d+)\])?)?$')
 PANELS = LAYOUT['configById']
 BUTTONS = {name: config for name, config in PANELS.items() if name.startswith('CallService!')}
 VIEWS = {name: config for name, config in PANELS.items() if name not in BUTTONS}
 # Services with a request of their own; the others are triggers.
-REQUESTS = {'/explore': srv.Explore, '/add_texture': srv.AddTexture, '/remove_texture': srv.RemoveTexture}
-SERVICE = re.compile(r"create_service\([\w.]+, '(\w+)'")
-TYPES = {'/' + topic.name.lstrip('/'): topic.type for topic in TOPICS.values()}
+REQUESTS = {
+    '/explore': srv.Explore,
+    '/classifier/add_texture': srv.AddTexture,
+    '/classifier/remove_texture': srv.RemoveTexture,
+}
+SERVICE = re.compile(r"create_service\([\w.]+, '([\w~/]+)'")
+SHOWN = {f'/views/{name}': kind for name, kind in VIEW_TYPES.items()}
+TYPES = {'/' + topic.name.lstrip('/'): topic.type for topic in TOPICS.values()} | SHOWN
+# What a panel must have besides its paths, by the configuration types of Lichtblick 1.28 and Foxglove.
+NEEDED = {
+    'Plot': {'paths', 'showLegend', 'legendDisplay', 'showXAxisLabels', 'showYAxisLabels', 'isSynced', 'xAxisVal',
+             'showPlotValuesInLegend', 'sidebarDimension'},
+    'StateTransitions': {'isSynced', 'paths'},
+    'Gauge': {'path', 'minValue', 'maxValue', 'colorMode', 'colorMap', 'gradient', 'reverse'},
+    'RawMessages': {'topicPath', 'diffEnabled', 'diffMethod', 'diffTopicPath', 'showFullMessageForDiff', 'fontSize'},
+    'DiagnosticSummary': {'topicToRender', 'minLevel', 'pinnedIds', 'hardwareIdFilter'},
+    '3D': {'cameraState', 'followMode', 'followTf', 'scene', 'publish', 'transforms', 'topics', 'layers', 'imageMode'},
+    'Image': {'cameraState', 'followMode', 'scene', 'publish', 'transforms', 'topics', 'layers', 'imageMode'},
+    'CallService': {'serviceName', 'requestPayload', 'layout', 'buttonText', 'buttonTooltip', 'buttonColor'},
+}  # fmt: skip
 
 
 def paths(config: Any) -> list[str]:
@@ -44,28 +60,38 @@ def test_a_panel_shows_fields_that_its_messages_have(panel: str) -> None:
     assert shown
     for path in shown:
         topic, field, all_of_it = FIELD.fullmatch(path).groups()
-        if topic in MADE:
-            continue
         assert topic in TYPES, f'{path}: nobody publishes {topic}'
         if field:
             kind = TYPES[topic].get_fields_and_field_types()[field]
             assert kind.startswith('sequence<') == bool(all_of_it), f'{path} is a {kind}'
 
 
-def test_the_topics_of_the_suite_are_all_shown_but_the_features() -> None:
+def test_all_is_shown_but_features_labels_and_the_signals_that_have_a_view() -> None:
     shown = {FIELD.fullmatch(path).group(1) for path in paths(VIEWS)}
-    assert set(TYPES) - shown == {'/features'}
+    assert set(TYPES) - shown == {'/features', '/model_info', '/signal', '/signal_static'}
+
+
+@pytest.mark.parametrize('panel', PANELS)
+def test_a_panel_has_what_its_type_needs(panel: str) -> None:
+    config, kind = PANELS[panel], panel.partition('!')[0]
+    assert NEEDED[kind] <= set(config)
+    for path in config.get('paths', []):
+        assert {'value', 'timestampMethod'} <= set(path)
+        assert path['timestampMethod'] == 'headerStamp'
 
 
 @pytest.mark.parametrize('button', BUTTONS)
 def test_a_button_calls_a_service_of_a_node_with_a_request_that_fits(button: str) -> None:
     name = BUTTONS[button]['serviceName']
     nodes = Path(__file__).parents[2].glob('*/texture_*/nodes/*.py')
-    assert name in {f'/{service}' for node in nodes for service in SERVICE.findall(node.read_text())}
+    offered = {
+        f'/{service}'.replace('/~', f'/{node.stem}') for node in nodes for service in SERVICE.findall(node.read_text())
+    }
+    assert name in offered
     values = json.loads(BUTTONS[button]['requestPayload'])
-    REQUESTS.get(name, Trigger).Request(**values)  # rclpy checks names and types
+    filled(REQUESTS.get(name, Trigger).Request(), values)
 
 
 def test_an_operator_has_a_button_for_each_of_his_actions() -> None:
     called = {config['serviceName'] for config in BUTTONS.values()}
-    assert {'/explore', '/stop', '/recover', '/tare', '/touch_surface', '/add_texture', '/remove_texture'} <= called
+    assert set(REQUESTS) | {'/explorer/stop', '/explorer/recover', '/sensor/tare', '/explorer/touch_surface'} <= called

@@ -29,7 +29,16 @@ from numpy.typing import NDArray
 from texture_bringup.launcher import ChildLauncher
 from texture_core.config import parse_json
 from texture_core.errors import InvalidParameter, LaunchFailed, TextureError
-from texture_core.types import ENDED, ExplorationState, Phase, RoughnessEstimate, TactileSignal, TextureEstimate
+from texture_core.types import (
+    ENDED,
+    ExplorationState,
+    ModelInfo,
+    Phase,
+    Rejection,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
 from texture_exploration import motions
 from texture_exploration.safety import RANGES, SafetyLimits
 
@@ -755,6 +764,7 @@ class Feed:
         self._taxels = Taxels()
         self._state = IDLE
         self._texture = TextureEstimate(0, '')
+        self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
         self.recording = ''  # folder that is being recorded to
 
@@ -783,6 +793,10 @@ class Feed:
             self.history.add(estimate.exploration_id, reported)
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
+
+    def on_model(self, model: ModelInfo) -> None:
+        """Take the labels of the classifier's model."""
+        self._model = model
 
     def on_roughness(self, estimate: RoughnessEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
@@ -840,9 +854,11 @@ class Feed:
 
     def _evidence(self) -> dict[str, Any]:
         """Return the estimate with the most probable labels first."""
-        estimate = self._texture
-        pairs = sorted(zip(estimate.probabilities, estimate.labels, strict=False), reverse=True)[:MAX_LABELS]
-        shown = {name: _plain(value) for name, value in asdict(estimate).items()}
+        estimate, model = self._texture, self._model
+        fits = (estimate.model, estimate.revision) == (model.model, model.revision)  # else the labels come in a moment
+        labels = model.labels if fits else ()
+        pairs = sorted(zip(estimate.probabilities, labels, strict=False), reverse=True)[:MAX_LABELS]
+        shown = {name: _plain(value) for name, value in asdict(estimate).items()} | {'known': estimate.known}
         shown['missing'] = '' if estimate.label or estimate.message else self._missing('estimate', 'classifier')
         shown['labels'] = [label for _, label in pairs]
         shown['probabilities'] = _numbers(probability for probability, _ in pairs)
@@ -855,6 +871,8 @@ def _plain(value: Any) -> Any:
         return _number(value)
     if isinstance(value, Phase):
         return value.value
+    if isinstance(value, Rejection):
+        return value.name.lower().replace('_', ' ')
     return str(value) if isinstance(value, int) and abs(value) > 2**53 else value
 
 

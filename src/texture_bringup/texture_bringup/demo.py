@@ -33,10 +33,10 @@ from texture_core.types import (
     ExplorationState,
     FeatureVector,
     Phase,
+    Rejection,
     TactileSignal,
     TextureEstimate,
 )
-from texture_estimation.decisions import OUTSIDE
 from texture_estimation.evidence_rules import running_means
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles
@@ -132,7 +132,7 @@ class DemoPlan:
         slides
             Number of explorations.
         early_stopping
-            Whether a slide may end when it is certain.
+            Whether a slide may end when it is decided.
 
         Yields
         ------
@@ -230,7 +230,7 @@ class RecognisedSlide:
 
 def is_refused(estimate: TextureEstimate) -> bool:
     """Return whether an estimate says that its exploration is outside what was trained, and claims nothing."""
-    return estimate.message.startswith(OUTSIDE) and not estimate.known and not estimate.decided
+    return estimate.rejection is Rejection.OUTSIDE_TRAINING and not estimate.decided
 
 
 def untrained_figures(estimate: TextureEstimate, speed_m_s: float) -> dict[str, Any]:
@@ -570,7 +570,7 @@ def _train(out: Path, recipe: str, progress: ProgressLog) -> None:
 
 
 def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> list[RecognisedSlide]:
-    progress.section('Recognising: new slides at other places; each may end as soon as the classifier is certain')
+    progress.section('Recognising: new slides at other places; each may end as soon as its label is decided')
     rows = []
     with rig.recording(out / RECOGNITION_BAG):
         for surface in plan.surfaces:

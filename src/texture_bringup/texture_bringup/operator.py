@@ -26,8 +26,8 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_core.config import unknown_name
-from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
-from texture_core.ros import FEATURE_QOS, SENSOR_QOS, from_msg, request_to_msg
+from texture_core.errors import ExplorationError, InvalidData, InvalidParameter, LaunchFailed, MotionAborted
+from texture_core.ros import FEATURE_QOS, SENSOR_QOS, from_msg, to_msg
 from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
 
 # --------------------
@@ -147,11 +147,16 @@ Progress = Callable[[ExplorationState, TextureEstimate], None]
 class ExplorationResult:
     """The answer to an exploration."""
 
-    success: bool
+    error: ExplorationError
     message: str
     exploration_id: str
     texture: TextureEstimate
     roughness: RoughnessEstimate
+
+    @property
+    def success(self) -> bool:
+        """Whether the motion ended as requested."""
+        return self.error is ExplorationError.NONE
 
 
 class Operator:
@@ -177,7 +182,7 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
-        self._stop = self._node.create_client(Trigger, 'stop')
+        self._stop = self._node.create_client(Trigger, 'explorer/stop')
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
         self._received_s = 0.0
         self._vectors: list[FeatureVector] | None = None  # nobody listens yet
@@ -259,7 +264,7 @@ class Operator:
             self._received_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
-        accepted = self._explore.send_goal_async(request_to_msg(request), on_feedback)
+        accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback)
         self._wait(accepted.done, ACCEPT_S)
         goal = accepted.result()
         endings = [goal.get_result_async()]
@@ -280,9 +285,13 @@ class Operator:
             )
         if answer.status == GoalStatus.STATUS_UNKNOWN:
             raise MotionAborted('the explorer was started again and knows of no such exploration; it was broken off')
-        result = answer.result
+        result = answer.result.result
         return ExplorationResult(
-            result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)
+            ExplorationError(result.error_code),
+            result.message,
+            result.exploration_id,
+            from_msg(result.texture),
+            from_msg(result.roughness),
         )
 
     def explore_with_features(
@@ -400,7 +409,7 @@ class Operator:
             If it could not be added, with the reason.
         """
         request = srv.AddTexture.Request(label=label, exploration_id=exploration_id)
-        answer = self._ask_classifier(srv.AddTexture, 'add_texture', request, deadline_s)
+        answer = self._ask_classifier(srv.AddTexture, 'classifier/add_texture', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
     def remove(self, label: str, deadline_s: float = 30.0) -> str:
@@ -414,11 +423,11 @@ class Operator:
             If none could be removed, with the reason.
         """
         request = srv.RemoveTexture.Request(label=label)
-        return str(self._ask_classifier(srv.RemoveTexture, 'remove_texture', request, deadline_s).message)
+        return str(self._ask_classifier(srv.RemoveTexture, 'classifier/remove_texture', request, deadline_s).message)
 
     def remove_last_added(self, deadline_s: float = 30.0) -> str:
         """Let the classifier remove the slide that was added last; return what happened. Raises as `add` does."""
-        return str(self._ask_classifier(Trigger, 'remove_last_added', Trigger.Request(), deadline_s).message)
+        return str(self._ask_classifier(Trigger, 'classifier/remove_last_added', Trigger.Request(), deadline_s).message)
 
     def _listen_to_features(self) -> list[FeatureVector]:
         """Return the list to which feature vectors are added as they come, once they would come."""
@@ -443,7 +452,7 @@ class Operator:
         """Return the answer of a service of the classifier that succeeded."""
         missing, silent = 'no classifier answers; is it running?', 'the classifier does not answer; look at its output'
         answer = self._ask(kind, name, request, (deadline_s, missing), (deadline_s, silent))
-        if not answer.success:
+        if not answer.success if kind is Trigger else answer.error_code:
             raise InvalidData(answer.message)
         return answer
 
@@ -589,4 +598,4 @@ class Operator:
                 f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at '
                 'the robot, and use its own stop if it moves'
             )
-        return f'the exploration has ended: {ending.result().result.message}'
+        return f'the exploration has ended: {ending.result().result.result.message}'

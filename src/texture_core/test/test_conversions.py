@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from texture_msgs import msg
-from texture_msgs.srv import Explore
 
-from texture_core.errors import InvalidData
-from texture_core.ros import from_msg, request_from_msg, request_to_msg, to_msg
+from texture_core.errors import ExplorationError, InvalidData
+from texture_core.ros import from_msg, to_msg
 from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
     FeatureVector,
+    ModelInfo,
     Phase,
+    Rejection,
     RoughnessEstimate,
     TactileSignal,
     TextureEstimate,
@@ -36,6 +37,7 @@ EXAMPLES = [
         2**40,
         np.array([[1.5, math.nan], [-3e-20, 7]], np.float32),
         'tip',
+        tared=True,
     ),
     ExplorationState(
         STAMP,
@@ -60,9 +62,8 @@ EXAMPLES = [
         STAMP,
         'e-1',
         'felt',
-        True,
+        Rejection.AMBIGUOUS,
         0.9,
-        ('felt', 'wool'),
         (0.9, 0.1),
         True,
         ('felt',),
@@ -73,7 +74,10 @@ EXAMPLES = [
         'm',
         'ok',
         'tip',
+        7,
     ),
+    ModelInfo(STAMP, 'm', 7, ('felt', 'wool'), 'f'),
+    ExplorationRequest('linear_slide', 0.05, 1.0, duration_s=2.5, surface='felt', early_stopping=True, timeout_s=30.25),
     RoughnessEstimate(STAMP, 'e-1', True, 3.5, 0.4, 4, 0.8, True, 1e-4, 'm', 'ok', 'tip'),
 ]
 
@@ -86,10 +90,10 @@ def test_a_value_survives_the_wire(value: object) -> None:
         np.testing.assert_equal(getattr(back, item.name), getattr(value, item.name))
 
 
-def test_a_request_is_the_same_for_action_and_service() -> None:
-    request = ExplorationRequest('linear_slide', 0.05, 1.0, surface='felt', early_stopping=True)
-    assert request_from_msg(request_to_msg(request)) == request
-    assert request_from_msg(request_to_msg(request, Explore.Request)) == request
+@pytest.mark.parametrize('seconds', [math.nan, math.inf, 1e10])
+def test_a_time_that_no_message_holds_is_refused(seconds: float) -> None:
+    with pytest.raises(InvalidData, match=r'a time is .* s; less than'):
+        to_msg(ExplorationRequest('in_hand_sliding', duration_s=seconds))
 
 
 def test_samples_that_do_not_fill_the_channels_are_refused() -> None:
@@ -103,8 +107,26 @@ def test_an_unknown_phase_is_refused() -> None:
         from_msg(msg.ExplorationState(phase=99))
 
 
+def test_an_unknown_rejection_is_refused() -> None:
+    with pytest.raises(InvalidData, match=r'rejection 9; allowed are 0 \(none\), .*5 \(no_model\)'):
+        from_msg(msg.TextureEstimate(rejection=9))
+
+
 @pytest.mark.parametrize('phase', Phase)
-def test_each_phase_has_the_constant_of_the_message_and_its_name_beside_it(phase: Phase) -> None:
+def test_each_phase_has_the_constant_of_the_message(phase: Phase) -> None:
     message = to_msg(ExplorationState(STAMP, 'e-1', 'linear_slide', phase))
-    assert message.phase == getattr(msg.ExplorationState, phase.name)
-    assert message.phase_name == phase.value
+    assert message.phase == getattr(msg.ExplorationState, f'PHASE_{phase.name}')
+
+
+@pytest.mark.parametrize(
+    ('codes', 'message', 'prefix'),
+    [(ExplorationError, msg.ExplorationResult, 'ERROR_'), (Rejection, msg.TextureEstimate, 'REJECTION_')],
+)
+def test_the_codes_are_the_constants_of_the_messages(codes, message, prefix) -> None:
+    constants = {name: getattr(message, name) for name in dir(message) if name.startswith(prefix) and '__' not in name}
+    assert {f'{prefix}{code.name}': code.value for code in codes} == constants
+
+
+def test_a_result_and_an_estimate_that_nobody_filled_claim_nothing() -> None:
+    assert msg.ExplorationResult().error_code == msg.ExplorationResult.ERROR_INTERNAL
+    assert msg.TextureEstimate().rejection == msg.TextureEstimate.REJECTION_TOO_LITTLE_EVIDENCE

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
 from texture_msgs.action import Explore
+from texture_msgs.msg import ExplorationResult
 
 from texture_core.ros import WaitingExecutor
 
@@ -70,7 +71,7 @@ def test_the_result_of_an_action_that_ends_at_the_shutdown_is_sent(world):
     def slide(goal):
         node.told.wait(DEADLINE_S)
         goal.abort()
-        return Explore.Result(message='the finger was lifted')
+        return Explore.Result(result=ExplorationResult(message='the finger was lifted'))
 
     server = ActionServer(node, Explore, 'slide', slide, callback_group=ReentrantCallbackGroup())
     asking = Node('asking')
@@ -88,7 +89,7 @@ def test_the_result_of_an_action_that_ends_at_the_shutdown_is_sent(world):
     node.told.set()
     executor.shutdown(DEADLINE_S)
     spin_until(reader, result.done)
-    assert result.result().result.message == 'the finger was lifted'
+    assert result.result().result.result.message == 'the finger was lifted'
     reader.shutdown()
     client.destroy()
     asking.destroy_node()

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import enum
+
 MAX_CHARACTERS = 1000
 
 
@@ -38,12 +40,46 @@ class CommandRefused(DeviceError):
     """A command that an arm or a hand does not carry out: not finite, too fast, or too hard."""
 
 
+class ExplorationError(enum.IntEnum):
+    """Why an exploration is no success: `error_code` of the message ExplorationResult, which describes each value.
+
+    From 10 on it was refused and nothing has moved; from 20 on it was aborted.
+    """
+
+    NONE = 0
+    INTERNAL = 1
+    UNKNOWN_MOTION = 10
+    INVALID_REQUEST = 11
+    BUSY = 12
+    NOT_ACTIVE = 13
+    ARM_NOT_READY = 14
+    STOPPED = 20
+    CANCELLED = 21
+    TIMEOUT = 22
+    NO_SURFACE = 23
+    MOTION_FAILED = 24
+    FORCE_LIMIT = 25
+    FORCE_SENSOR = 26
+    WORKSPACE = 27
+    ARM_FAULT = 28
+    NO_SIGNAL = 29
+    NO_SAMPLES = 30
+
+
 class MotionRefused(TextureError):
     """A motion that is unknown, unsafe or impossible now."""
+
+    def __init__(self, sentence: str = '', error: ExplorationError = ExplorationError.INVALID_REQUEST) -> None:
+        super().__init__(sentence)
+        self.error = error
 
 
 class MotionAborted(TextureError):
     """A motion that had begun and was ended early."""
+
+    def __init__(self, sentence: str = '', error: ExplorationError = ExplorationError.MOTION_FAILED) -> None:
+        super().__init__(sentence)
+        self.error = error
 
 
 class InvalidLaunch(TextureError):

@@ -14,12 +14,14 @@ import time
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import rclpy
+from builtin_interfaces.msg import Duration as DurationMessage
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -38,18 +40,21 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 from texture_msgs import msg
-from texture_msgs.action import Explore
 
 from texture_core.config import Parameter, from_mapping, parameters_of, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.types import (
+    DURATIONS,
     NANOSECONDS,
+    POSITION,
     QUALITIES,
     Array,
     ExplorationRequest,
     ExplorationState,
     FeatureVector,
+    ModelInfo,
     Phase,
+    Rejection,
     RoughnessEstimate,
     TactileSignal,
     TextureEstimate,
@@ -419,10 +424,12 @@ def to_stamp(time_ns: int) -> Time:
 # Data classes of texture_core to messages and back: field by field of the same name, the time in the header.
 
 MESSAGES: Mapping[type, type] = {
+    ExplorationRequest: msg.ExplorationRequest,
     ExplorationState: msg.ExplorationState,
     FeatureVector: msg.FeatureVector,
     TextureEstimate: msg.TextureEstimate,
     RoughnessEstimate: msg.RoughnessEstimate,
+    ModelInfo: msg.ModelInfo,
 }
 DATA_CLASSES = {message: cls for cls, message in MESSAGES.items()}
 STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
@@ -430,15 +437,22 @@ Convert = Callable[[Any], Any] | None  # None: the same on both sides
 
 
 def to_msg(value: Any) -> Any:
-    """Return the message of a data class of texture_core."""
+    """Return the message of a data class of texture_core.
+
+    Raises
+    ------
+    InvalidData
+        If a time in s is more than the message can hold.
+    """
     if isinstance(value, TactileSignal):
         return _signal_to_msg(value)
-    stamp, fields = _plan(type(value))
-    values = {name: wire(getattr(value, name)) if wire else getattr(value, name) for name, wire, _ in fields}
-    if isinstance(value, ExplorationState):
-        values['phase_name'] = value.phase.value
-    header = Header(stamp=to_stamp(getattr(value, stamp)), frame_id=value.frame_id)
-    return MESSAGES[type(value)](header=header, **values)
+    plan = _plan(type(value))
+    values = {there: wire(getattr(value, here)) if wire else getattr(value, here) for here, there, wire, _ in plan.rest}
+    if plan.stamp:
+        values['header'] = Header(stamp=to_stamp(getattr(value, plan.stamp)), frame_id=value.frame_id)
+    if plan.position:
+        values['position'] = Point(**{name[0]: float(getattr(value, name)) for name in POSITION})
+    return MESSAGES[type(value)](**values)
 
 
 def from_msg(message: Any) -> Any:
@@ -452,10 +466,14 @@ def from_msg(message: Any) -> Any:
     if isinstance(message, msg.TactileSignal):
         return _signal_from_msg(message)
     cls = DATA_CLASSES[type(message)]
-    stamp, fields = _plan(cls)
-    values = {name: unwire(getattr(message, name)) if unwire else getattr(message, name) for name, _, unwire in fields}
-    values[stamp] = to_ns(message.header.stamp)
-    values['frame_id'] = message.header.frame_id
+    plan = _plan(cls)
+    values = {
+        here: back(getattr(message, there)) if back else getattr(message, there) for here, there, _, back in plan.rest
+    }
+    if plan.stamp:
+        values[plan.stamp], values['frame_id'] = to_ns(message.header.stamp), message.header.frame_id
+    if plan.position:
+        values.update({name: getattr(message.position, name[0]) for name in POSITION})
     return cls(**values)
 
 
@@ -465,6 +483,7 @@ def _signal_to_msg(signal: TactileSignal) -> msg.TactileSignal:
         sensor=signal.sensor,
         channels=list(signal.channels),
         units=list(signal.units),
+        tared=signal.tared,
         sampling_rate_hz=float(signal.sampling_rate_hz),
         first_sample=signal.first_sample,
     )
@@ -490,6 +509,7 @@ def _signal_from_msg(message: msg.TactileSignal) -> TactileSignal:
         first_sample=message.first_sample,
         samples=flat.reshape(-1, len(channels)),
         frame_id=message.header.frame_id,
+        tared=message.tared,
     )
 
 
@@ -501,10 +521,26 @@ def _phase(code: int) -> Phase:
     return phases[code]
 
 
+def _rejection(code: int) -> Rejection:
+    try:
+        return Rejection(code)
+    except ValueError as error:
+        allowed = ', '.join(f'{known.value} ({known.name.lower()})' for known in Rejection)
+        raise InvalidData(f'a texture estimate has the rejection {code}; allowed are {allowed}') from error
+
+
 def _doubles(values: Array) -> array.array[float]:
     return array.array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
 
 
+def _duration(seconds: float) -> DurationMessage:
+    if not abs(seconds) < MAX_DURATION_S:
+        raise InvalidData(f'a time is {seconds:g} s; less than {MAX_DURATION_S:g} s is allowed')
+    stamp = to_stamp(round(seconds * NANOSECONDS))
+    return DurationMessage(sec=stamp.sec, nanosec=stamp.nanosec)
+
+
+MAX_DURATION_S = 2.0**31
 # By the type of a field: to the message, and back.
 CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
     float: (float, None),
@@ -512,26 +548,32 @@ CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
     tuple[float, ...]: (partial(array.array, 'd'), tuple),
     Array: (_doubles, partial(np.array, dtype=np.float64)),
     Phase: (lambda phase: phase.code, _phase),
+    Rejection: (int, _rejection),
 }
+DURATION = (_duration, lambda duration: to_ns(duration) / NANOSECONDS)
+
+
+class _Plan(NamedTuple):
+    """How a data class and its message belong together."""
+
+    stamp: str  # the field that is the time in the header; '' without a header
+    position: bool  # whether coordinates are a point
+    rest: tuple[tuple[str, str, Convert, Convert], ...]  # names here and there, and what becomes of the value
 
 
 @cache
-def _plan(cls: type) -> tuple[str, tuple[tuple[str, Convert, Convert], ...]]:
-    """Return which field is the time, and each other one with what it becomes."""
+def _plan(cls: type) -> _Plan:
     types = typing.get_type_hints(cls)
-    [stamp] = [name for name in STAMPS if types.pop(name, None)]
-    types.pop('frame_id')  # stands in the header, too
-    return stamp, tuple((name, *CONVERT.get(kind, (None, None))) for name, kind in types.items())
-
-
-def request_from_msg(goal: Any) -> ExplorationRequest:
-    """Return the request in a goal of the action or a request of the service: both have the same fields."""
-    return ExplorationRequest(**{name: getattr(goal, name) for name in ExplorationRequest.__dataclass_fields__})
-
-
-def request_to_msg(request: ExplorationRequest, kind: Any = Explore.Goal) -> Any:
-    """Return a goal of the action, or of another `kind` with the same fields."""
-    return kind(**{name: getattr(request, name) for name in ExplorationRequest.__dataclass_fields__})
+    stamp = next((name for name in STAMPS if types.pop(name, None)), '')
+    types.pop('frame_id', None)  # in the header, too
+    position = POSITION[0] in types
+    for name in POSITION:
+        types.pop(name, None)
+    rest = (
+        (name, DURATIONS.get(name, name), *(DURATION if name in DURATIONS else CONVERT.get(kind, (None, None))))
+        for name, kind in types.items()
+    )
+    return _Plan(stamp, position, tuple(rest))
 
 
 # --------------------

@@ -240,3 +240,10 @@ class LocalGraph:
         self._closing.callback(node.destroy_node)
         self._closing.callback(getattr(node, 'shutdown', lambda: None))
         return node
+
+
+def filled(message: Any, values: Mapping[str, Any]) -> Any:
+    """Return a message with the values of a mapping, as the command line gives them; rclpy checks names and types."""
+    for name, value in values.items():
+        setattr(message, name, filled(getattr(message, name), value) if isinstance(value, dict) else value)
+    return message

@@ -41,10 +41,17 @@ QUALITIES: Mapping[str, Quality] = {
     # Who joins late gets the newest estimates, and so the verdict on the last exploration.
     'texture': Quality(50, reliable=True, latched=True),
     'roughness': Quality(50, reliable=True, latched=True),
+    # The labels of the estimates, once for each change of the model.
+    'model_info': Quality(1, reliable=True, latched=True),
     # A node that starts late learns at once what is going on.
     'exploration': Quality(100, reliable=True, latched=True),
 }
 
+
+# Fields of the data classes below that messages hold in standard types: times in s as a builtin_interfaces/Duration,
+# and coordinates as the geometry_msgs/Point `position`.
+DURATIONS: Mapping[str, str] = {'steady_s': 'steady', 'timeout_s': 'timeout', 'duration_s': 'duration'}
+POSITION = ('x_m', 'y_m', 'z_m')
 
 # --------------------
 # Names for array types; the shape stands in the docstring of each function.
@@ -99,7 +106,6 @@ def _shown(label: str) -> str:
 # A batch of consecutive samples of one sensor.
 
 NANOSECONDS = 1_000_000_000
-TARED = ' (tared)'  # ends the name of a sensor whose level without load has been subtracted
 MIN_HZ = 1e-3  # a sample in a quarter of an hour: below, stamps leave what 64 bits hold
 MAX_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
 
@@ -124,6 +130,8 @@ class TactileSignal:
         NaN for a sample known to be bad.
     frame_id
         Frame of the fingertip.
+    tared
+        Whether the level without load is subtracted.
 
     Raises
     ------
@@ -139,6 +147,7 @@ class TactileSignal:
     first_sample: int
     samples: NDArray[np.float32]
     frame_id: str = ''
+    tared: bool = False
 
     def __post_init__(self) -> None:
         if self.samples.ndim != 2 or self.samples.shape[1] != len(self.channels):
@@ -290,19 +299,30 @@ class FeatureVector:
 # Estimates of texture and roughness.
 
 
+class Rejection(enum.IntEnum):
+    """Why a label must not be used: `rejection` of the message TextureEstimate, which describes each value."""
+
+    NONE = 0
+    NOVEL = 1
+    AMBIGUOUS = 2
+    OUTSIDE_TRAINING = 3
+    TOO_LITTLE_EVIDENCE = 4
+    NO_MODEL = 5
+
+
 @dataclass(frozen=True)
 class TextureEstimate:
     """Which surface is being touched; label '' and no probabilities while there is no evidence.
 
-    A label of '' with probabilities: the evidence speaks for several surfaces alike, it is unclassified.
+    A label of '' with probabilities: the evidence speaks for several surfaces alike, it is unclassified. There is one
+    probability for each label of the model, in the order of its ModelInfo.
     """
 
     stamp_ns: int
     exploration_id: str
     label: str = ''
-    known: bool = False
+    rejection: Rejection = Rejection.TOO_LITTLE_EVIDENCE
     confidence: float = math.nan
-    labels: tuple[str, ...] = ()
     probabilities: tuple[float, ...] = ()
     decided: bool = False
     prediction_set: tuple[str, ...] = ()
@@ -312,6 +332,24 @@ class TextureEstimate:
     processing_s: float = 0.0
     model: str = ''
     message: str = ''
+    frame_id: str = ''
+    revision: int = 0
+
+    @property
+    def known(self) -> bool:
+        """Whether the label may be used: it is not rejected."""
+        return self.rejection is Rejection.NONE
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """The model behind the estimates of the same `model` and `revision`: its labels, in the order of probabilities."""
+
+    stamp_ns: int
+    model: str = ''
+    revision: int = 0
+    labels: tuple[str, ...] = ()
+    feature_set: str = ''
     frame_id: str = ''
 
 

@@ -137,7 +137,7 @@ class TwoFingers(Scripted):
 
     @property
     def expected_rates_hz(self):
-        return {'finger0/signal': 1000.0, 'finger0/imu': 1000.0, 'finger1/signal': 1000.0}
+        return {'finger0/signal': 1000.0, 'finger0/signal_imu': 1000.0, 'finger1/signal': 1000.0}
 
 
 def two_fingers_after(*seconds: tuple[str, ...]) -> tuple[str, str]:
@@ -152,7 +152,7 @@ def two_fingers_after(*seconds: tuple[str, ...]) -> tuple[str, str]:
     return level, message
 
 
-BOTH = ('finger0/signal', 'finger0/imu', 'finger1/signal')
+BOTH = ('finger0/signal', 'finger0/signal_imu', 'finger1/signal')
 
 
 def test_a_finger_that_drops_out_is_an_error_with_its_name() -> None:
@@ -304,4 +304,4 @@ def test_the_baseline_is_subtracted_only_if_wanted_and_known() -> None:
         assert watched.add('signal', stream.batch())[0].sensor == 'x/slow'
         watched.start_tare()
         feed(watched, stream, 3)
-        assert watched.add('signal', stream.batch())[0].sensor == ('x/slow (tared)' if subtract else 'x/slow')
+        assert watched.add('signal', stream.batch())[0].tared is subtract

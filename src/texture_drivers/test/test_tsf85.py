@@ -223,7 +223,7 @@ def test_a_silent_device_is_stopped_and_started_and_given_up_at_last(wire: Wire,
 
 def test_acceleration_and_rotation_come_in_si_units_with_the_dynamic_values(feeder: Feeder) -> None:
     feeder.run(200, more=bytes.fromhex('30 0000 C000 4000') + b'\x40' + struct.pack('>3h', 0, -13107, 13107))
-    imu = feeder.others['imu']
+    imu = feeder.others['signal_imu']
     assert indices(imu) == indices(feeder.signal)
     assert [batch.stamp_ns for batch in imu] == [batch.stamp_ns for batch in feeder.signal]
     assert imu[0].channels[:1] + imu[0].channels[-1:] == ('acceleration_x', 'rotation_z')
@@ -234,9 +234,9 @@ def test_acceleration_and_rotation_come_in_si_units_with_the_dynamic_values(feed
 
 def test_what_the_finger_does_not_measure_is_nan_or_not_published(feeder: Feeder) -> None:
     feeder.run(200)
-    assert feeder.others['imu'] == []
+    assert feeder.others['signal_imu'] == []
     feeder.run(20, more=bytes.fromhex('30 0000 0000 4000'))
-    assert np.isnan(feeder.others['imu'][-1].samples[-1]).tolist() == [False] * 3 + [True] * 3
+    assert np.isnan(feeder.others['signal_imu'][-1].samples[-1]).tolist() == [False] * 3 + [True] * 3
 
 
 @pytest.mark.parametrize(
@@ -248,10 +248,10 @@ def test_the_settings_choose_the_inertial_channels(wire: Wire, clock: Clock, con
     feeder = Feeder(wire, sensor, clock)
     feeder.run(200, more=bytes.fromhex('30 0000 0000 4000 40 0000 0000 0000 50 0001 0000 0000'))
     sensor.close()
-    assert ('imu' in sensor.expected_rates_hz) == bool(columns)
-    assert {batch.samples.shape[1] for batch in feeder.others['imu']} == ({columns} if columns else set())
+    assert ('signal_imu' in sensor.expected_rates_hz) == bool(columns)
+    assert {batch.samples.shape[1] for batch in feeder.others['signal_imu']} == ({columns} if columns else set())
     if columns == 3:
-        assert feeder.others['imu'][0].samples[0] == pytest.approx([0.15e-6, 0, 0], rel=1e-5)
+        assert feeder.others['signal_imu'][0].samples[0] == pytest.approx([0.15e-6, 0, 0], rel=1e-5)
 
 
 def test_both_fingers_are_read_through_one_opening(wire: Wire, clock: Clock) -> None:
@@ -261,7 +261,7 @@ def test_both_fingers_are_read_through_one_opening(wire: Wire, clock: Clock) -> 
     feeder.run(300, missing=(200,), more=bytes.fromhex('24 0007') + b'\x14' + struct.pack('>28H', *range(28)))
     sensor.close()
     assert set(sensor.expected_rates_hz) == {
-        f'finger{finger}/{topic}' for finger in (0, 1) for topic in ('signal', 'signal_static', 'imu')
+        f'finger{finger}/{topic}' for finger in (0, 1) for topic in ('signal', 'signal_static', 'signal_imu')
     }
     first, second = feeder.others['finger0/signal'], feeder.others['finger1/signal']
     assert indices(first) == indices(second)
@@ -418,7 +418,7 @@ def test_messages_become_batches_numbered_by_the_stamps_and_timed_by_when_they_w
     last = driver.signals[-1]
     assert last.stamp_ns == pytest.approx(START_NS + (last.samples[0, 0] + 1) * MS, abs=20_000)
     assert len(driver.others['signal_static']) == pytest.approx(24, abs=2)
-    assert driver.others['imu'][-1].samples[-1] == pytest.approx([0, 0, 9.80665, 0, 0, 0])
+    assert driver.others['signal_imu'][-1].samples[-1] == pytest.approx([0, 0, 9.80665, 0, 0, 0])
 
 
 def test_a_lost_sample_leaves_a_gap_and_a_lost_stamp_none(driver):
@@ -479,7 +479,7 @@ def recording(tmp_path):
 
 def test_each_finger_becomes_signals_in_the_units_of_the_driver(recording):
     signals = recording.signals(finger=1)
-    (dynamic,), (static,), (imu,) = signals['signal'], signals['signal_static'], signals['imu']
+    (dynamic,), (static,), (imu,) = signals['signal'], signals['signal_static'], signals['signal_imu']
     assert dynamic.samples[:3, 0].tolist() == [0, -1, -2]
     assert (dynamic.stamp_ns, dynamic.sampling_rate_hz) == (1_700_000_000_000_000_000, 1000.0)
     assert static.samples.shape == (36, 28)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.errors import InvalidData
-from texture_core.types import NANOSECONDS, TARED, Array, TactileSignal
+from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers.sensor import SensorReader
 
 # --------------------
@@ -48,9 +48,9 @@ class Baseline:
     stream: TactileSignal
 
     def subtract_from(self, batch: TactileSignal) -> TactileSignal:
-        """Return a batch without the baseline; the sensor's name says so."""
+        """Return a batch without the baseline; it is marked as tared."""
         samples = (batch.samples - self.level).astype(np.float32)
-        return replace(batch, samples=samples, sensor=f'{batch.sensor}{TARED}')
+        return replace(batch, samples=samples, tared=True)
 
     def drift(self, level: Array) -> Array:
         """Return by how many standard deviations of the noise a level differs from the baseline.
@@ -169,7 +169,7 @@ class TareParams:
 
     tare_s: float = param(
         1.0,
-        "Sets over how long the service 'tare' averages; a longer time gives a more exact baseline.",
+        "Sets over how long the service '~/tare' averages; a longer time gives a more exact baseline.",
         unit='s',
         low=0.1,
         high=60.0,

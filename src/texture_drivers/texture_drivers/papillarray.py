@@ -43,7 +43,7 @@ COMMANDS_OF_RATE = {100: b'f100\n', 250: b'f250\n', 500: b'f500\n', 1000: b'f100
 BIAS_COMMAND = b'z\n'  # takes 2 s, in which nothing may touch the pillars
 BIAS_S = 2.0
 
-SIGNAL, WRENCH = 'signal', 'wrench'
+SIGNAL, WRENCH = 'signal', 'signal_wrench'
 PILLARS_SENSOR, WHOLE_SENSOR = 'papillarray/pillars', 'papillarray/whole'
 PILLAR_QUANTITIES = {'fx': 'N', 'fy': 'N', 'fz': 'N', 'dx': 'mm', 'dy': 'mm', 'dz': 'mm'}
 WHOLE_QUANTITIES = {'fx': 'N', 'fy': 'N', 'fz': 'N', 'tx': 'N mm', 'ty': 'N mm', 'tz': 'N mm'}
@@ -268,7 +268,7 @@ def _wholes(packet: bytes, at: int, size: int) -> tuple[tuple[int, ...], int] | 
 
 
 # --------------------
-# The PapillArray as a sensor of the suite: its pillars on 'signal', the whole array on 'wrench'.
+# The PapillArray as a sensor of the suite: its pillars on 'signal', the whole array on 'signal_wrench'.
 
 MICROSECONDS_PER_S = 1e6
 LONGEST_STEP_US = 10_000_000  # a clock that leaps further, or back, is another one
@@ -287,7 +287,7 @@ class PapillArraySettings:
         low=100,
         high=1000,
     )
-    wrench: bool = param(True, "Publishes force and torque of the whole array on the topic 'wrench'.")
+    wrench: bool = param(True, "Publishes force and torque of the whole array on the topic 'signal_wrench'.")
 
     def __post_init__(self) -> None:
         if self.rate_hz not in COMMANDS_OF_RATE:

@@ -312,9 +312,9 @@ SETTINGS_AXES = 'xyz'
 
 @dataclass(frozen=True)
 class Tsf85Settings:
-    """Whether and how the inertial sensors of the finger are published, as topic 'imu'."""
+    """Whether and how the inertial sensors of the finger are published, as topic 'signal_imu'."""
 
-    imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'imu'.")
+    imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'signal_imu'.")
     magnetometer: bool = param(False, 'Publishes the magnetic field too, which only few firmware versions send.')
     # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
     acceleration_count_g: float = param(
@@ -374,7 +374,7 @@ QUANTITIES = {ACCELEROMETER: ('acceleration', 'm/s²'), GYROSCOPE: ('rotation', 
 # Cut the samples of a finger into batches of signals.
 
 IMAGE_HOLD_S = 0.25  # an image older than this is no measurement of now
-SIGNAL, BATCH_STATIC, IMU = 'signal', 'signal_static', 'imu'
+SIGNAL, BATCH_STATIC, IMU = 'signal', 'signal_static', 'signal_imu'
 
 
 class BatchCutter:
@@ -802,7 +802,7 @@ REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
 class Tsf85:
-    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'imu' at 1 kHz.
+    """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
 
     The device's own stamps number the samples, so losses are known exactly; over an interruption the host's clock
     does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published

@@ -156,7 +156,7 @@ def slides(rng, count=400):
 
 def outcome(rule, data):
     ends = [
-        next((k for k in range(len(w)) if rule.certain(c[k], w[k])), len(w) - 1) for c, _, w in zip(*data, strict=True)
+        next((k for k in range(len(w)) if rule.decided(c[k], w[k])), len(w) - 1) for c, _, w in zip(*data, strict=True)
     ]
     wrong = np.mean([not right[k] for k, (_, right, _) in zip(ends, zip(*data, strict=True), strict=True)])
     return wrong, np.mean([STOP_WINDOWS[k] for k in ends])
@@ -179,25 +179,25 @@ def test_where_no_rule_errs_rarely_enough_the_one_that_errs_least_is_taken():
         [STOP_WINDOWS] * 6,
         0.0,
     )
-    assert not rule.certain(0.9, 2.0)
-    assert rule.certain(0.9, 3.0)
+    assert not rule.decided(0.9, 2.0)
+    assert rule.decided(0.9, 3.0)
 
 
 def test_without_anything_held_out_confidence_alone_decides():
-    assert StoppingRule().certain(0.96, 1.0)
-    assert not StoppingRule().certain(0.9, 100.0)
+    assert StoppingRule().decided(0.96, 1.0)
+    assert not StoppingRule().decided(0.9, 100.0)
 
 
 def test_at_the_start_of_a_slide_a_smaller_novelty_score_is_needed():
     rule = StoppingRule(confidence=0.9, novelty_score=40.0, early_novelty_score=0.5)
-    assert rule.certain(0.95, 1.0, 0.49)
-    assert not rule.certain(0.95, 1.0, 0.51)
-    assert rule.certain(0.95, 2.0, 2.9)  # six times as much after each further window
-    assert not rule.certain(0.95, 2.0, 3.1)
-    assert rule.certain(0.95, 3.0, 17.0)
-    assert not rule.certain(0.95, 3.0, 19.0)
-    assert not rule.certain(0.95, 4.0, 41.0)
-    assert not StoppingRule(novelty_score=0.5, early_novelty_score=1.0).certain(0.99, 1.0, 0.8)
+    assert rule.decided(0.95, 1.0, 0.49)
+    assert not rule.decided(0.95, 1.0, 0.51)
+    assert rule.decided(0.95, 2.0, 2.9)  # six times as much after each further window
+    assert not rule.decided(0.95, 2.0, 3.1)
+    assert rule.decided(0.95, 3.0, 17.0)
+    assert not rule.decided(0.95, 3.0, 19.0)
+    assert not rule.decided(0.95, 4.0, 41.0)
+    assert not StoppingRule(novelty_score=0.5, early_novelty_score=1.0).decided(0.99, 1.0, 0.8)
 
 
 def course(right, novelty_score, disturbance=''):
@@ -218,9 +218,9 @@ def test_the_rule_stops_few_disturbed_slides_wrongly():
     strange = [course(right=False, novelty_score=8.0, disturbance='gain')] * 5
     harmless = [course(right=True, novelty_score=0.1, disturbance='gain')] * 95
     strict, lax = (fit_open_set_rule([*undisturbed, *strange, *harmless], 0.02, wrong) for wrong in (0.02, 0.05))
-    assert strict.certain(0.99, 1.0, 0.1)
-    assert not strict.certain(0.99, 1.0, 8.0)
-    assert lax.certain(0.99, 1.0, 8.0)
+    assert strict.decided(0.99, 1.0, 0.1)
+    assert not strict.decided(0.99, 1.0, 8.0)
+    assert lax.decided(0.99, 1.0, 8.0)
 
 
 RECIPE = load_recipe('default')

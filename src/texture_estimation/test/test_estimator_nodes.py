@@ -231,17 +231,17 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, 
         dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in cloth_slide
     ]
     assert node.ask(moved)[-1].label != 'silk'
-    answer = node.call(srv.AddTexture, 'add_texture', label='silk')
-    assert (answer.success, answer.examples) == (True, len(cloth_slide) - 1)
+    answer = node.call(srv.AddTexture, 'classifier/add_texture', label='silk')
+    assert (answer.error_code, answer.examples) == (answer.ERROR_NONE, len(cloth_slide) - 1)
     assert '5 textures, 1 slide added' in answer.message
     assert node.ask(moved)[-1].label == 'silk'
     assert node.ask(cloth_slide)[-1].label == 'felt'
     assert load_model(path).labels[-1] == 'silk'
     assert node.set_model(path).successful  # as after a restart
     assert node.ask(moved)[-1].label == 'silk'
-    assert node.call(Trigger, 'remove_last_added').success
+    assert node.call(Trigger, 'classifier/remove_last_added').success
     assert node.ask(moved)[-1].label != 'silk'
-    assert not node.call(Trigger, 'remove_last_added').success
+    assert not node.call(Trigger, 'classifier/remove_last_added').success
 
 
 def test_a_texture_is_removed_by_its_label_and_stays_removed_after_a_restart(graph, model, cloth_slide, tmp_path):
@@ -250,24 +250,29 @@ def test_a_texture_is_removed_by_its_label_and_stays_removed_after_a_restart(gra
     node.ask(cloth_slide)
     for label in ('silk', 'felt'):
         node.ask([dataclasses.replace(v, exploration_id=label) for v in cloth_slide])
-        assert node.call(srv.AddTexture, 'add_texture', label=label).success
-    answer = node.call(srv.RemoveTexture, 'remove_texture', label='silk')
-    assert (answer.success, answer.slides) == (True, 1)
+        assert (
+            node.call(srv.AddTexture, 'classifier/add_texture', label=label).error_code
+            == srv.AddTexture.Response.ERROR_NONE
+        )
+    answer = node.call(srv.RemoveTexture, 'classifier/remove_texture', label='silk')
+    assert (answer.error_code, answer.slides) == (answer.ERROR_NONE, 1)
     assert "removed 1 slide of 'silk'; 4 textures, 1 slide added" in answer.message
     assert load_model(path).labels == model.labels
-    answer = node.call(srv.RemoveTexture, 'remove_texture', label='felt')
+    answer = node.call(srv.RemoveTexture, 'classifier/remove_texture', label='felt')
     assert 'stays as it was trained; 4 textures, 0 slides added' in answer.message
-    refused = node.call(srv.RemoveTexture, 'remove_texture', label='felt')
-    assert not refused.success
+    refused = node.call(srv.RemoveTexture, 'classifier/remove_texture', label='felt')
+    assert refused.error_code == refused.ERROR_NOT_ADDED
     assert 'no added slides' in refused.message
 
 
 def test_what_cannot_be_added_is_answered_with_a_sentence(graph, model, tmp_path):
     node = NodeUnderTest(graph, Classifier)
-    assert 'no model is loaded' in node.call(srv.AddTexture, 'add_texture', label='silk').message
+    answer = node.call(srv.AddTexture, 'classifier/add_texture', label='silk')
+    assert answer.error_code == answer.ERROR_NO_MODEL
+    assert 'no model is loaded' in answer.message
     node.set_model(model.save(tmp_path / 'm'))
-    answer = node.call(srv.AddTexture, 'add_texture', label='silk', exploration_id='e1')
-    assert not answer.success
+    answer = node.call(srv.AddTexture, 'classifier/add_texture', label='silk', exploration_id='e1')
+    assert answer.error_code == answer.ERROR_NO_SLIDE
     assert 'explore first' in answer.message
     node.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))
-    assert 'train it again' in node.call(Trigger, 'remove_last_added').message
+    assert 'train it again' in node.call(Trigger, 'classifier/remove_last_added').message

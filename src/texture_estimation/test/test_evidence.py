@@ -50,7 +50,7 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert estimates[-1].known
     assert estimates[-1].confidence == max(estimates[-1].probabilities)
     assert sum(estimates[-1].probabilities) == pytest.approx(1.0)
-    assert estimates[-1].labels == model.labels
+    assert len(estimates[-1].probabilities) == len(model.labels)
 
 
 def test_an_estimate_carries_the_frame_of_its_vectors(model, examples):

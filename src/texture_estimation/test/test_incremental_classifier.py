@@ -257,7 +257,7 @@ def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(mode
     estimates = estimated(with_slides(dataclasses.replace(model, error_bound=bound), silk, count), silk + 0.1)
     assert {estimate.label for estimate in estimates} == {'silk'}
     assert not any(estimate.decided for estimate in estimates)
-    highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].labels))
+    highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].probabilities))
     assert max(estimate.confidence for estimate in estimates) <= highest + 1e-9
     assert f'with {count} the confidence is' in estimates[-1].message
 

@@ -702,7 +702,7 @@ class Domain:
         Raises
         ------
         InvalidData
-            If there is none, or a range is none. A model without a domain would be certain under any conditions.
+            If there is none, or a range is none. A model without a domain would be decided under any conditions.
         """
         if not isinstance(card, Mapping):
             raise InvalidData("the model card has no entry 'domain', the conditions of the training")
@@ -1326,7 +1326,7 @@ class StoppingRule:
     Examples
     --------
     >>> rule = StoppingRule(confidence=0.95, max_windows=10.0)
-    >>> rule.certain(0.9, 2.0), rule.certain(0.96, 2.0), rule.certain(0.5, 10.0)
+    >>> rule.decided(0.9, 2.0), rule.decided(0.96, 2.0), rule.decided(0.5, 10.0)
     (False, True, True)
     """
 
@@ -1335,7 +1335,7 @@ class StoppingRule:
     novelty_score: float = NEVER
     early_novelty_score: float = NEVER
 
-    def certain(self, confidence: float, effective_windows: float, novelty_score: float = 0.0) -> bool:
+    def decided(self, confidence: float, effective_windows: float, novelty_score: float = 0.0) -> bool:
         """Return whether the slide may end.
 
         Parameters
@@ -1380,7 +1380,7 @@ class SlideCourse:
     --------
     >>> right = np.array([False, True])
     >>> course = SlideCourse(np.array([0.6, 0.99]), right, np.array([1.0, 1.2]), np.array([True, True]), np.zeros(2))
-    >>> fit_open_set_rule([course] * 30, wrong=0.02, wrong_disturbed=0.02).certain(0.99, 1.2)
+    >>> fit_open_set_rule([course] * 30, wrong=0.02, wrong_disturbed=0.02).decided(0.99, 1.2)
     True
     """
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from texture_core.types import NANOSECONDS, Array, FeatureVector, TextureEstimate
+from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.decisions import ErrorBound, SlideNovelty
 from texture_estimation.evidence_rules import GroupedEvidence
 from texture_estimation.gaussians import SlideMoments
@@ -80,9 +80,9 @@ NEVER_KNOWN = "recipe '{}' calls nothing known or decided: its features tell the
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
-    A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the surface
-    is known; a label is certain only while it is. An exploration under conditions that were not trained is neither
-    known nor decided, and the message says which condition it is. Equally probable labels give no label: unclassified.
+    A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the label is
+    rejected, and why; it is decided only while it is not. An exploration under conditions that were not trained is
+    rejected, and the message says which condition it is. Equally probable labels give no label: unclassified.
     No confidence is above what the slides held out of the training can show.
 
     Parameters
@@ -131,6 +131,7 @@ class EvidenceAccumulator:
         self._over = False
         self._windows = self._evidence_ns = self._window_ns = self._end_ns = 0
         self._trusted_ns = 0.0
+        self._misfit = False  # features of another set came
         self._message = '' if self.model else NO_MODEL
         self._evidence = GroupedEvidence(
             self.model.n_predicted if self.model else 0, self.model.recipe.evidence.group if self.model else 0
@@ -152,6 +153,7 @@ class EvidenceAccumulator:
     def _predict(self, vector: FeatureVector, model: TextureModel) -> None:
         if vector.feature_set != model.feature_set:
             self.refused += 1
+            self._misfit = True
             self._message = (
                 f"model '{model.name}' does not fit: {fingerprint_difference(vector.feature_set, model.feature_set)}"
             )
@@ -189,6 +191,7 @@ class EvidenceAccumulator:
                 stamp_ns=vector.start_ns,
                 exploration_id=vector.exploration_id,
                 frame_id=vector.frame_id,
+                rejection=Rejection.NO_MODEL if model is None or self._misfit else Rejection.TOO_LITTLE_EVIDENCE,
                 final=final,
                 model=model.name if model else '',
                 message=self._message or (no_window(model.recipe.feature_set.windows) if model and final else ''),
@@ -203,24 +206,29 @@ class EvidenceAccumulator:
         )
         listed = probabilities.tolist()
         confidence = max(listed)
-        best, decided = listed.index(confidence), listed.count(confidence) == 1
+        best, single = listed.index(confidence), listed.count(confidence) == 1
         within = not self._deviation
-        novelty_score, known = self._novelty_score(model, mean, best, effective_windows)
-        known = known and within and model.recipe.training.known
-        known = known and model.active_confidence_floor.reached(confidence, effective_windows)
+        novelty_score, familiar = self._novelty_score(model, mean, best, effective_windows)
+        if not within or not model.recipe.training.known:
+            rejection = Rejection.OUTSIDE_TRAINING
+        elif not familiar:
+            rejection = Rejection.NOVEL
+        elif not single or not model.active_confidence_floor.reached(confidence, effective_windows):
+            rejection = Rejection.AMBIGUOUS
+        else:
+            rejection = Rejection.NONE
+        known = rejection is Rejection.NONE
         bound = model.error_bound_of(best)
-        certain = decided and known and bound.shown and model.certain(confidence, effective_windows, novelty_score)
         reported = bound.limited(probabilities)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
             frame_id=vector.frame_id,
-            label=model.labels[best] if decided else '',
-            known=decided and known,
+            label=model.labels[best] if single else '',
+            rejection=rejection,
             confidence=float(reported.max()),
-            labels=model.labels,
             probabilities=tuple(reported.tolist()),
-            decided=certain,
+            decided=known and bound.shown and model.decided(confidence, effective_windows, novelty_score),
             prediction_set=self._candidates(model, probabilities, effective_windows) if final and within else (),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections import OrderedDict
 from pathlib import Path
 
@@ -17,6 +18,27 @@ from texture_features.examples import RunningConditions
 
 # Number of recent explorations that can be added, and of windows of each.
 EXPLORATIONS, WINDOWS = 20, 600
+
+
+class ChangeError(enum.IntEnum):
+    """Why a texture was not added or removed: `error_code` of the services, which describe each value."""
+
+    NONE = 0
+    INTERNAL = 1
+    NO_MODEL = 10
+    INVALID_LABEL = 11
+    NO_SLIDE = 12
+    ALREADY_ADDED = 13
+    NOT_STORED = 14
+    NOT_ADDED = 15
+
+
+class ChangeRefused(InvalidData):
+    """A slide that cannot be added, or a texture that cannot be removed."""
+
+    def __init__(self, sentence: str, error: ChangeError) -> None:
+        super().__init__(sentence)
+        self.error = error
 
 
 class IncrementalClassifier:
@@ -82,7 +104,7 @@ class IncrementalClassifier:
         """
         label = checked_label(label)
         if not label:
-            raise InvalidData('no label was given; name the texture to add')
+            raise ChangeRefused('no label was given; name the texture to add', ChangeError.INVALID_LABEL)
         name = exploration_id or next(reversed(self._recent_windows), '')
         self._refuse_without_window(name)
         self._refuse_second_time(name, label)
@@ -106,7 +128,7 @@ class IncrementalClassifier:
         if self._recent_windows.get(exploration_id):
             return
         if not self._recent_windows:
-            raise InvalidData('no exploration was classified with this model; explore first')
+            raise ChangeRefused('no exploration was classified with this model; explore first', ChangeError.NO_SLIDE)
         reason = (
             f"exploration '{exploration_id}' has no usable window: its slide was too short, its samples were lost, or "
             'its features do not fit the model'
@@ -114,19 +136,21 @@ class IncrementalClassifier:
             else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
         )
         usable = ', '.join(name for name, windows in self._recent_windows.items() if windows) or 'none'
-        raise InvalidData(f'{reason}. Can be added: {usable}')
+        raise ChangeRefused(f'{reason}. Can be added: {usable}', ChangeError.NO_SLIDE)
 
     def _refuse_second_time(self, exploration_id: str, label: str) -> None:
         """Refuse an exploration that was added before: counted twice, one slide would raise the confidence."""
         others = [kept.label for kept in self.model.added_slides if kept.exploration_id == exploration_id != '']
         if label in others:
-            raise InvalidData(
-                f"exploration '{exploration_id}' was added as '{label}' already; explore again, and add that slide"
+            raise ChangeRefused(
+                f"exploration '{exploration_id}' was added as '{label}' already; explore again, and add that slide",
+                ChangeError.ALREADY_ADDED,
             )
         if others:
-            raise InvalidData(
+            raise ChangeRefused(
                 f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
-                'undo that first, or explore again'
+                'undo that first, or explore again',
+                ChangeError.ALREADY_ADDED,
             )
 
     def remove_last(self) -> AddedSlide:
@@ -182,15 +206,18 @@ class IncrementalClassifier:
     def _refuse_removal(self, label: str) -> None:
         added = sorted({slide.label for slide in self.model.added_slides})
         if not added:
-            raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
+            raise ChangeRefused(
+                f"model '{self.model.name}' has no added slides that could be removed", ChangeError.NOT_ADDED
+            )
         allowed = f'Can be removed: {", ".join(added)}'
         if not label:
-            raise InvalidData(f'no label was given; name the texture to remove. {allowed}')
+            raise ChangeRefused(f'no label was given; name the texture to remove. {allowed}', ChangeError.INVALID_LABEL)
         if label in added:
             return
         if label in self.model.trained_labels:
-            raise InvalidData(
+            raise ChangeRefused(
                 f"'{label}' is of the training, and no slide was added to it; to remove it, "
-                f'train the model again without it. {allowed}'
+                f'train the model again without it. {allowed}',
+                ChangeError.NOT_ADDED,
             )
         raise unknown_name(label, added, 'added texture')

@@ -175,7 +175,7 @@ class TextureModel:
         windows = self.recipe.feature_set.windows
         return min(windows.hop_s / windows.length_s, 1.0)
 
-    def certain(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
+    def decided(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
         """Return whether a slide may end: by the stopping rule, if enough slides were held out to show its error rate.
 
         Parameters
@@ -191,7 +191,7 @@ class TextureModel:
         -------
         bool
         """
-        return self.error_bound.shown and self.stopping_rule.certain(confidence, effective_windows, novelty_score)
+        return self.error_bound.shown and self.stopping_rule.decided(confidence, effective_windows, novelty_score)
 
     @cached_property
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
@@ -331,7 +331,7 @@ class TextureModel:
         if answer.shape != (len(self.labels),) or np.isnan(answer).any():
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
         self.prediction_sets.members(np.exp(answer), 1.0)
-        self.stopping_rule.certain(0.5, 1.0)
+        self.stopping_rule.decided(0.5, 1.0)
         self.confidence_floor.reached(0.5, 1.0)
         if self.novelty_detector is not None:
             novelty = SlideNovelty(self.novelty_detector.distances, len(self.labels))

@@ -4,19 +4,20 @@ import dataclasses
 import numpy as np
 import pytest
 
-from texture_core.types import TextureEstimate
+from texture_core.types import Rejection, TextureEstimate
 from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
 
 
 def slide(
-    surface: str, decisions: str, *, confidences: tuple[float, ...] = (), known: bool = True, certain_from: int = 99
+    surface: str, decisions: str, *, confidences: tuple[float, ...] = (), known: bool = True, decided_from: int = 99
 ) -> SlideResult:
     """Return a slide whose windows of 0.5 s every 0.1 s decide letter by letter, each alone as with the evidence."""
-    sure = confidences or (0.5,) * len(decisions)
+    confidences = confidences or (0.5,) * len(decisions)
+    rejection = Rejection.NONE if known else Rejection.NOVEL
     estimates = [
         TextureEstimate(
-            0, 'e', label, known, sure[k], decided=k >= certain_from, windows=k + 1, evidence_s=0.5 + 0.1 * k
+            0, 'e', label, rejection, confidences[k], decided=k >= decided_from, windows=k + 1, evidence_s=0.5 + 0.1 * k
         )
         for k, label in enumerate(decisions)
     ]
@@ -36,11 +37,11 @@ def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float,
 
 
 def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
-    sure = slide('a', 'bbaa', certain_from=2)
-    novel = slide('a', 'aab', certain_from=0, known=False)
+    decided = slide('a', 'bbaa', decided_from=2)
+    novel = slide('a', 'aab', decided_from=0, known=False)
     never_sure = slide('a', 'aaab')
     assert metrics.early_decision([novel]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.7)}
-    assert metrics.early_decision([sure]) == {'accuracy': 1.0, 'mean_s': pytest.approx(0.7)}
+    assert metrics.early_decision([decided]) == {'accuracy': 1.0, 'mean_s': pytest.approx(0.7)}
     assert metrics.early_decision([never_sure]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.8)}
 
 
@@ -85,11 +86,11 @@ def test_candidates_are_counted_at_the_end_where_there_are_any() -> None:
 
 
 def test_wrong_and_known_is_counted_once_decided_and_at_the_end() -> None:
-    right = slide('a', 'aaaa', certain_from=1)
-    soon_wrong = slide('a', 'bbaa', certain_from=1)  # decided for b, and right at its end
-    late_wrong = slide('a', 'aaab', certain_from=0)  # decided for a, and wrong at its end
+    right = slide('a', 'aaaa', decided_from=1)
+    soon_wrong = slide('a', 'bbaa', decided_from=1)  # decided for b, and right at its end
+    late_wrong = slide('a', 'aaab', decided_from=0)  # decided for a, and wrong at its end
     never_decided = slide('a', 'aabb')  # known and wrong at its end, but never decided
-    strange = slide('a', 'bbbb', certain_from=0, known=False)
+    strange = slide('a', 'bbbb', decided_from=0, known=False)
     results = [right, soon_wrong, late_wrong, never_decided, strange]
     assert metrics.wrong_known(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(2 / 5)}
     assert metrics.unknown(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(1 / 5)}

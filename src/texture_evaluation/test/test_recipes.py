@@ -99,9 +99,12 @@ def slides_of_days(days: tuple[int, ...]) -> SlideDataset:
             together = steps + np.roll(steps, 1 if surface == 'cork' else 2, axis=1)
             samples.append(levels * rng.uniform(0.8, 1.2) + 10.0 * together)
         made = SlideDataset.from_arrays(
-            {'signal_static': samples}, labels, {'signal_static': 50.0}, sensor='skin (tared)', session=f'day {day}'
+            {'signal_static': samples}, labels, {'signal_static': 50.0}, sensor='skin', session=f'day {day}'
         )
-        slides += [replace(slide, number=slide.number + 10 * day) for slide in made]
+        for slide in made:
+            (batch,) = slide.signals['signal_static']
+            tared = {'signal_static': (replace(batch, tared=True),)}
+            slides.append(replace(slide, number=slide.number + 10 * day, signals=tared))
     return SlideDataset(tuple(slides))
 
 

@@ -246,7 +246,7 @@ def summary(report: EvaluationReport) -> list[str]:
         f'slides: {len(report.known)} over surfaces the model knows, {len(report.unknown)} over others',
         f'single windows right: {percent(figures["window_accuracy"])}',
         f'slides right: {", ".join(at) or "no slide is long enough to say"}',
-        f'decided once certain: {percent(early["accuracy"])} right'
+        f'as soon as decided: {percent(early["accuracy"])} right'
         + (f', after {early["mean_s"]:.2f} s on average' if early['mean_s'] is not None else ''),
         f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]

@@ -58,7 +58,7 @@ class SlideResult:
         return received[-1] if received else None
 
     def early(self) -> TextureEstimate:
-        """Return the first estimate that is certain of a known texture, else the last one."""
+        """Return the first estimate that is decided and known, else the last one."""
         return next((e for e in self.estimates if e.decided and e.known), self.estimates[-1])
 
 
@@ -96,7 +96,7 @@ def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float 
 
 
 def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
-    """Return accuracy and mean time of decisions taken as soon as they are certain."""
+    """Return accuracy and mean time of decisions taken as soon as the estimate is decided."""
     decisions = [(result.surface, result.early()) for result in results]
     return {
         'accuracy': float(np.mean([estimate.label == surface for surface, estimate in decisions])),

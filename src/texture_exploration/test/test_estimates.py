@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 import threading
 
-from texture_core.types import RoughnessEstimate, TextureEstimate
+from texture_core.types import Rejection, RoughnessEstimate, TextureEstimate
 from texture_exploration.explorer import EarlyStoppingParams, ExplorationEstimates
 
 
 def texture(**values):
-    return TextureEstimate(**{'stamp_ns': 1, 'exploration_id': 'one', 'label': 'cork', 'known': True, **values})
+    return TextureEstimate(
+        **{'stamp_ns': 1, 'exploration_id': 'one', 'label': 'cork', 'rejection': Rejection.NONE, **values}
+    )
 
 
-def test_a_known_texture_of_which_its_model_is_certain_ends_the_slide_if_it_is_confident_enough():
+def test_a_known_texture_that_is_decided_ends_the_slide_if_it_is_confident_enough():
     params = EarlyStoppingParams(min_confidence=0.9)
     assert params.may_stop(texture(confidence=0.95, decided=True))
     assert not params.may_stop(texture(confidence=0.95))
     assert not params.may_stop(texture(confidence=0.85, decided=True))
-    assert not params.may_stop(texture(confidence=0.95, decided=True, known=False))
+    assert not params.may_stop(texture(confidence=0.95, decided=True, rejection=Rejection.NOVEL))
     assert not params.may_stop(texture(decided=True))  # confidence unknown
 
 

@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from texture_core.errors import ExplorationError
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.safety import SafetyLimits, SignalWatch
@@ -16,7 +17,7 @@ MOVING = (Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT)
 def test_a_stop_in_any_phase_lifts_the_finger_and_says_aborted(table, phase):
     table.when[phase] = lambda: table.exploration.stop('stopped on request')
     outcome = table.explore()
-    assert (outcome.success, outcome.message) == (False, 'stopped on request')
+    assert (outcome.error, outcome.message) == (ExplorationError.STOPPED, 'stopped on request')
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
     assert table.arm.state().force_n == 0
     assert table.arm.state().position[2] == pytest.approx(table.home[2], abs=0.001)
@@ -52,7 +53,7 @@ def test_a_stop_while_sliding_leaves_along_the_normal(table):
 def test_without_a_surface_the_approach_gives_up(make_table):
     table = make_table(SimulatedArmParams(stiffness_n_m=0.0), TouchParams(approach_travel_m=0.02))
     outcome = table.explore()
-    assert not outcome.success
+    assert outcome.error is ExplorationError.NO_SURFACE
     assert outcome.message.startswith('no surface within 0.02 m')
     assert table.phases == [Phase.APPROACH, Phase.LIFT, Phase.ABORTED]
     assert not outcome.slid
@@ -62,6 +63,7 @@ def test_a_force_above_the_limit_aborts(make_table):
     table = make_table(limits=SafetyLimits(max_force_n=1.5, force_limit_n=2.0))
     table.when[Phase.SLIDE] = lambda: table.arm.push(3.0)
     outcome = table.explore()
+    assert outcome.error is ExplorationError.FORCE_LIMIT
     assert outcome.message.endswith('is above the limit of 2 N')
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
 
@@ -69,6 +71,7 @@ def test_a_force_above_the_limit_aborts(make_table):
 def test_a_finger_that_leaves_the_workspace_is_lifted(make_table):
     table = make_table(limits=SafetyLimits(z_low_m=-0.0004))
     outcome = table.explore()  # 1 N needs 0.5 mm of depth
+    assert outcome.error is ExplorationError.WORKSPACE
     assert outcome.message.startswith('the finger left the workspace: z is -0.000')
     assert table.arm.state().force_n == 0
 
@@ -117,19 +120,27 @@ def test_steps_that_are_late_again_and_again_do_not_hide_a_sensor_that_is_silent
 def test_a_slide_that_was_over_before_it_was_seen_is_no_success(table):
     table.late_ns = 100_000_000
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.005))
-    assert (outcome.success, outcome.slid) == (False, False)
+    assert (outcome.error, outcome.slid) == (ExplorationError.NO_SAMPLES, False)
     assert outcome.message.startswith('the slide was shorter than the delay of the arm')
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
 
 
 def test_a_fault_of_the_arm_aborts_and_is_reported(table):
     table.when[Phase.SLIDE] = lambda: table.arm.fail('protective stop')
-    assert 'the arm reports a fault: protective stop' in table.explore().message
+    outcome = table.explore()
+    assert outcome.error is ExplorationError.ARM_FAULT
+    assert 'the arm reports a fault: protective stop' in outcome.message
+
+
+def test_a_force_sensor_that_hangs_aborts_with_a_code_of_its_own(table):
+    table.when[Phase.SLIDE] = table.arm.freeze_force
+    assert table.explore().error is ExplorationError.FORCE_SENSOR
 
 
 def test_an_arm_that_is_lost_aborts(table):
     table.when[Phase.SLIDE] = table.arm.close
     outcome = table.explore()
+    assert outcome.error is ExplorationError.ARM_FAULT
     assert outcome.message.startswith('the simulated arm is not connected')
     assert table.phases[-1] is Phase.ABORTED
 
@@ -144,13 +155,13 @@ def test_a_bug_in_the_loop_leaves_no_arm_moving(table):
     before = table.arm.state().position
     table.pace()
     assert table.arm.state().position == before
-    assert not table.exploration.outcome.success
+    assert table.exploration.outcome.error is ExplorationError.INTERNAL
 
 
 def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(table):
-    table.when[Phase.SLIDE] = lambda: table.exploration.finish('the texture is certain')
+    table.when[Phase.SLIDE] = lambda: table.exploration.finish('the texture is decided')
     outcome = table.explore()
-    assert (outcome.success, outcome.message) == (True, 'the texture is certain')
+    assert (outcome.success, outcome.message) == (True, 'the texture is decided')
     begin, end = table.first(Phase.SLIDE)[0], table.first(Phase.LIFT)[0]
     assert begin.stamp_ns + begin.steady_s * 1e9 <= end.stamp_ns
     assert (end.stamp_ns - begin.stamp_ns) * 1e-9 < 0.15
@@ -158,9 +169,9 @@ def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(t
 
 def test_a_force_that_never_settles_aborts_with_what_was_waited_for(make_table):
     table = make_table(limits=SafetyLimits(contact_timeout_s=0.5), arm=SimulatedArmParams(admittance_m_s_n=1e-4))
-    assert table.explore(ExplorationRequest('linear_slide', force_n=3.0)).message.startswith(
-        'waited 0.5 s for the force to settle at 3 N; the force is'
-    )
+    outcome = table.explore(ExplorationRequest('linear_slide', force_n=3.0))
+    assert outcome.error is ExplorationError.MOTION_FAILED
+    assert outcome.message.startswith('waited 0.5 s for the force to settle at 3 N; the force is')
 
 
 def test_states_come_fifty_times_a_second_and_carry_who_and_what(table):

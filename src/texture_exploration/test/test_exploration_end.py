@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 import pytest
 
+from texture_core.errors import ExplorationError
 from texture_exploration.explorer import STILL_MOVING, ExplorationEnd, ExplorationOutcome
 
 
 @pytest.mark.parametrize(
     ('outcome', 'severity', 'sentence'),
     [
-        (ExplorationOutcome(True, 'done', True), 'info', '17: done'),
-        (ExplorationOutcome(False, 'stopped', True), 'warning', '17: stopped; the finger was lifted'),
-        (ExplorationOutcome(False, 'no lift', True, lifted=False), 'error', '17: no lift'),
+        (ExplorationOutcome(ExplorationError.NONE, 'done', True), 'info', '17: done'),
+        (
+            ExplorationOutcome(ExplorationError.STOPPED, 'stopped', True),
+            'warning',
+            '17: stopped; the finger was lifted',
+        ),
+        (ExplorationOutcome(ExplorationError.STOPPED, 'no lift', True, lifted=False), 'error', '17: no lift'),
         (STILL_MOVING, 'error', '17: the explorer ended before the finger was lifted; look at the robot'),
     ],
 )

@@ -115,7 +115,7 @@ def parent(bus):
 def test_a_failed_connection_leaves_no_motor_under_torque(bus, hand):
     bus.motors.fail(THUMB, OVERLOAD)
     with pytest.raises(
-        DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*reboot it \(service 'reboot'\)"
+        DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*reboot it \(service '~/reboot'\)"
     ):
         hand.connect()
     assert torque_is_off(bus)

@@ -25,8 +25,8 @@ pytestmark = pytest.mark.realtime
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
 OVERLOAD = (
-    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, reboot it (service 'reboot'"
-    ') or switch its power off and on'
+    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, reboot it "
+    "(service '~/reboot') or switch its power off and on"
 )
 needs_sdk = pytest.mark.skipif(importlib.util.find_spec('dynamixel_sdk') is None, reason='dynamixel-sdk is missing')
 

@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
 from texture_core.errors import DeviceError, MotionRefused
-from texture_core.ros import STATE_QOS
+from texture_core.ros import STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph, NodeProcess, killed_on_error
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
@@ -190,8 +190,9 @@ def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, m
     with NodeProcess('texture_exploration', 'explorer', MANAGED) as explorer:
         client = graph.peer.create_client(srv.Explore, 'explore')
         graph.until(client.service_is_ready)
-        client.call_async(srv.Explore.Request(motion='linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.1))
-        graph.until(lambda: any(state.phase_name == Phase.SLIDE.value for state in states))
+        request = ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.1)
+        client.call_async(srv.Explore.Request(request=to_msg(request)))
+        graph.until(lambda: any(state.phase == Phase.SLIDE.code for state in states))
         end(graph, explorer)
         taken, given_back = map(json.loads, log.read_text().splitlines())
     assert (taken['activated'], taken['deactivated']) == (['twist'], ['joints'])

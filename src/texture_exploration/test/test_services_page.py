@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 import yaml
 from rclpy.action import ActionClient
+from std_srvs.srv import Trigger
+from texture_msgs.msg import ExplorationResult
 
-from texture_core.ros_testing import LocalGraph
+from texture_core.ros_testing import LocalGraph, filled
 from texture_exploration.nodes import explorer
 from texture_exploration.nodes.explorer import ExplorerNode
 
@@ -19,13 +21,13 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 PAGE = Path(__file__).parents[3] / 'docs' / 'operate.md'
 LINE = re.compile(r'`(ros2 (?:service call|action send_goal) [^`]+)`')
 OF_OTHERS = {
-    '/reboot',
-    '/touch_surface',
-    '/forget_touches',
-    '/tare',
-    '/add_texture',
-    '/remove_last_added',
-    '/remove_texture',
+    '/explorer/reboot',
+    '/explorer/touch_surface',
+    '/explorer/forget_touches',
+    '/sensor/tare',
+    '/classifier/add_texture',
+    '/classifier/remove_last_added',
+    '/classifier/remove_texture',
 }
 
 
@@ -40,12 +42,6 @@ def parsed(line):
 LINES = [parsed(line) for line in LINE.findall(PAGE.read_text())]
 
 
-def filled(message, values):
-    for name, value in values.items():
-        setattr(message, name, value)  # rclpy checks name and type
-    return message
-
-
 @pytest.mark.parametrize(('name', 'kind', 'values'), LINES, ids=[f'{n}-{k.__name__}' for n, k, _ in LINES])
 def test_every_line_fits_its_type(name, kind, values):
     filled((kind.Goal if hasattr(kind, 'Goal') else kind.Request)(), values)
@@ -53,7 +49,7 @@ def test_every_line_fits_its_type(name, kind, values):
 
 def test_the_page_names_every_service_of_the_explorer():
     source = Path(explorer.__file__).read_text()
-    offered = {f'/{name}' for name in re.findall(r"create_service\([\w.]+, '(\w+)'", source)}
+    offered = {name.replace('~', '/explorer') for name in re.findall(r"create_service\([\w.]+, '(~/\w+)'", source)}
     assert offered
     assert offered <= {name for name, _, _ in LINES}
 
@@ -71,11 +67,13 @@ def test_the_explorer_answers_every_line_that_is_its_own():
                 graph.until(sent.done)
                 answered = sent.result().get_result_async()
                 graph.until(answered.done)
-                result = answered.result().result
+                result = answered.result().result.result
             else:
                 client = graph.peer.create_client(kind, name)
                 assert client.wait_for_service(30.0)
                 answered = client.call_async(filled(kind.Request(), values))
                 graph.until(answered.done)
                 result = answered.result()
-            assert result.success, (name, result.message)
+            result = getattr(result, 'result', result)  # of the service
+            success = result.success if kind is Trigger else result.error_code == ExplorationResult.ERROR_NONE
+            assert success, (name, result.message)

@@ -10,6 +10,7 @@ from texture_msgs import msg, srv
 
 from texture_core.ros import SENSOR_QOS, STATE_QOS
 from texture_core.ros_testing import LocalGraph
+from texture_core.types import Phase
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
@@ -36,13 +37,13 @@ class Finger:
             self._signal.publish(msg.TactileSignal())
 
     def _on_state(self, state):
-        self.phases.append((state.phase_name, time.monotonic()))
+        self.phases.append((tuple(Phase)[state.phase].value, time.monotonic()))
 
     def ready(self):
         return self._explore.service_is_ready() and self._signal.get_subscription_count() > 0
 
     def explore(self, **request):
-        return self._explore.call_async(srv.Explore.Request(**request))
+        return self._explore.call_async(srv.Explore.Request(request=msg.ExplorationRequest(**request)))
 
 
 @pytest.fixture
@@ -62,9 +63,9 @@ def test_a_silent_sensor_ends_the_slide_and_the_next_exploration_works(finger, r
     record_property('detected_s', finger.phases[-1][1] - silent_s)
     print(f'sensor silent: lifting after {1e3 * (finger.phases[-1][1] - silent_s):.0f} ms')
     finger.until(answer.done)
-    assert not answer.result().success
-    assert answer.result().message.startswith("no samples have come on 'signal' for")
+    assert answer.result().result.error_code == msg.ExplorationResult.ERROR_NO_SIGNAL
+    assert answer.result().result.message.startswith("no samples have come on 'signal' for")
     finger.streaming = True
     again = finger.explore(**QUICK)
     finger.until(again.done)
-    assert again.result().success, again.result().message
+    assert again.result().result.error_code == msg.ExplorationResult.ERROR_NONE, again.result()

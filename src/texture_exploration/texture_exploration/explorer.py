@@ -16,7 +16,15 @@ from typing import Literal
 import numpy as np
 
 from texture_core.config import find, param
-from texture_core.errors import DeviceError, InvalidData, MotionAborted, MotionRefused, TextureError
+from texture_core.errors import (
+    DeviceError,
+    ExplorationError,
+    InvalidData,
+    MotionAborted,
+    MotionRefused,
+    TextureError,
+    UnknownName,
+)
 from texture_core.types import (
     ENDED,
     Array,
@@ -122,8 +130,8 @@ class ExplorationOutcome:
 
     Attributes
     ----------
-    success
-        Whether it was done as requested.
+    error
+        Why it was not done as requested; NONE if it was.
     message
         What happened, in a sentence.
     slid
@@ -133,10 +141,22 @@ class ExplorationOutcome:
         stopped.
     """
 
-    success: bool
+    error: ExplorationError
     message: str
     slid: bool
     lifted: bool = True
+
+    @property
+    def success(self) -> bool:
+        """Whether it was done as requested."""
+        return self.error is ExplorationError.NONE
+
+
+def refusal(error: TextureError) -> ExplorationError:
+    """Return the code of what `Explorer.begin` raises, or of a request that cannot be read."""
+    if isinstance(error, MotionRefused):
+        return error.error
+    return ExplorationError.UNKNOWN_MOTION if isinstance(error, UnknownName) else ExplorationError.INVALID_REQUEST
 
 
 def no_signal_watch(_listening: Listening) -> str:
@@ -184,7 +204,9 @@ class Exploration:
     ) -> None:
         self.exploration_id = exploration_id
         self.request = request
-        self.outcome = ExplorationOutcome(False, 'it broke off through an internal error; see the log', False, False)
+        self.outcome = ExplorationOutcome(
+            ExplorationError.INTERNAL, 'it broke off through an internal error; see the log', False, False
+        )
         self.ended = threading.Event()
         self.gaps = 0
         self.state = ExplorationState(clock(), exploration_id, request.motion, Phase.IDLE)
@@ -197,9 +219,9 @@ class Exploration:
         self._force_watch = ForceWatch(limits, arm.force_reading, motion.force_n)
         self._guard = ForceGuard(limits)
         self._commanded = ArmCommand()
-        self._stop_reason = ''
+        self._stop: tuple[ExplorationError, str] | None = None
         self._finish_reason = ''
-        self._abort_reason = ''
+        self._abort: tuple[ExplorationError, str] | None = None  # the first reason counts
         self._signal_seen = False
         self._slid = False
         self._entered = False  # the workspace
@@ -213,16 +235,16 @@ class Exploration:
             while not self._tick():
                 pace()
         except DeviceError as error:
-            self._give_up(f'{error}; the finger was not lifted')
+            self._give_up(ExplorationError.ARM_FAULT, f'{error}; the finger was not lifted')
         finally:
             # Also when a bug ends the loop: no arm is left moving.
             with contextlib.suppress(DeviceError):
                 self._arm.stop()
         return self.outcome
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, error: ExplorationError = ExplorationError.STOPPED) -> None:
         """Lift the finger and abort, from any phase; from any thread."""
-        self._stop_reason = self._stop_reason or reason
+        self._stop = self._stop or (error, reason)
 
     def finish(self, reason: str) -> None:
         """End the slide early with success; from any thread."""
@@ -234,19 +256,13 @@ class Exploration:
         self._detect_gap(now_ns)
         fault = arm_fault(arm, now_ns, self._limits, self._listening)
         if fault:
-            self._give_up(f'{fault}; the finger was not lifted')
+            self._give_up(ExplorationError.ARM_FAULT, f'{fault}; the finger was not lifted')
             return True
         relative = self._guard.relative(arm, self._arm.zeroed, self._commanded)
-        reason = (
-            self._stop_reason
-            or self._violation(arm, relative)
-            or self._arm.doubt()
-            or self._signal_fault(self._listening)
-            or self._overdue(now_ns)
-        )
-        if reason:
-            self._abort_reason = self._abort_reason or reason
-            self._motion.abort(reason)
+        trouble = self._stop or self._trouble(now_ns, arm, relative)
+        if trouble:
+            self._abort = self._abort or trouble
+            self._motion.abort(trouble[1])
         if self._awaits_samples():
             self._arm.command(ArmCommand())
             return False
@@ -255,8 +271,8 @@ class Exploration:
         step = self._motion.step(now_ns, arm)
         command = self._guard.yielding(relative, step.command, step.phase in (Phase.LIFT, Phase.ABORTED))
         if self._guard.blocked:
-            self._abort_reason = self._motion.message
-            self._give_up(f'{self._guard.blocked}; the finger was not lifted')
+            self._abort = (self._error or ExplorationError.FORCE_LIMIT, self._motion.message)
+            self._give_up(ExplorationError.FORCE_LIMIT, f'{self._guard.blocked}; the finger was not lifted')
             return True
         if command is not step.command:
             step = replace(step, command=command, phase=Phase.LIFT)
@@ -268,20 +284,29 @@ class Exploration:
 
     def _awaits_samples(self) -> bool:
         """Return whether the finger rests until the sensor delivers; silence from before the request counts."""
-        self._signal_seen = self._signal_seen or bool(self._abort_reason) or not self._signal_fault(WITHOUT_GAPS)
+        self._signal_seen = self._signal_seen or bool(self._abort) or not self._signal_fault(WITHOUT_GAPS)
         return not self._signal_seen
 
-    def _violation(self, arm: ArmState, relative: ArmState) -> str:
-        """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
+    @property
+    def _error(self) -> ExplorationError:
+        """Why it is aborted so far, by itself or by its motion."""
+        return self._abort[0] if self._abort else self._motion.error
+
+    def _trouble(self, now_ns: int, arm: ArmState, relative: ArmState) -> tuple[ExplorationError, str] | None:
+        """Return why it must end; a finger that was pushed out of the workspace may come home first."""
         workspace_violation = self._limits.workspace_violation(arm)
         self._entered |= not workspace_violation
         frozen = self._force_watch.frozen(arm, self._commanded)
-        return (
-            arm.unsafe
-            or self._guard.violation(relative, self.state.phase)
-            or frozen
-            or (workspace_violation if self._entered else '')
+        reasons = (
+            (ExplorationError.ARM_FAULT, arm.unsafe),
+            (ExplorationError.FORCE_LIMIT, self._guard.violation(relative, self.state.phase)),
+            (ExplorationError.FORCE_SENSOR, frozen),
+            (ExplorationError.WORKSPACE, workspace_violation if self._entered else ''),
+            (ExplorationError.ARM_FAULT, self._arm.doubt()),
+            (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
+            (ExplorationError.TIMEOUT, self._overdue(now_ns)),
         )
+        return next(((error, text) for error, text in reasons if text), None)
 
     def _overdue(self, now_ns: int) -> str:
         """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
@@ -298,13 +323,10 @@ class Exploration:
     def _publish_state(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""
         self._slid |= step.phase is Phase.SLIDE
-        flaw = self._flaw() if step.phase is Phase.DONE else ''
-        if flaw:
-            lifted = self._motion.lifted
-            self.outcome, step = ExplorationOutcome(False, flaw, self._slid, lifted), replace(step, phase=Phase.ABORTED)
-        elif step.phase in ENDED:
-            success = step.phase is Phase.DONE
-            self.outcome = ExplorationOutcome(success, self._motion.message, self._slid, self._motion.lifted)
+        if step.phase in ENDED:
+            error, message = self._end_of(step.phase)
+            self.outcome = ExplorationOutcome(error, message, self._slid, self._motion.lifted)
+            step = replace(step, phase=Phase.DONE if self.outcome.success else Phase.ABORTED)
         # A promise that is withdrawn is told at once: until then windows may be cut on it.
         as_before = step.phase is self.state.phase and (step.steady_s > 0) is (self.state.steady_s > 0)
         if as_before and now_ns < self._next_state_ns:
@@ -331,14 +353,19 @@ class Exploration:
             )
         )
 
-    def _flaw(self) -> str:
-        """Return why an exploration whose motion ended as planned is no success, '' if it is."""
-        return self._force_watch.drifted() if self._slid else NO_SLIDE_OBSERVED
+    def _end_of(self, phase: Phase) -> tuple[ExplorationError, str]:
+        """Return how an exploration ended whose motion did; one that ended as planned may still be no success."""
+        if phase is not Phase.DONE:
+            return self._error or ExplorationError.INTERNAL, self._motion.message
+        if not self._slid:
+            return ExplorationError.NO_SAMPLES, NO_SLIDE_OBSERVED
+        drifted = self._force_watch.drifted()
+        return (ExplorationError.FORCE_SENSOR, drifted) if drifted else (ExplorationError.NONE, self._motion.message)
 
-    def _give_up(self, reason: str) -> None:
+    def _give_up(self, error: ExplorationError, reason: str) -> None:
         """End at once: an arm that does not follow cannot be lifted, only stopped."""
-        message = f'{self._abort_reason}; {reason}' if self._abort_reason else reason
-        self.outcome = ExplorationOutcome(False, message, self._slid, lifted=False)
+        error, message = (self._abort[0], f'{self._abort[1]}; {reason}') if self._abort else (error, reason)
+        self.outcome = ExplorationOutcome(error, message, self._slid, lifted=False)
         self._report(
             ExplorationState(
                 stamp_ns=self._clock(),
@@ -386,7 +413,10 @@ def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Liste
 # How the end of an exploration is reported to the operator.
 
 STILL_MOVING = ExplorationOutcome(
-    False, 'the explorer ended before the finger was lifted; look at the robot', slid=False, lifted=False
+    ExplorationError.INTERNAL,
+    'the explorer ended before the finger was lifted; look at the robot',
+    slid=False,
+    lifted=False,
 )
 
 
@@ -889,7 +919,7 @@ class Explorer:
 
     def _prepare(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
         if self._closed:
-            raise MotionRefused('the explorer is shutting down')
+            raise MotionRefused('the explorer is shutting down', ExplorationError.NOT_ACTIVE)
         self._check_idle()
         plan = find(MOTIONS, request.motion, 'motion')
         start = self.patch.start(request, self._ready(), self.limits)
@@ -915,11 +945,13 @@ class Explorer:
     def _check_idle(self) -> None:
         if self._released:
             raise MotionRefused(
-                'the explorer has no control of the arm; configure and activate it (ros2 lifecycle set)'
+                'the explorer has no control of the arm; configure and activate it (ros2 lifecycle set)',
+                ExplorationError.NOT_ACTIVE,
             )
         if self.current is not None:
             raise MotionRefused(
-                f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it"
+                f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it",
+                ExplorationError.BUSY,
             )
 
     def _ready(self) -> Vector:
@@ -928,7 +960,7 @@ class Explorer:
             try:
                 self._home = self.connect()
             except DeviceError as error:
-                raise MotionRefused(f'the arm is not ready: {error}') from error
+                raise MotionRefused(f'the arm is not ready: {error}', ExplorationError.ARM_NOT_READY) from error
         return self._home
 
     def _run(self, exploration: Exploration) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from texture_core.config import param
-from texture_core.errors import MotionAborted
+from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, FreeAir, Vector
 from texture_exploration.safety import SafetyLimits
@@ -413,6 +413,10 @@ class Motion(Protocol):
     @property
     def message(self) -> str:
         """What happened, in one sentence."""
+
+    @property
+    def error(self) -> ExplorationError:
+        """Why the motion itself aborted; NONE if it did not, or was told to."""
 
 
 # Plans a motion from a request, whose numbers of 0 take the default; the place where the slide begins and to which
@@ -821,7 +825,8 @@ class ApproachStage(Stage):
         if self._start_m - arm.position[2] > self._touch.approach_travel_m:
             raise MotionAborted(
                 f'no surface within {self._touch.approach_travel_m:g} m below the start; '
-                "bring the finger closer or raise 'approach_travel_m'"
+                "bring the finger closer or raise 'approach_travel_m'",
+                ExplorationError.NO_SURFACE,
             )
         speed_m_s = self._touch.approach_m_s(self._force_n, arm.watchdog_s)
         if arm.watchdog_s:
@@ -840,7 +845,9 @@ class ApproachStage(Stage):
             return
         what = f'({x:.2f}, {y:.2f}, {z:.2f}) N in the frame of the surface'
         if -z > math.hypot(x, y):
-            raise MotionAborted(f'the finger came down and its force became {what}: its sign is wrong')
+            raise MotionAborted(
+                f'the finger came down and its force became {what}: its sign is wrong', ExplorationError.FORCE_SENSOR
+            )
         raise MotionAborted(
             f'the finger met something from the side as it came down, {what}; if there is nothing, the force is given '
             'in another frame than its name says'
@@ -1150,6 +1157,9 @@ class WrongWay(MotionAborted):
 class WrongSign(MotionAborted):
     """The force rises while the finger does; what touches it is left by rising all the same."""
 
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason, ExplorationError.FORCE_SENSOR)
+
 
 class Rise(Stage):
     """Rise until the force has not changed over the clearance: then nothing touches the finger.
@@ -1206,7 +1216,8 @@ class Rise(Stage):
         if risen_m > self._longest_m:
             raise MotionAborted(
                 f'the force changed all the while the finger rose by {risen_m:.3f} m; see that nothing touches it, and '
-                "raise 'contact_force_n' above the noise of the force sensor"
+                "raise 'contact_force_n' above the noise of the force sensor",
+                ExplorationError.FORCE_SENSOR,
             )
         if abs(arm.force_n - self._first.force_n) > self._most_n:
             raise WrongWay(
@@ -1221,7 +1232,9 @@ class Rise(Stage):
     def _rests(self, time_ns: int, arm: ArmState) -> bool:
         """Wait until the arm stands still, as it may not do yet after a fault; note place and force."""
         if self.elapsed_s(time_ns) > PROBE_TIMEOUT_S:
-            raise MotionAborted('the arm moves although it was told to stand still; see who else moves it')
+            raise MotionAborted(
+                'the arm moves although it was told to stand still; see who else moves it', ExplorationError.ARM_FAULT
+            )
         if math.dist(arm.position, self._first.position) > STILL_M:
             self._first, self._rest_ns = arm, time_ns
         if (time_ns - self._rest_ns) * 1e-9 < STILL_S:
@@ -1348,6 +1361,7 @@ class LiftFirst:
         ]
         self._stage: Stage | None = None
         self._reason = ''  # why it ends before the motion has begun
+        self._error = ExplorationError.NONE
         self._free = False
 
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
@@ -1393,6 +1407,11 @@ class LiftFirst:
             return self._motion.message
         return self._reason if self._free else f'{self._reason}; the finger was not lifted'
 
+    @property
+    def error(self) -> ExplorationError:
+        """Why the motion itself aborted; NONE if it did not, or was told to."""
+        return self._error or self._motion.error
+
     def _end(self, reason: str, *stages: Stage) -> None:
         """End after some stages; the motion does not begin."""
         self._reason = self._reason or reason
@@ -1416,7 +1435,7 @@ class LiftFirst:
 
     def _give_way(self, stage: Stage, trouble: MotionAborted) -> None:
         """End in the way that is left: back, further up, by the lift of the motion, or where the finger is."""
-        reason = str(trouble)
+        reason, self._error = str(trouble), self._error or trouble.error
         if isinstance(trouble, WrongWay):
             self._end(reason, GoBack(trouble.before_n, self._touch))
         elif isinstance(trouble, WrongSign):
@@ -1459,6 +1478,7 @@ class StagedMotion:
         self._phase = Phase.IDLE
         self._abort_reason = ''
         self._finish_reason = ''
+        self.error = ExplorationError.NONE
 
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
         """Return what to do now; a stage that is over hands on to the next within the same step."""
@@ -1525,7 +1545,9 @@ class StagedMotion:
             if stage is self._lift:
                 before = f'{self._abort_reason}; ' if self._abort_reason else ''
                 self._abort_reason = f'{before}the finger was not lifted: {error}'
+                self.error = self.error or error.error
             elif not self._sought(error, stage):
+                self.error = self.error or error.error
                 self.abort(str(error))
             return None
         return command

@@ -16,7 +16,7 @@ import numpy as np
 
 from texture_core.config import find, find_file, from_mapping, load_card, load_yaml, param, safe_repr
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_core.types import TARED, Array, FeatureVector, Window
+from texture_core.types import Array, FeatureVector, Window
 from texture_features.correction import CORRECTED, Correction, read_correction
 from texture_features.feature import Feature, WindowBatch
 from texture_features.features.spectral import (
@@ -331,20 +331,19 @@ class FeatureSet:
         """What is subscribed to, in order, each once."""
         return tuple(dict.fromkeys(map(_topic_of, self.window_names)))
 
-    def tare_faults(self, sensors: Mapping[str, str]) -> list[str]:
+    def tare_faults(self, tared: Mapping[str, bool]) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round.
 
         Parameters
         ----------
-        sensors
-            Name of the sensor by topic, as its messages hold it.
+        tared
+            Whether the level without load is subtracted, by topic, as the messages hold it.
         """
         faults = []
         for item in self.inputs:
             for topic in item.topics if item.tare else ():
-                tared = sensors.get(topic, '').endswith(TARED)
-                if topic in sensors and tared != (item.tare == SUBTRACTED):
-                    what = 'subtracted' if tared else 'not subtracted'
+                if topic in tared and tared[topic] != (item.tare == SUBTRACTED):
+                    what = 'subtracted' if tared[topic] else 'not subtracted'
                     faults.append(
                         f"the recipe expects '{topic}' {item.tare}, and its baseline is {what}; tare the sensor, or "
                         'change its parameter subtract_baseline'

@@ -11,7 +11,16 @@ import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 
 from texture_core.errors import InvalidData
-from texture_core.types import ExplorationState, FeatureVector, Phase, RoughnessEstimate, TactileSignal, TextureEstimate
+from texture_core.types import (
+    ExplorationState,
+    FeatureVector,
+    ModelInfo,
+    Phase,
+    Rejection,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
 from texture_recordings.bags import (
     TYPES,
     BagWriter,
@@ -31,7 +40,15 @@ STAMP_NS = 1_700_000_000_123_456_789
 def signal(first_sample: int = 7, channels: tuple[str, ...] = ('a', 'b')) -> TactileSignal:
     samples = np.arange(5 * len(channels), dtype=np.float32).reshape(5, -1) + first_sample
     return TactileSignal(
-        STAMP_NS + first_sample, 'x/y', channels, ('count',) * len(channels), 1000.0, first_sample, samples, 'tip'
+        STAMP_NS + first_sample,
+        'x/y',
+        channels,
+        ('count',) * len(channels),
+        1000.0,
+        first_sample,
+        samples,
+        'tip',
+        tared=True,
     )
 
 
@@ -41,9 +58,10 @@ VALUES = [
     ('features', FeatureVector(STAMP_NS, 'e1', 0.5, 0.1, ('f', 'g'), np.array([1.5, math.nan]), feature_set='abc')),
     (
         'texture',
-        TextureEstimate(STAMP_NS, 'e1', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7),
+        TextureEstimate(STAMP_NS, 'e1', 'cork', Rejection.NOVEL, 0.9, (0.9, 0.1), True, ('cork',), 3, 0.7),
     ),
     ('roughness', RoughnessEstimate(STAMP_NS, 'e1', True, 3.5, 0.4)),
+    ('model_info', ModelInfo(STAMP_NS, 'm', 3, ('cork', 'felt'), 'abc')),
 ]
 
 
@@ -86,7 +104,7 @@ def test_a_bag_played_by_ros_offers_every_topic_as_the_nodes_do(tmp_path: Path) 
             bag.write(topic, value, 1)
     with Reader(tmp_path / 'bag') as reader:
         offered = {c.topic.rpartition('/')[2]: c.ext.offered_qos_profiles[0] for c in reader.connections}
-    latched = {'texture', 'roughness', 'exploration', 'signal_baseline'}
+    latched = {'texture', 'roughness', 'exploration', 'model_info', 'signal_baseline'}
     assert {name for name, qos in offered.items() if qos.durability.name == 'TRANSIENT_LOCAL'} == latched
     assert {name for name, qos in offered.items() if qos.reliability.name == 'BEST_EFFORT'} == {'signal'}
 

@@ -22,13 +22,17 @@ from numpy.typing import NDArray
 from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text
 from texture_core.errors import InvalidData, MissingLibrary
 from texture_core.types import (
+    DURATIONS,
     NANOSECONDS,
+    POSITION,
     QUALITIES,
     Array,
     ExplorationState,
     FeatureVector,
+    ModelInfo,
     Phase,
     Quality,
+    Rejection,
     RoughnessEstimate,
     TactileSignal,
     TextureEstimate,
@@ -223,7 +227,7 @@ def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
 
 MESSAGES: Mapping[str, type] = {
     f'texture_msgs/msg/{cls.__name__}': cls
-    for cls in (TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate)
+    for cls in (TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate, ModelInfo)
 }
 TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
 PHASES = tuple(Phase)
@@ -231,6 +235,7 @@ Convert = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 # By the type of a field, where it is not the same on both sides: to the wire, and back.
 WIRE: Mapping[Any, Convert] = {
     Phase: (lambda phase: phase.code, PHASES.__getitem__),
+    Rejection: (int, Rejection),
     tuple[str, ...]: (list, tuple),
     tuple[float, ...]: (lambda values: np.array(values, dtype=np.float64), lambda values: tuple(values.tolist())),
     Array: (lambda values: np.ascontiguousarray(values, dtype=np.float64), lambda values: values),
@@ -264,14 +269,20 @@ def encode(value: Any) -> bytes:
     types = typestore().types
     cls: type = type(value)
     given = {name: to_wire(getattr(value, name)) for name, (to_wire, _) in _fields(cls).items()}
-    if isinstance(value, ExplorationState):
-        given['phase_name'] = value.phase.value
-    seconds, nanoseconds = divmod(next(given.pop(name) for name in STAMPS if name in given), NANOSECONDS)
+    stamp_ns = next(given.pop(name) for name in STAMPS if name in given)
     header = types['std_msgs/msg/Header'](
-        stamp=types['builtin_interfaces/msg/Time'](sec=int(seconds), nanosec=int(nanoseconds)),
-        frame_id=given.pop('frame_id', ''),
+        stamp=_two_numbers('builtin_interfaces/msg/Time', stamp_ns), frame_id=given.pop('frame_id', '')
     )
+    for name in DURATIONS.keys() & given.keys():
+        given[DURATIONS[name]] = _two_numbers('builtin_interfaces/msg/Duration', given.pop(name) * NANOSECONDS)
+    if POSITION[0] in given:
+        given['position'] = types['geometry_msgs/msg/Point'](*(given.pop(name) for name in POSITION))
     return bytes(typestore().serialize_cdr(types[TYPES[cls]](header=header, **given), TYPES[cls]))
+
+
+def _two_numbers(msgtype: str, time_ns: float) -> Any:
+    seconds, nanoseconds = divmod(round(time_ns), NANOSECONDS)
+    return typestore().types[msgtype](sec=seconds, nanosec=nanoseconds)
 
 
 def decode(raw: bytes, msgtype: str) -> Any:
@@ -296,6 +307,11 @@ def _data_class(message: Any, cls: type) -> Any:
             values[name] = stamp_ns
         elif name == 'frame_id':
             values[name] = message.header.frame_id
+        elif name in DURATIONS:
+            duration = getattr(message, DURATIONS[name])
+            values[name] = (duration.sec * NANOSECONDS + duration.nanosec) / NANOSECONDS
+        elif name in POSITION and hasattr(message, 'position'):
+            values[name] = getattr(message.position, name[0])
         else:
             values[name] = from_wire(getattr(message, name))
     if cls is TactileSignal:
@@ -338,7 +354,7 @@ class SignalDecoder:
         samples = np.frombuffer(raw, '<f4', length, tail + INDEX_AND_LENGTH.size)
         return TactileSignal(
             seconds * NANOSECONDS + nanoseconds, like.sensor, like.channels, like.units, like.sampling_rate_hz,
-            first, samples.reshape(-1, columns), like.frame_id,
+            first, samples.reshape(-1, columns), like.frame_id, like.tared,
         )  # fmt: skip
 
     def _decode_first(self, raw: bytes) -> TactileSignal:

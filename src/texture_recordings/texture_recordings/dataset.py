@@ -822,10 +822,9 @@ class SlideDataset:
         """
         faults: dict[str, None] = {}
         for slide in self.slides:
-            sensors = {topic: batches[0].sensor for topic, batches in slide.signals.items() if batches}
-            faults.update(
-                dict.fromkeys(feature_set.tare_faults({t: s for t, s in sensors.items() if s not in ('', t)}))
-            )
+            batches = {topic: batches[0] for topic, batches in slide.signals.items() if batches}
+            tared = {topic: batch.tared for topic, batch in batches.items() if batch.sensor not in ('', topic)}
+            faults.update(dict.fromkeys(feature_set.tare_faults(tared)))
         return list(faults)
 
     def features_over_distances(

@@ -14,7 +14,7 @@ from rclpy.qos import QoSProfile
 from texture_msgs import msg
 
 from texture_core.errors import InvalidData
-from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, SENSOR_QOS, STATE_QOS
+from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, SENSOR_QOS, STATE_QOS, quality_of_service
 
 # --------------------
 # See that nobody else publishes what a replay publishes: two streams on one topic would be mixed in every window.
@@ -87,5 +87,6 @@ TOPICS: Mapping[str, Topic] = {
     'features': Topic(msg.FeatureVector, FEATURE_QOS, 'features'),
     'texture': Topic(msg.TextureEstimate, ESTIMATE_QOS, 'texture'),
     'roughness': Topic(msg.RoughnessEstimate, ESTIMATE_QOS, 'roughness'),
+    'model_info': Topic(msg.ModelInfo, quality_of_service('model_info'), 'model_info'),
     'diagnostics': Topic(DiagnosticArray, QoSProfile(depth=100), '/diagnostics'),
 }

@@ -100,7 +100,7 @@ def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
     units: dict[str, str | tuple[str, ...]] = {
         f'{prefix}signal': 'count',
         f'{prefix}signal_static': 'count',
-        f'{prefix}imu': imu,
+        f'{prefix}signal_imu': imu,
     }
     return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(shape), units, 1000)
 
@@ -115,7 +115,7 @@ def papillarray(prefix: str = '', arrays: int = 1) -> RigCase:
     """Return how a hub of PapillArrays is fed."""
     units: dict[str, str | tuple[str, ...]] = {
         f'{prefix}signal': (*('N',) * 3, *('mm',) * 3) * 9,
-        f'{prefix}wrench': (*('N',) * 3, *('N mm',) * 3),
+        f'{prefix}signal_wrench': (*('N',) * 3, *('N mm',) * 3),
     }
     feed = feed_papillarray(arrays)
     return RigCase(f'{prefix}signal', 250.0, 1, feed, units, 30_000, config='{rate_hz: 250}')

@@ -139,7 +139,7 @@ def test_a_rate_that_the_hub_cannot_do_is_refused() -> None:
 
 def test_the_force_on_the_array_is_the_sum_over_its_pillars(make_papillarray: Make) -> None:
     topics = make_papillarray().read_s(0.2)
-    pillars, whole = topics['signal'][-1].samples, topics['wrench'][-1].samples
+    pillars, whole = topics['signal'][-1].samples, topics['signal_wrench'][-1].samples
     np.testing.assert_allclose(whole[:, 0], pillars[:, ::6].sum(axis=1))
 
 

@@ -486,7 +486,7 @@ class HazardRig(Listener):
         self._explorer = self._new_explorer().__enter__()
         self._wait_for_explorer()
         with suppress(TextureError):  # what is left of the force tells
-            self._settings.call('lift', 'start the explorer')
+            self._settings.call('explorer/lift', 'start the explorer')
         time.sleep(SETTLED_S)
 
     def _wait_for_explorer(self) -> None:

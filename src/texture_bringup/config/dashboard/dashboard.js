@@ -170,7 +170,7 @@ function showTexture(texture) {
   at('label').dataset.final = texture.final;
   const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
   const sure = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
-  const strange = texture.label && !texture.known ? 'unknown: it resembles no trained texture' : '';
+  const strange = texture.label && !texture.known ? `rejected: ${texture.rejection}` : '';
   at('estimate-note').textContent = [sure, seen, strange, texture.message, texture.missing].filter(Boolean).join(' · ');
   const bars = texture.labels.slice(0, BARS).map((label, k) => [label, texture.probabilities[k]]);
   fill(at('evidence'), bars, ([label, probability]) => {
@@ -298,7 +298,7 @@ at('explore').addEventListener('submit', (event) => {
   say('exploring');
   ask('explore', {
     motion: at('motion').value, ...Object.fromEntries(numbers), direction_rad: Number(at('direction').value),
-    surface: at('surface').value.trim(), early_stopping: at('certain').checked,
+    surface: at('surface').value.trim(), early_stopping: at('early').checked,
   });
 });
 at('learn').addEventListener('submit', (event) => {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that slide the finger: `explore` once, `identify` until the texture is certain."""
+"""The sub-commands of `texture` that slide the finger: `explore` once, `identify` until the label is decided."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
         'control of the arm',
     )
     parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
-    parser.add_argument('--early-stopping', action='store_true', help='end the slide as soon as the texture is certain')
+    parser.add_argument('--early-stopping', action='store_true', help='end the slide as soon as the label is decided')
     parser.add_argument(
         '--timeout',
         type=float,
@@ -177,7 +177,7 @@ def _configure_identify(parser: argparse.ArgumentParser) -> None:
 
 
 def _identify(options: argparse.Namespace) -> int:
-    """Slide until the texture is certain; return 1 as soon as a slide was ended early by a fault or a stop."""
+    """Slide until the label is decided; return 1 as soon as a slide was ended early by a fault or a stop."""
     if options.slides < 1 or not 0.0 < options.sure <= 1.0:
         raise InvalidParameter(
             f'--slides is {options.slides} and --sure {options.sure:g}; 1 or more and a probability are needed'
@@ -240,5 +240,5 @@ def belief_text(known: NextTouchModel, belief: Array) -> str:
 
 explore = Command('slide the finger over the surface and print what it is', _configure_explore, _explore)
 identify = Command(
-    'repeat the slide with the largest information gain until the texture is certain', _configure_identify, _identify
+    'repeat the slide with the largest information gain until the label is decided', _configure_identify, _identify
 )

@@ -32,21 +32,21 @@ def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Comma
 
 stop = trigger(
     'end the exploration and lift the finger, from any phase',
-    'stop',
+    'explorer/stop',
     'no explorer runs there; if the robot moves, use its own stop, and look whether the finger touches',
 )
-recover = trigger('free the arm from a fault', 'recover')
-lift = trigger('lift a finger that was left pressed on the surface', 'lift')
+recover = trigger('free the arm from a fault', 'explorer/recover')
+lift = trigger('lift a finger that was left pressed on the surface', 'explorer/lift')
 reboot = trigger(
     'reboot the motors of a hand',
-    'reboot',
+    'explorer/reboot',
     "only the launch file 'hand' offers it; start that, or give its --namespace",
 )
-touch_surface = trigger('take one of the touches that find the surface', 'touch_surface', TOUCHES_MISSING)
-forget_touches = trigger('begin the touches that find the surface again', 'forget_touches', TOUCHES_MISSING)
+touch_surface = trigger('take one of the touches that find the surface', 'explorer/touch_surface', TOUCHES_MISSING)
+forget_touches = trigger('begin the touches that find the surface again', 'explorer/forget_touches', TOUCHES_MISSING)
 tare = trigger(
     'tare a sensor that nothing touches',
-    'tare',
+    'sensor/tare',
     'start a sensor, such as the emulated one with `texture launch emulator`, or give its --namespace',
 )
 

@@ -33,8 +33,9 @@ from texture_core.ros import (
     declare,
     from_msg,
     has_ended,
-    request_to_msg,
+    quality_of_service,
     run,
+    to_msg,
 )
 from texture_core.types import ExplorationRequest
 from texture_exploration.safety import SafetyLimits
@@ -96,16 +97,18 @@ class DashboardNode(Node):
             raise InvalidParameter('no motion is asked for; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
         await ready(self._explorer.server_is_ready, 'explorer')
-        goal = await answer_of(self._explorer.send_goal_async(request_to_msg(request)), ANSWER_DEADLINE_S)
+        wanted = action.Explore.Goal(request=to_msg(request))
+        goal = await answer_of(self._explorer.send_goal_async(wanted), ANSWER_DEADLINE_S)
         ending = goal.get_result_async()
         seen_s = time.monotonic()
         while time.monotonic() - seen_s < GONE_S:
             try:
-                result = (await answer_of(ending, RETRY_PERIOD_S)).result
+                result = (await answer_of(ending, RETRY_PERIOD_S)).result.result
             except LaunchFailed:
                 seen_s = time.monotonic() if self._explorer.server_is_ready() else seen_s
                 continue
-            return {'success': result.success, 'message': result.message, 'id': result.exploration_id}
+            success = result.error_code == msg.ExplorationResult.ERROR_NONE
+            return {'success': success, 'message': result.message, 'id': result.exploration_id}
         raise MotionAborted(VANISHED)
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -155,9 +158,9 @@ class DashboardNode(Node):
 
     def _make_clients(self) -> None:
         self._explorer = ActionClient(self, action.Explore, 'explore')
-        self._stop = self.create_client(Trigger, 'stop')
-        self._learn = self.create_client(srv.AddTexture, 'add_texture')
-        self._undo = self.create_client(Trigger, 'remove_last_added')
+        self._stop = self.create_client(Trigger, 'explorer/stop')
+        self._learn = self.create_client(srv.AddTexture, 'classifier/add_texture')
+        self._undo = self.create_client(Trigger, 'classifier/remove_last_added')
         self._limits = AsyncParameterClient(self, 'explorer')
 
     def _subscribe(self) -> None:
@@ -168,6 +171,7 @@ class DashboardNode(Node):
             (msg.ExplorationState, 'exploration', feed.on_state, STATE_QOS),
             (msg.TextureEstimate, 'texture', feed.on_texture, ESTIMATE_QOS),
             (msg.RoughnessEstimate, 'roughness', feed.on_roughness, ESTIMATE_QOS),
+            (msg.ModelInfo, 'model_info', feed.on_model, quality_of_service('model_info')),
         ):
             self.create_subscription(kind, topic, partial(self._on_message, take), qos)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
@@ -200,7 +204,8 @@ class DashboardNode(Node):
     async def _ask(self, client: Any, request: Any, node: str) -> Mapping[str, Any]:
         await ready(client.service_is_ready, node)
         answer = await answer_of(client.call_async(request), ANSWER_DEADLINE_S)
-        return {'success': answer.success, 'message': answer.message}
+        success = answer.success if isinstance(request, Trigger.Request) else not answer.error_code
+        return {'success': success, 'message': answer.message}
 
 
 def _short(value: Any) -> Any:

@@ -30,7 +30,9 @@ from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
 
 # Phases of an exploration in which nothing touches the finger; after an abort it may still.
-UNLOADED = frozenset({msg.ExplorationState.IDLE, msg.ExplorationState.APPROACH, msg.ExplorationState.DONE})
+UNLOADED = frozenset(
+    {msg.ExplorationState.PHASE_IDLE, msg.ExplorationState.PHASE_APPROACH, msg.ExplorationState.PHASE_DONE}
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class SensorNode(PatientLifecycleNode):
         self._reader: SensorReader | None = None
         self._topics: dict[str, Any] = {}
         self._baselines: dict[str, Any] = {}
-        self.create_service(Trigger, 'tare', self._on_tare)
+        self.create_service(Trigger, '~/tare', self._on_tare)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_exploration, STATE_QOS)
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
         if params.autostart:

@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
 from texture_core.config import param
-from texture_core.errors import ModelMismatch, TextureError
-from texture_core.ros import run
-from texture_core.types import FeatureVector, TextureEstimate
+from texture_core.errors import ModelMismatch, TextureError, UnknownName
+from texture_core.ros import quality_of_service, run, to_msg
+from texture_core.types import FeatureVector, ModelInfo, TextureEstimate
 from texture_estimation.evidence import NO_MODEL, EvidenceAccumulator
-from texture_estimation.incremental import IncrementalClassifier
+from texture_estimation.incremental import ChangeError, ChangeRefused, IncrementalClassifier
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.ros import EstimatorNode
 
@@ -39,9 +39,12 @@ class Classifier(EstimatorNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('classifier', **kwargs)
-        self.create_service(srv.AddTexture, 'add_texture', self._on_add)
-        self.create_service(Trigger, 'remove_last_added', self._on_remove_last)
-        self.create_service(srv.RemoveTexture, 'remove_texture', self._on_remove)
+        self._revision = 0
+        self._model_infos = self.create_publisher(msg.ModelInfo, 'model_info', quality_of_service('model_info'))
+        self._tell_model()
+        self.create_service(srv.AddTexture, '~/add_texture', self._on_add)
+        self.create_service(Trigger, '~/remove_last_added', self._on_remove_last)
+        self.create_service(srv.RemoveTexture, '~/remove_texture', self._on_remove)
 
     def _load(self, path: str) -> EvidenceAccumulator:
         model = load_model(path) if path else None
@@ -51,7 +54,22 @@ class Classifier(EstimatorNode):
     def _predict(self, vector: FeatureVector) -> TextureEstimate:
         if self._incremental_classifier is not None:
             self._incremental_classifier.observe(vector)
-        return super()._predict(vector)
+        return replace(super()._predict(vector), revision=self._revision)
+
+    def _change(self, params: Any) -> None:
+        super()._change(params)
+        self._tell_model()
+
+    def _tell_model(self) -> None:
+        """Publish the labels of the model, which estimates do not repeat."""
+        self._revision += 1
+        model, now_ns = self._evidence.model, self.get_clock().now().nanoseconds
+        info = (
+            ModelInfo(now_ns, model.name, labels=model.labels, feature_set=model.feature_set)
+            if model
+            else ModelInfo(now_ns)
+        )
+        self._model_infos.publish(to_msg(replace(info, revision=self._revision)))
 
     def _facts(self) -> dict[str, int]:
         return {'added_slides': len(self._evidence.model.added_slides) if self._evidence.model else 0}
@@ -63,10 +81,10 @@ class Classifier(EstimatorNode):
         try:
             answer.examples = self._require_incremental().add(request.label, request.exploration_id)
         except (TextureError, OSError) as error:
-            answer.message = str(error)
+            answer.error_code, answer.message = int(_code(error)), str(error)
             return answer
         model = self._use_updated_model()
-        answer.success = True
+        answer.error_code = srv.AddTexture.Response.ERROR_NONE
         answer.message = f"added '{request.label.strip()}' from '{model.added_slides[-1].exploration_id}'; " + _known(
             model
         )
@@ -88,9 +106,9 @@ class Classifier(EstimatorNode):
         try:
             removed = self._require_incremental().remove(request.label)
         except (TextureError, OSError) as error:
-            answer.message = str(error)
+            answer.error_code, answer.message = int(_code(error)), str(error)
             return answer
-        answer.success = True
+        answer.error_code = srv.RemoveTexture.Response.ERROR_NONE
         answer.slides = len(removed)
         model = self._use_updated_model()
         stays = ' which stays as it was trained;' if removed[0].label in model.labels else ''
@@ -110,8 +128,16 @@ class Classifier(EstimatorNode):
         """Classify with the updated model."""
         model = self._require_incremental().model
         self._evidence = EvidenceAccumulator(model)
+        self._tell_model()
         self.get_logger().info(_known(model))
         return model
+
+
+def _code(error: TextureError | OSError) -> ChangeError:
+    if isinstance(error, ChangeRefused):
+        return error.error
+    kinds = {ModelMismatch: ChangeError.NO_MODEL, UnknownName: ChangeError.NOT_ADDED, OSError: ChangeError.NOT_STORED}
+    return next((code for kind, code in kinds.items() if isinstance(error, kind)), ChangeError.INVALID_LABEL)
 
 
 def _known(model: TextureModel) -> str:

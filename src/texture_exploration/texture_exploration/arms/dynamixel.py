@@ -58,7 +58,7 @@ RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
 GARBLED = 'answers with what cannot be read: is its id given to two motors, or the cable damaged?'
 RESET = 'has lost its torque: it was reset, as by a dip of its supply'
-REMEDY = "; when it has cooled and nothing blocks it, reboot it (service 'reboot') or switch its power off and on"
+REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
 

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from texture_msgs import srv
 
 from texture_core.config import param
-from texture_core.ros import declare, request_to_msg, run
+from texture_core.ros import declare, run, to_msg
 from texture_exploration.presets import load_preset
 
 SAMPLE_PERIOD_S = 0.1
@@ -60,12 +60,12 @@ class ExplorePreset(Node):
             self._on_end()
             return
         self._busy = True
-        request = request_to_msg(self._remaining.pop(0), srv.Explore.Request)
+        request = srv.Explore.Request(request=to_msg(self._remaining.pop(0)))
         self._client.call_async(request).add_done_callback(self._on_answer)
 
     def _on_answer(self, future: Any) -> None:
-        answer = future.result()
-        kind = 'done' if answer.success else 'aborted' if answer.exploration_id else 'refused'
+        answer = future.result().result
+        kind = 'done' if answer.error_code == answer.ERROR_NONE else 'aborted' if answer.exploration_id else 'refused'
         self.counts[kind] += 1
         number = self._total - len(self._remaining)
         self.get_logger().info(f'{number} of {self._total}, {kind}: {answer.exploration_id} {answer.message}')

@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_core.config import find, param
-from texture_core.errors import DeviceError, InvalidData, InvalidParameter, MotionRefused, UnknownName
+from texture_core.errors import DeviceError, ExplorationError, InvalidData, InvalidParameter, MotionRefused, UnknownName
 from texture_core.ros import (
     ESTIMATE_QOS,
     SENSOR_QOS,
@@ -36,7 +36,6 @@ from texture_core.ros import (
     frame_name,
     from_msg,
     on_change,
-    request_from_msg,
     run,
     to_msg,
     to_stamp,
@@ -52,6 +51,7 @@ from texture_exploration.explorer import (
     ExplorationIds,
     Explorer,
     no_signal_watch,
+    refusal,
 )
 from texture_exploration.safety import Listening, SafetyLimits, SignalWatch, SignalWatchParams, SurfacePatch
 from texture_exploration.stages import TouchParams
@@ -161,8 +161,8 @@ LOGGED: dict[str, Callable[[Any, str], Any]] = {
     'error': lambda logger, text: logger.error(text),
 }
 NOT_KNOWN = (
-    'whether the finger presses is not known, as after an explorer that was killed: the service lift lifts it now, and '
-    "the first exploration does so; 'lift_at_start: true' does so at every start"
+    'whether the finger presses is not known, as after an explorer that was killed: the service ~/lift lifts it now, '
+    "and the first exploration does so; 'lift_at_start: true' does so at every start"
 )
 RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
@@ -215,14 +215,14 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
-        self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
-        self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
-        self.create_service(Trigger, 'lift', self._on_lift, callback_group=group)
+        self.create_service(Trigger, '~/stop', self._on_stop, callback_group=group)
+        self.create_service(Trigger, '~/recover', self._on_recover, callback_group=group)
+        self.create_service(Trigger, '~/lift', self._on_lift, callback_group=group)
         if self._explorer.arm.reboots:
-            self.create_service(Trigger, 'reboot', self._on_reboot, callback_group=group)
+            self.create_service(Trigger, '~/reboot', self._on_reboot, callback_group=group)
         if self._explorer.arm.base_frame_id:
-            self.create_service(Trigger, 'touch_surface', self._on_touch_surface, callback_group=group)
-            self.create_service(Trigger, 'forget_touches', self._on_forget_touches, callback_group=group)
+            self.create_service(Trigger, '~/touch_surface', self._on_touch_surface, callback_group=group)
+            self.create_service(Trigger, '~/forget_touches', self._on_forget_touches, callback_group=group)
         ActionServer(
             self,
             action.Explore,
@@ -340,25 +340,27 @@ class ExplorerNode(PatientLifecycleNode):
         on_change(self, SurfacePatch, partial(setattr, self._explorer, 'patch'))
 
     def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
-        return self._explore(request, response, lambda exploration: exploration.ended.wait())
+        response.result = self._explore(request.request, lambda exploration: exploration.ended.wait())
+        return response
 
     def _on_goal(self, goal: Any) -> action.Explore.Result:
-        result = self._explore(goal.request, action.Explore.Result(), partial(self._give_feedback, goal))
+        result = self._explore(goal.request.request, partial(self._give_feedback, goal))
         if goal.is_cancel_requested:
             goal.canceled()
-        elif result.success:
+        elif result.error_code == msg.ExplorationResult.ERROR_NONE:
             goal.succeed()
         else:
             goal.abort()
-        return result
+        return action.Explore.Result(result=result)
 
-    def _explore(self, request: Any, result: Any, wait: Callable[[Exploration], None]) -> Any:
-        """Begin, attend to it until the finger is lifted, and fill the result of the service or the action."""
+    def _explore(self, request: msg.ExplorationRequest, wait: Callable[[Exploration], None]) -> msg.ExplorationResult:
+        """Begin, attend to it until the finger is lifted, and return the result for the service or the action."""
+        result = msg.ExplorationResult()
         try:
             exploration_id = self._ids.next(self.get_clock().now().nanoseconds)
-            exploration = self._explorer.begin(exploration_id, request_from_msg(request))
+            exploration = self._explorer.begin(exploration_id, from_msg(request))
         except (MotionRefused, UnknownName, InvalidData) as error:
-            result.message = str(error)
+            result.error_code, result.message = int(refusal(error)), str(error)
             # Their numbers are NaN, not the zeros that a new message holds.
             nothing = ExplorationEstimates('')
             result.texture, result.roughness = to_msg(nothing.texture), to_msg(nothing.roughness)
@@ -370,10 +372,11 @@ class ExplorerNode(PatientLifecycleNode):
             self._wait_for_final_estimates(exploration, estimates)
         finally:
             del self._open[exploration.exploration_id]
-        result.success, result.message = exploration.outcome.success, exploration.outcome.message
+        outcome = exploration.outcome
+        result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
-        self._last_end = ExplorationEnd(exploration.exploration_id, exploration.outcome)
+        self._last_end = ExplorationEnd(exploration.exploration_id, outcome)
         if not self._closing:
             self._log_end(self._last_end)
         return result
@@ -385,7 +388,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Publish feedback to the client; stop when it cancels."""
         while not exploration.ended.wait(FEEDBACK_PERIOD_S):
             if goal.is_cancel_requested:
-                exploration.stop('cancelled by the client')
+                exploration.stop('cancelled by the client', ExplorationError.CANCELLED)
             estimates = self._open[exploration.exploration_id]
             state = self._stamped(exploration.state)
             goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates.texture)))
@@ -460,7 +463,7 @@ class ExplorerNode(PatientLifecycleNode):
         ours = current is not None and current.exploration_id == estimate.exploration_id
         if wanted and ours and isinstance(estimate, TextureEstimate) and self._early_stopping.may_stop(estimate):
             current.finish(
-                f"ended early: '{estimate.label}' is certain with {estimate.confidence:.2f} "
+                f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
                 f'after {estimate.windows} windows'
             )
 

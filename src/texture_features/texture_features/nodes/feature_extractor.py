@@ -51,7 +51,7 @@ class FeatureExtractor(Node):
         self._invalid = self._sent = 0
         self._reported: dict[str, int] = {}
         self._frame_id = ''  # of the fingertip, of several that of the first input
-        self._sensors: dict[str, str] = {}  # by topic
+        self._tared: dict[str, bool] = {}  # by topic
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
@@ -62,7 +62,7 @@ class FeatureExtractor(Node):
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
         if topic == self._feature_set.topics[0]:
             self._frame_id = message.header.frame_id
-        self._sensors[topic] = message.sensor
+        self._tared[topic] = message.tared
         self._add(partial(self._cutter.add_signal, topic), message)
 
     def _on_state(self, message: msg.ExplorationState) -> None:
@@ -103,7 +103,7 @@ class FeatureExtractor(Node):
         dropped = self._cutter.dropped(time.monotonic())
         if dropped:
             return 'WARN', f'nothing comes any more on {", ".join(dropped)}; no window can be cut without it', numbers
-        tare_faults = self._feature_set.tare_faults(self._sensors)
+        tare_faults = self._feature_set.tare_faults(self._tared)
         if tare_faults:
             return 'WARN', '; '.join(tare_faults), numbers
         new, self._reported = {name: total - self._reported.get(name, 0) for name, total in numbers.items()}, numbers

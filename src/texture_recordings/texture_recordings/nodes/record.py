@@ -111,7 +111,7 @@ class RecordNode(Node):
         self._bag.qualities[name] = quality
         # Deep queues: a burst must not be lost while the executor is busy. Volatile, but for what is said once for all:
         # of an exploration that was over before the recording began, the states alone would come.
-        once = name in COMMON or name.endswith('_baseline')
+        once = name in COMMON or name.endswith(('_baseline', '/model_info'))
         durability = offered.durability if once else DurabilityPolicy.VOLATILE
         qos = QoSProfile(depth=1000, reliability=offered.reliability, durability=durability)
         kind = message_class(msgtype)

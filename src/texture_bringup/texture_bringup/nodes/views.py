@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Show the finger in types that standard tools draw: samples as curves, taxels, the path of the slide, its wrench."""
+
+from __future__ import annotations
+
+import array
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Point, WrenchStamped
+from numpy.typing import NDArray
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import Image
+from std_msgs.msg import ColorRGBA, Header
+from texture_msgs import msg
+from visualization_msgs.msg import Marker
+
+from texture_bringup.dashboard import places_of
+from texture_core.config import param
+from texture_core.errors import TextureError
+from texture_core.ros import SENSOR_QOS, STATE_QOS, DiagnosticReport, Diagnostics, declare, from_msg, run, to_stamp
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
+
+WATCH_S = 0.5  # how often it is asked who looks
+PATH_S = 0.2  # how often the path is drawn anew
+PATH_POINTS = 5000
+PATH_WIDTH_M = 0.001
+WEAK, STRONG = np.array([0.1, 0.15, 0.5]), np.array([1.0, 0.85, 0.1])  # colours by the power of the vibration
+NEWTON_MILLIMETRES = 1e-3
+# rqt_plot and RViz ask for reliable delivery, which a best-effort publisher does not offer.
+VIEW_QOS = QoSProfile(depth=1000)
+
+
+VIEW_TYPES: Mapping[str, type] = {'signal': msg.SignalSample, 'taxels': Image, 'wrench': WrenchStamped, 'path': Marker}
+
+
+@dataclass(frozen=True)
+class ViewsParams:
+    """Parameters of the views."""
+
+    max_rate_hz: float = param(
+        2500.0,
+        'Messages a second of the curve at most; a faster signal is drawn by its lowest and highest value in turn.',
+        unit='Hz',
+        low=10.0,
+        high=20_000.0,
+    )
+
+
+def curve(batch: TactileSignal, max_rate_hz: float) -> Iterator[tuple[int, NDArray[np.float32]]]:
+    """Yield time, ns, and value of each channel, (n_channels,), of the points by which a batch is drawn.
+
+    They are its samples or, where these are more than `max_rate_hz`, the lowest and the highest of as many samples as
+    needed, half of these samples apart.
+    """
+    step = 2 * math.ceil(batch.sampling_rate_hz / max_rate_hz) if batch.sampling_rate_hz > max_rate_hz else 1
+    starts = np.arange(0, len(batch.samples), step)
+    rows = batch.samples
+    if step > 1:
+        extremes = [ufunc.reduceat(rows, starts, axis=0) for ufunc in (np.fmin, np.fmax)]
+        rows = np.stack(extremes, axis=1).reshape(-1, rows.shape[1])
+        starts = np.stack([starts, starts + step // 2], axis=1).ravel()
+    times_ns = batch.stamp_ns + np.round(starts * (NANOSECONDS / batch.sampling_rate_hz)).astype(np.int64)
+    return zip(times_ns.tolist(), rows, strict=True)
+
+
+def taxel_image(batch: TactileSignal) -> NDArray[np.float32]:
+    """Return the newest sample as an image, (n_rows, n_columns), by row and column in the names of the channels.
+
+    NaN where there is no channel.
+    """
+    places = np.array(places_of(batch.channels))
+    image = np.full(places.max(axis=0) + 1, np.nan, np.float32)
+    image[places[:, 0], places[:, 1]] = batch.samples[-1]
+    return image
+
+
+def path_colours(powers: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return red, green and blue, (n, 3), of powers, (n,): they differ by factors, so colours follow the logarithm."""
+    logs = np.log(powers + np.finfo(float).tiny)
+    share = (logs - logs.min()) / (np.ptp(logs) or 1.0)
+    colours: NDArray[np.float64] = WEAK + share[:, None] * (STRONG - WEAK)
+    return colours
+
+
+class Views(Node):
+    """Publish views of the topics in its namespace; each is computed only while somebody subscribes to it."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('views', **kwargs)
+        self._params = declare(self, ViewsParams)
+        self._points: list[Point] = []
+        self._powers: list[float] = []
+        self._power = 0.0  # of the newest batch
+        self._state: ExplorationState | None = None
+        self._bad = 0
+        signal, state = (msg.TactileSignal, SENSOR_QOS), (msg.ExplorationState, STATE_QOS)
+        # The topics that each view is made of, and what takes their messages.
+        sources = {
+            'signal': [('signal', signal, self._draw)],
+            'taxels': [('signal_static', signal, self._show_taxels)],
+            'wrench': [('signal_wrench', signal, self._show_wrench)],
+            'path': [('signal', signal, self._note_power), ('exploration', state, self._follow)],
+        }
+        self._views: list[tuple[Any, list[Any], list[Any]]] = [
+            (self.create_publisher(kind, f'~/{name}', VIEW_QOS), sources[name], []) for name, kind in VIEW_TYPES.items()
+        ]
+        self._curve, self._image, self._wrench, self._path = (view for view, _, _ in self._views)
+        self.create_timer(WATCH_S, self._watch)
+        self.create_timer(PATH_S, self._draw_path)
+        Diagnostics(self, self._report)
+
+    def _watch(self) -> None:
+        """Subscribe to what the watched views are made of, and to nothing else."""
+        for publisher, sources, subscriptions in self._views:
+            watched = publisher.get_subscription_count() > 0
+            if watched and not subscriptions:
+                subscriptions += [
+                    self.create_subscription(kind, topic, self._taking(take), qos)
+                    for topic, (kind, qos), take in sources
+                ]
+            elif not watched:
+                while subscriptions:
+                    self.destroy_subscription(subscriptions.pop())
+
+    def _taking(self, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        def on_message(message: Any) -> None:
+            try:
+                value = from_msg(message)
+            except TextureError as error:
+                self._bad += 1
+                self.get_logger().warning(f'left out: {error}', throttle_duration_sec=10.0)
+                return
+            if not isinstance(value, TactileSignal) or len(value.samples):
+                take(value)
+
+        return on_message
+
+    def _draw(self, batch: TactileSignal) -> None:
+        for time_ns, row in curve(batch, self._params.max_rate_hz):
+            header = Header(stamp=to_stamp(time_ns), frame_id=batch.frame_id)
+            self._curve.publish(msg.SignalSample(header=header, values=array.array('f', row.tobytes())))
+
+    def _show_taxels(self, batch: TactileSignal) -> None:
+        image = taxel_image(batch)
+        height, width = image.shape
+        shown = Image(header=_newest(batch), height=height, width=width, encoding='32FC1', step=4 * width)
+        shown.data = array.array('B', image.tobytes())
+        self._image.publish(shown)
+
+    def _show_wrench(self, batch: TactileSignal) -> None:
+        values = dict(zip(batch.channels, batch.samples[-1].tolist(), strict=True))
+        shown = WrenchStamped(header=_newest(batch))
+        for axis in 'xyz':
+            setattr(shown.wrench.force, axis, values.get(f'f{axis}', math.nan))
+            setattr(shown.wrench.torque, axis, NEWTON_MILLIMETRES * values.get(f't{axis}', math.nan))
+        self._wrench.publish(shown)
+
+    def _note_power(self, batch: TactileSignal) -> None:
+        self._power = float(np.nan_to_num(batch.samples.var(axis=0).mean()))
+
+    def _follow(self, state: ExplorationState) -> None:
+        if state.phase is not Phase.SLIDE or math.isnan(state.x_m):
+            return
+        if self._state is None or state.exploration_id != self._state.exploration_id:
+            self._points, self._powers = [], []
+        self._state = state
+        if len(self._points) < PATH_POINTS:
+            self._points.append(Point(x=state.x_m, y=state.y_m, z=state.z_m))
+            self._powers.append(self._power)
+
+    def _draw_path(self) -> None:
+        """Publish the path of the slide; each exploration replaces the one before."""
+        if self._state is None or not self._path.get_subscription_count():
+            return
+        path = Marker(type=Marker.LINE_STRIP, action=Marker.ADD, ns='path', frame_locked=True, points=self._points)
+        path.header = Header(stamp=to_stamp(self._state.stamp_ns), frame_id=self._state.frame_id)
+        path.pose.orientation.w, path.scale.x = 1.0, PATH_WIDTH_M
+        colours = path_colours(np.array(self._powers)).tolist()
+        path.colors = [ColorRGBA(r=red, g=green, b=blue, a=1.0) for red, green, blue in colours]
+        self._path.publish(path)
+
+    def _report(self) -> DiagnosticReport:
+        watched = [publisher.topic_name for publisher, _, subscriptions in self._views if subscriptions]
+        said = f'shows {", ".join(watched)}' if watched else 'nobody looks, so nothing is computed'
+        return 'WARN' if self._bad else 'OK', said, {'bad_messages': self._bad}
+
+
+def _newest(batch: TactileSignal) -> Header:
+    """Return the header of the newest sample of a batch."""
+    age_ns = round((len(batch.samples) - 1) / batch.sampling_rate_hz * NANOSECONDS)
+    return Header(stamp=to_stamp(batch.stamp_ns + age_ns), frame_id=batch.frame_id)
+
+
+def main() -> None:
+    """Run the node."""
+    run(Views)
