@@ -44,7 +44,7 @@ class AccuracyCurve:
 
 def overview_chart(methods: Sequence[AccuracyCurve], path: str | Path) -> Path:
     """Draw all methods, each named at the left end of its line."""
-    with chart(path, (8.0, 5.4), 'Slides recognised over the time since the finger began to slide') as figure:
+    with chart(path, (8.0, 5.4), 'Same track: slides recognised over the time since the first touch') as figure:
         axes = figure.subplots()
         for each in methods:
             axes.plot(each.seconds, [100 * share for share in each.shares], **STYLES[each.kind])
@@ -114,7 +114,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
                 'kind': each.kind,
                 's': [round(seconds, 5) for seconds in each.seconds],
                 'share': list(each.shares),
-                'ends_when_certain': each.ends,
+                'ends_when_decided': each.ends,
             }
             for each in methods
         },
