@@ -14,7 +14,7 @@ from texture_exploration.nodes.explore_preset import ExplorePreset
 from texture_exploration.nodes.explorer import ExplorerNode
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
-PRESET = 'motion: linear_slide\nspeed_m_s: 0.1\ndistance_m: 0.02\nvary: {direction_deg: [0, 720, .inf]}\n'
+PRESET = 'motion: linear_slide\nspeed_m_s: 0.1\nvary: {distance_m: [0.02, 0.03, 5.0]}\n'  # the last one is refused
 
 
 @pytest.fixture

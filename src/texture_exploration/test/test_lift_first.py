@@ -92,7 +92,7 @@ def test_a_state_from_before_the_zero_of_its_force_is_no_contact(table, lifting_
 CHANGING = {
     'swings': (lambda reading: 2.0 * (reading.time_ns // 50_000_000 % 2), 'the force changed by 2.00 N'),
     'falls slowly': (
-        lambda reading: -150.0 * reading.position[2],
+        lambda reading: -120.0 * reading.position[2],
         'the force changed all the while the finger rose by 0.05',
     ),
 }
