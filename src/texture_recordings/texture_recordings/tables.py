@@ -577,6 +577,8 @@ class TableFiles:
         timer = threading.Timer(self._left_s, child.kill)
         timer.start()
         try:
+            if self._left_s <= 0.0:  # what came meanwhile came too late
+                raise EOFError
             return self._connection.recv_bytes()
         except (EOFError, OSError):
             late = time.monotonic() - began_s >= self._left_s
