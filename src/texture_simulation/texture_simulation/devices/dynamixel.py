@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import struct
 import time
 from collections.abc import Mapping
@@ -40,6 +41,7 @@ TORQUE_NM_A = 0.517  # of an XC330-M288: stall torque by stall current, 0.93 N·
 A_PER_RAD_AND_GAIN = 0.005  # how much current an error makes, per gain
 DAMPING = 0.012  # N·m per rad/s
 PHYSICS_S = 0.0005
+SPEED_FILTER_S = 0.02  # of the register Present Velocity; a guess, the manual names none
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,7 @@ class DynamixelMotors:
         self.tables = {motor: bytearray(256) for motor in ids}
         self._angle: Array = np.zeros(len(ids))
         self._speed: Array = np.zeros(len(ids))
+        self._shown_speed: Array = np.zeros(len(ids))
         self._current: Array = np.zeros(len(ids))
         self._lever = np.array([pressing[motor].lever_m if motor in pressing else 0.0 for motor in ids])
         self._height = np.array([pressing[motor].height_m if motor in pressing else 1.0 for motor in ids])
@@ -169,9 +172,14 @@ class DynamixelMotors:
         most = np.abs(self._registers(GOAL_CURRENT, '<h')) * A_PER_COUNT
         gain = self._registers(P_GAIN, '<H') * A_PER_RAD_AND_GAIN
         free = np.array([motor not in self.held for motor in self.ids])
+        before = self._angle
         for _ in range(steps):
             self._current = np.where(torque, np.clip(gain * (goal - self._angle), -most, most), 0.0)
             self._move(free)
+        # Without inertia the speed swings with each goal: who reads in step with the goals would always see half.
+        passed_s = max(1, steps) * PHYSICS_S
+        newest = (self._angle - before) / passed_s - self._shown_speed
+        self._shown_speed = self._shown_speed + newest * (1.0 - math.exp(-passed_s / SPEED_FILTER_S))
         self._show()
 
     def _move(self, free: NDArray[np.bool_]) -> None:
@@ -262,7 +270,7 @@ class DynamixelMotors:
                 self.tables[motor],
                 PRESENT,
                 round(self._current[place] / A_PER_COUNT),
-                round(self._speed[place] / RAD_S_PER_COUNT),
+                round(self._shown_speed[place] / RAD_S_PER_COUNT),
                 round(self._angle[place] / RAD_PER_COUNT) + 2048,
             )
 
