@@ -7,11 +7,11 @@ import pytest
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_evaluation.collection import (
     CollectionParams,
-    Judgement,
     Patch,
+    PlaceAccuracy,
     PlacePlan,
     collect,
-    judge,
+    evaluate_places,
     next_bag,
 )
 from texture_features.examples import LabelledFeatures, SlideConditions
@@ -71,12 +71,12 @@ def features(shift_of_place, n_places=6):
 
 
 def test_left_out_places_are_told_right_or_taken_for_another_surface():
-    assert judge(features(lambda place: 0.0), 'oak') == Judgement(6, 6, '', 1)
+    assert evaluate_places(features(lambda place: 0.0), 'oak') == PlaceAccuracy(6, 6, '', 1)
     # One place of six is like felt: trained on the others it is taken for that.
-    assert judge(features(lambda place: float(place == 2)), 'oak') == Judgement(6, 5, 'felt', 1)
+    assert evaluate_places(features(lambda place: float(place == 2)), 'oak') == PlaceAccuracy(6, 5, 'felt', 1)
     # Clopper and Pearson: 6 of 6 show 0.1^(1/6) at 90 %.
-    assert Judgement(6, 6, '', 1).bound == pytest.approx(0.1 ** (1 / 6))
-    assert Judgement(6, 6, '', 0).bound == 0.0
+    assert PlaceAccuracy(6, 6, '', 1).bound == pytest.approx(0.1 ** (1 / 6))
+    assert PlaceAccuracy(6, 6, '', 0).bound == 0.0
 
 
 def run(judgements, faults=(), params=PARAMS):
@@ -92,26 +92,26 @@ def run(judgements, faults=(), params=PARAMS):
 
 
 def test_it_ends_at_the_bound_not_before_the_fewest_places():
-    end, told = run([Judgement(3, 3, '', 2), Judgement(4, 3, 'felt', 2), Judgement(6, 6, '', 2)])
+    end, told = run([PlaceAccuracy(3, 3, '', 2), PlaceAccuracy(4, 3, 'felt', 2), PlaceAccuracy(6, 6, '', 2)])
     assert (end.success, end.slides) == (True, 6)
     assert [slides for slides, _ in told] == [3, 4, 6]
     assert end.message.startswith('6 of 6 left-out places right; at new places at least 68 %')
 
 
 def test_a_bound_that_is_not_met_says_what_is_missing():
-    end, _ = run([Judgement(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
+    end, _ = run([PlaceAccuracy(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
     assert (end.success, end.slides) == (False, 9)
     assert 'mostly taken for felt' in end.message and 'collect felt at more places, too' in end.message
 
 
 def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
-    end, _ = run([Judgement(3, 0), Judgement(4, 0)])
+    end, _ = run([PlaceAccuracy(3, 0), PlaceAccuracy(4, 0)])
     assert (end.success, end.slides) == (True, 4)
     assert 'no other surface is in the folder yet' in end.message
 
 
 def test_three_failures_in_a_row_end_it_and_two_do_not():
-    end, told = run([Judgement(3, 3, '', 1)] * 3, ['', 'off the patch', 'stopped', '', '', 'a', 'b', 'c'])
+    end, told = run([PlaceAccuracy(3, 3, '', 1)] * 3, ['', 'off the patch', 'stopped', '', '', 'a', 'b', 'c'])
     assert (end.success, end.slides) == (False, 3)
     assert end.message == '3 touches in a row failed, the last: c'
     assert (1, 'a touch failed: off the patch') in told

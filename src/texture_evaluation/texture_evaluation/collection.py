@@ -54,7 +54,7 @@ class CollectionParams:
         if shortest_s < SHORTEST_S:
             raise InvalidParameter(
                 f"a slide of 'distance_m' {self.distance_m:g} m lasts {shortest_s:.2f} s at 'speed_high_m_s' "
-                f'{self.speed_high_m_s:g} m/s; {SHORTEST_S:g} s are needed to judge it'
+                f'{self.speed_high_m_s:g} m/s; {SHORTEST_S:g} s are needed to recognise it'
             )
 
 
@@ -153,7 +153,7 @@ CONFIDENCE = 0.9
 
 
 @dataclass(frozen=True)
-class Judgement:
+class PlaceAccuracy:
     """What a quick classifier says of places that it was not trained at.
 
     Parameters
@@ -190,7 +190,7 @@ class Judgement:
         )
 
 
-def judge(features: LabelledFeatures, surface: str) -> Judgement:
+def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
     """Return how a discriminant tells the places of a surface, each left out in turn, from all other surfaces.
 
     Parameters
@@ -207,7 +207,7 @@ def judge(features: LabelledFeatures, surface: str) -> Judgement:
     codes = np.searchsorted(names, features.labels)
     where = np.unique(places[own])
     if len(names) < 2 or len(where) < 2:
-        return Judgement(len(where), 0, others=len(names) - 1)
+        return PlaceAccuracy(len(where), 0, others=len(names) - 1)
     taken: Counter[str] = Counter()
     for place in where:
         left = own & (places == place)
@@ -215,7 +215,7 @@ def judge(features: LabelledFeatures, surface: str) -> Judgement:
         scores = (features.values[left] @ weights + offsets).mean(axis=0)
         taken[str(names[int(scores.argmax())])] += 1
     right = taken.pop(surface, 0)
-    return Judgement(len(where), right, taken.most_common(1)[0][0] if taken else '', len(names) - 1)
+    return PlaceAccuracy(len(where), right, taken.most_common(1)[0][0] if taken else '', len(names) - 1)
 
 
 # --------------------
@@ -227,19 +227,19 @@ FAILURES = 3  # in a row end it
 
 @dataclass(frozen=True)
 class CollectionEnd:
-    """How it ended: whether the bound was met, in a sentence, the number of slides, and the last judgement."""
+    """How it ended: whether the bound was met, in a sentence, the number of slides, and the last accuracy."""
 
     success: bool
     message: str
     slides: int
-    judgement: Judgement = Judgement(0, 0)
+    accuracy: PlaceAccuracy = PlaceAccuracy(0, 0)
 
 
 def collect(
     plan: PlacePlan,
     params: CollectionParams,
     explore: Callable[[ExplorationRequest], str],
-    judge_all: Callable[[], Judgement],
+    evaluate_all: Callable[[], PlaceAccuracy],
     tell: Callable[[str, int], None],
 ) -> CollectionEnd:
     """Touch place after place until the bound is met, the places are used up, or the finger cannot go on.
@@ -250,35 +250,35 @@ def collect(
         Where to touch, and when to end.
     explore
         Makes one slide; returns why it failed, '' if it did not.
-    judge_all
+    evaluate_all
         Judges what has been recorded so far.
     tell
-        Called with a sentence and the number of slides after each judgement and each failure.
+        Called with a sentence and the number of slides after each accuracy and each failure.
     """
-    slides, failures, judgement = 0, 0, Judgement(0, 0)
+    slides, failures, accuracy = 0, 0, PlaceAccuracy(0, 0)
     while slides < params.most_places:
         fault = explore(plan.next())
         if fault:
             failures += 1
             tell(f'a touch failed: {fault}', slides)
             if failures == FAILURES:
-                return CollectionEnd(False, f'{FAILURES} touches in a row failed, the last: {fault}', slides, judgement)
+                return CollectionEnd(False, f'{FAILURES} touches in a row failed, the last: {fault}', slides, accuracy)
             continue
         slides, failures = slides + 1, 0
         if slides % EVERY and slides not in (params.places, params.most_places):
             continue
-        judgement = judge_all()
-        tell(judgement.sentence, slides)
-        met = judgement.bound >= params.bound if judgement.others else True
+        accuracy = evaluate_all()
+        tell(accuracy.sentence, slides)
+        met = accuracy.bound >= params.bound if accuracy.others else True
         if slides >= params.places and met:
-            return CollectionEnd(True, judgement.sentence, slides, judgement)
+            return CollectionEnd(True, accuracy.sentence, slides, accuracy)
     missing = f'; the bound of {100 * params.bound:.0f} % is not met: '
     missing += (
-        f'collect {judgement.confused} at more places, too, or other speeds and forces, or add slow channels'
-        if judgement.confused
+        f'collect {accuracy.confused} at more places, too, or other speeds and forces, or add slow channels'
+        if accuracy.confused
         else 'allow more places'
     )
-    return CollectionEnd(False, judgement.sentence + missing, slides, judgement)
+    return CollectionEnd(False, accuracy.sentence + missing, slides, accuracy)
 
 
 def next_bag(existing: Sequence[str], surface: str) -> str:

@@ -27,17 +27,17 @@ from texture_core.types import ExplorationRequest
 from texture_evaluation.collection import (
     CollectionEnd,
     CollectionParams,
-    Judgement,
     Patch,
+    PlaceAccuracy,
     PlacePlan,
     collect,
-    judge,
+    evaluate_places,
     next_bag,
 )
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
-RECIPE = 'fast'  # whose features judge the places
+RECIPE = 'fast'  # whose features tell the places apart
 RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
@@ -101,7 +101,7 @@ def collect_surface(
             return '' if explored.success else explored.message
 
         try:
-            end = collect(plan, params, explore, lambda: _judge(bag, surface, count), told)
+            end = collect(plan, params, explore, lambda: _evaluate_bag(bag, surface, count), told)
         except KeyboardInterrupt as stop:
             raise KeyboardInterrupt(f"stopped: {stop}; {count} slides are kept in '{bag}'") from None
         except TextureError as error:
@@ -109,7 +109,7 @@ def collect_surface(
     return end, bag
 
 
-def _judge(bag: Path, surface: str, slides: int) -> Judgement:
+def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
     """Judge all bags of the folder, once the newest one shows so many slides on the disk."""
     feature_set = FeatureSet.load(RECIPE)
     deadline_s = time.monotonic() + FLUSHED_S
@@ -118,7 +118,7 @@ def _judge(bag: Path, surface: str, slides: int) -> Judgement:
         dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
         written = sum(one.bag == bag for one in dataset)
         if written >= slides or time.monotonic() > deadline_s:
-            return judge(dataset.features(feature_set), surface)
+            return evaluate_places(dataset.features(feature_set), surface)
 
 
 @contextmanager
@@ -208,7 +208,7 @@ class Collector(Node):
             result.message = str(error)
         else:
             result.success, result.message, result.bag = end.success, end.message, str(bag)
-            result.slides, result.places, result.right = end.slides, end.judgement.places, end.judgement.right
+            result.slides, result.places, result.right = end.slides, end.accuracy.places, end.accuracy.right
         finally:
             self._busy.release()
         self.get_logger().info(f'collect: {result.message}')
