@@ -583,7 +583,7 @@ def param(
     default
         Default value; a list is copied for each instance.
     description
-        Whole sentence: what it sets and what changes when it grows.
+        Noun phrase, and what a larger value changes: "Highest speed; a higher one shortens the slide."
     unit
         Unit such as 'm/s'; '' if it has none.
     low

@@ -202,12 +202,12 @@ class AnySkinSettings:
     """Parameters of the AnySkin or ReSkin board."""
 
     magnetometers: int = param(
-        MAGNETOMETERS, 'Sets the number of magnetometers on the board; it must equal that of the device.',
+        MAGNETOMETERS, 'Number of magnetometers on the board; it must equal that of the device.',
         low=1, high=16,
     )  # fmt: skip
     rate_hz: float = param(
         0.0,
-        'Sets the rate of the board; 0 measures it in the first two seconds, to a whole hertz. A model needs the rate '
+        'Rate of the board; 0 measures it in the first two seconds, to a whole hertz. A model needs the rate '
         'that it was trained at, so set it once it is known.',
         unit='Hz',
         low=0.0,

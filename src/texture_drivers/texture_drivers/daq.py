@@ -36,10 +36,10 @@ DEFAULT_SETTINGS = 'daq'
 class DaqChannel:
     """What is wired to one input of the converter: sample = gain · count + offset."""
 
-    name: str = param('', 'Sets the name of the channel, which must be unique in the file.')
-    unit: str = param('V', 'Sets the unit of the published samples.')
-    gain: float = param(1.0, 'Sets the factor from counts to the unit; a larger value gives larger samples.')
-    offset: float = param(0.0, 'Sets the value of 0 counts in the unit, which is added to every sample.')
+    name: str = param('', 'Name of the channel, which must be unique in the file.')
+    unit: str = param('V', 'Unit of the published samples.')
+    gain: float = param(1.0, 'Factor from counts to the unit; larger values give larger samples.')
+    offset: float = param(0.0, 'Value of 0 counts in the unit, which is added to every sample.')
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class DaqSettings:
 
     baud: int = param(
         BAUD,
-        'Sets the baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
         low=9600,
         high=12_000_000,
     )
     rate_hz: float = param(
         RATE_HZ,
-        'Sets the nominal sampling rate of every channel; it must equal that of the device.',
+        'Nominal sampling rate of every channel; it must equal that of the device.',
         unit='Hz',
         low=1.0,
         high=1e5,

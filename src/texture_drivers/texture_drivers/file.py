@@ -238,22 +238,20 @@ class FileSettings:
 
     rate_hz: float = param(
         0.0,
-        'Sets the sampling rate of every channel; 0 takes the rate that the file states.',
+        'Sampling rate of every channel; 0 takes the rate that the file states.',
         unit='Hz',
         low=0.0,
         high=1e6,
     )
     speed: float = param(
         1.0,
-        'Sets how many times faster than real time the file is played; 0 plays it as fast as it can be read.',
+        'How many times faster than real time the file is played; 0 plays it as fast as it can be read.',
         low=0.0,
         high=1000.0,
     )
     loop: bool = param(False, 'Starts the file again from the beginning when its end is reached.')
-    topic: str = param(
-        'signal', 'Sets the topic on which the samples are published.', choices=('signal', 'signal_static')
-    )
-    unit: str = param('', 'Sets the unit of the published samples; the file does not state one.')
+    topic: str = param('signal', 'Topic on which the samples are published.', choices=('signal', 'signal_static'))
+    unit: str = param('', 'Unit of the published samples; the file does not state one.')
 
 
 class FilePlayer:

@@ -169,7 +169,7 @@ class TareParams:
 
     tare_s: float = param(
         1.0,
-        "Sets over how long the service '~/tare' averages; a longer time gives a more exact baseline.",
+        "Over how long the service '~/tare' averages; a longer time gives a more exact baseline.",
         unit='s',
         low=0.1,
         high=60.0,
@@ -186,7 +186,7 @@ class TareParams:
     )
     drift_limit: float = param(
         10.0,
-        'Sets the drift of an unloaded channel, in standard deviations of its noise, from which on it is reported; a '
+        'Drift of an unloaded channel, in standard deviations of its noise, from which on it is reported; a '
         'larger value reports less.',
         low=1.0,
         high=1e6,

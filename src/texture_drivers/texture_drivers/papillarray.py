@@ -281,7 +281,7 @@ class PapillArraySettings:
 
     rate_hz: int = param(
         500,
-        'Sets the rate that is asked of the hub: 100, 250, 500 or 1000; a higher rate holds finer texture and costs '
+        'Rate that is asked of the hub: 100, 250, 500 or 1000; a higher rate holds finer texture and costs '
         'more computing time.',
         unit='Hz',
         low=100,

@@ -134,36 +134,34 @@ class PvdfSettings:
 
     baud: int = param(
         BAUD,
-        'Sets the baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
         low=9600,
         high=12_000_000,
     )
     film_rate_hz: float = param(
         FILM_RATE_HZ,
-        'Sets the nominal sampling rate of the film; it must equal that of the device.',
+        'Nominal sampling rate of the film; it must equal that of the device.',
         unit='Hz',
         low=1.0,
         high=1e5,
     )
     force_rate_hz: float = param(
         FORCE_RATE_HZ,
-        'Sets the nominal sampling rate of the force sensor; it must equal that of the device.',
+        'Nominal sampling rate of the force sensor; it must equal that of the device.',
         unit='Hz',
         low=0.1,
         high=1e4,
     )
     film_gain_pc: float = param(
-        FILM_PC_PER_COUNT, 'Sets the charge of one count of the film; a larger value gives larger samples.', unit='pC'
+        FILM_PC_PER_COUNT, 'Charge of one count of the film; larger values give larger samples.', unit='pC'
     )
-    film_offset_pc: float = param(
-        0.0, 'Sets the charge of the film at 0 counts, which is added to every sample.', unit='pC'
-    )
+    film_offset_pc: float = param(0.0, 'Charge of the film at 0 counts, which is added to every sample.', unit='pC')
     force_gain_n: float = param(
         FORCE_N_PER_COUNT,
-        'Sets the force of one count of the force sensor; a larger value gives larger samples.',
+        'Force of one count of the force sensor; larger values give larger samples.',
         unit='N',
     )
-    force_offset_n: float = param(0.0, 'Sets the force at 0 counts, which is added to every sample.', unit='N')
+    force_offset_n: float = param(0.0, 'Force at 0 counts, which is added to every sample.', unit='N')
     restore_from_hz: float = param(
         0.0,
         'Publishes the force on the film with its charge leakage undone above this frequency; 0 publishes '
@@ -174,21 +172,21 @@ class PvdfSettings:
     )
     resistance_ohm: float = param(
         RESISTANCE_OHM,
-        'Sets the input resistance of the amplifier; a larger value makes the charge leak more slowly.',
+        'Input resistance of the amplifier; larger values make the charge leak more slowly.',
         unit='Ω',
         low=1e3,
         high=1e15,
     )
     capacitance_f: float = param(
         CAPACITANCE_F,
-        'Sets the capacitance of the film; a larger value makes the charge leak more slowly.',
+        'Capacitance of the film; larger values make the charge leak more slowly.',
         unit='F',
         low=1e-13,
         high=1e-3,
     )
     d33_pc_n: float = param(
         D33_PC_N,
-        'Sets the charge of the film per force; a larger value gives smaller restored forces.',
+        'Charge of the film per force; larger values give smaller restored forces.',
         unit='pC/N',
         low=1e-3,
         high=1e6,

@@ -155,23 +155,21 @@ class SoundCardSettings:
 
     rate_hz: int = param(
         RATE_HZ,
-        'Sets the sampling rate of the card, such as 44100 or 48000; it must be one that the card has.',
+        'Sampling rate of the card, such as 44100 or 48000; it must be one that the card has.',
         unit='Hz',
         low=8000,
         high=192_000,
     )
-    channels: int = param(1, 'Sets the number of channels that are read, from the first on.', low=1, high=8)
+    channels: int = param(1, 'Number of channels that are read, from the first on.', low=1, high=8)
     decimation: int = param(
         3,  # 16 kHz: docs/sensors.md has what it gains over 4 and 8 kHz
-        'Sets by what factor the rate is lowered behind a low-pass; a larger factor costs less computing time and '
+        'By what factor the rate is lowered behind a low-pass; a larger factor costs less computing time and '
         'keeps a smaller band, up to 0.34 of the lower rate.',
         low=1,
         high=64,
     )
-    unit: str = param(FULL_SCALE, "Sets the unit of the published samples; 'FS' is the full scale of the card.")
-    gain: float = param(
-        1.0, 'Sets the value of the full scale in the unit, by which the samples are multiplied; it is signed.'
-    )
+    unit: str = param(FULL_SCALE, "Unit of the published samples; 'FS' is the full scale of the card.")
+    gain: float = param(1.0, 'Value of the full scale in the unit, by which the samples are multiplied; it is signed.')
 
     def __post_init__(self) -> None:
         if self.rate_hz % self.decimation:

@@ -116,7 +116,7 @@ class SoftVote:
 
     late_weight: float = param(
         1.0,
-        'Sets the weight of windows later than five that do not overlap, relative to those before; with a smaller one, '
+        'Weight of windows later than five that do not overlap, relative to those before; with a smaller one, '
         'drift within a long slide changes its label less, and what shows late in a slide counts less.',
         low=0.0,
         high=1.0,
@@ -164,14 +164,14 @@ class MajorityVote:
 
     share: float = param(
         0.6,
-        'Sets the fraction of the votes that a label needs; a larger fraction leaves more slides undecided,'
+        'Fraction of the votes that a label needs; a larger fraction leaves more slides undecided,'
         ' 0 takes the label with the most votes.',
         low=0.0,
         high=1.0,
     )
     windows: int = param(
         5,
-        'Sets how many consecutive windows vote together; more decide later and more safely, 0 lets all windows of the '
+        'How many consecutive windows vote together; more decide later and more safely, 0 lets all windows of the '
         'slide vote.',
         low=0,
         high=10_000,

@@ -78,7 +78,7 @@ class TrainingParams:
 
     hop_s: float = param(
         0.25,
-        'Sets the time between the starts of two training windows; a smaller one costs time and adds little.',
+        'Time between the starts of two training windows; a smaller one costs time and adds little.',
         unit='s',
         low=0.001,
         high=60.0,
@@ -97,7 +97,7 @@ class DecisionParams(TrainingParams):
 
     start_weight: int = param(
         1,
-        'Sets the weight of the first windows of a slide in training, while friction and sensor settle; a '
+        'Weight of the first windows of a slide in training, while friction and sensor settle; a '
         'larger one counts them more.',
         low=1,
         high=100,
@@ -152,7 +152,7 @@ class DecisionParams(TrainingParams):
     )
     held_out_places: int = param(
         1,
-        'Sets into how many parts of the track slides are cut that were all made over one track: what is fitted to '
+        'Into how many parts of the track slides are cut that were all made over one track: what is fitted to '
         'held-out slides is fitted to held-out parts of the track, as places that the training does not have; 1: none.',
         low=1,
         high=20,
@@ -166,7 +166,7 @@ class DecisionParams(TrainingParams):
     )
     slowest_m_s: float = param(
         0.0,
-        'Sets the lowest speed at which surfaces will be explored: further training windows show as little of a '
+        'Lowest speed at which surfaces will be explored: further training windows show as little of a '
         'surface as one shows at this speed; 0: none.',
         unit='m/s',
         low=0.0,
@@ -174,7 +174,7 @@ class DecisionParams(TrainingParams):
     )
     fastest_m_s: float = param(
         0.0,
-        'Sets the highest speed at which surfaces will be explored: further training windows show as much of a surface '
+        'Highest speed at which surfaces will be explored: further training windows show as much of a surface '
         'as one shows at this speed; 0: none.',
         unit='m/s',
         low=0.0,
@@ -182,7 +182,7 @@ class DecisionParams(TrainingParams):
     )
     touch_s: float = param(
         0.0,
-        'Sets how much of the touch before the finger moves shows what friction does to the load, which the whitening '
+        'How much of the touch before the finger moves shows what friction does to the load, which the whitening '
         'of the learner then takes out; 0: none.',
         unit='s',
         low=0.0,
@@ -190,21 +190,21 @@ class DecisionParams(TrainingParams):
     )
     speed_margin: float = param(
         0.15,
-        'Sets how far the speed of an exploration may lie outside the speeds of the training, relative to them; '
+        'How far the speed of an exploration may lie outside the speeds of the training, relative to them; '
         'beyond, the estimate says that it is outside what was trained.',
         low=0.0,
         high=100.0,
     )
     force_margin: float = param(
         0.3,
-        'Sets how far the force of an exploration may lie outside the forces of the training, relative to them; '
+        'How far the force of an exploration may lie outside the forces of the training, relative to them; '
         'beyond, the estimate says that it is outside what was trained.',
         low=0.0,
         high=100.0,
     )
     direction_margin_rad: float = param(
         0.35,
-        'Sets the largest angle between the direction of an exploration and a direction of the training; '
+        'Largest angle between the direction of an exploration and a direction of the training; '
         'beyond, the estimate says that it is outside what was trained.',
         unit='rad',
         low=0.0,
@@ -213,7 +213,7 @@ class DecisionParams(TrainingParams):
 
     level_margin: float = param(
         1.0,
-        'Sets how far the signal level of an exploration may lie outside the levels of the training, relative to them; '
+        'How far the signal level of an exploration may lie outside the levels of the training, relative to them; '
         'beyond, the estimate says that it is outside what was trained.',
         low=0.0,
         high=1e6,

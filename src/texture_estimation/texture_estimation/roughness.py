@@ -50,13 +50,13 @@ class CheckParams:
     min_force_n: float = param(0.05, 'Smallest force that counts as contact.', unit='N', low=0.0, high=100.0)
     stick_slip_margin: float = param(
         1.0,
-        f'Sets the rise of `{STICK_SLIP}` over the training set that counts as stick-slip, as ln of power.',
+        f'Rise of `{STICK_SLIP}` over the training set that counts as stick-slip, as ln of power.',
         low=0.0,
         high=100.0,
     )
     quiet_margin: float = param(
         0.7,
-        f'Sets the fall of `{LEVEL}` below the training set that counts as too quiet, as ln of power.',
+        f'Fall of `{LEVEL}` below the training set that counts as too quiet, as ln of power.',
         low=0.0,
         high=100.0,
     )
@@ -637,7 +637,7 @@ class CalibrationParams(TrainingParams):
 
     folds: int = param(
         15,
-        'Sets the number of folds of textures for the calibration; at most one per texture is possible.',
+        'Number of folds of textures for the calibration; at most one per texture is possible.',
         low=2,
         high=1000,
     )

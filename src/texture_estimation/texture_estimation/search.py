@@ -768,21 +768,19 @@ class SearchParams:
     """How long and for what is searched; population and generations are those of Roberge et al."""
 
     population: int = param(
-        20, 'Sets the number of individuals in a generation; more search wider and take longer.', low=4, high=1000
+        20, 'Number of individuals in a generation; more search wider and take longer.', low=4, high=1000
     )
     generations: int = param(
-        30, 'Sets the number of generations, including the first one; more search longer.', low=1, high=10_000
+        30, 'Number of generations, including the first one; more search longer.', low=1, high=10_000
     )
     halves: int = param(20, 'Number of random half splits on which the finalists are evaluated.', low=2, high=1000)
     search_halves: int = param(
         4, 'Number of these half splits on which each individual is evaluated during the search.', low=1, high=1000
     )
-    seed: int = param(
-        0, 'Sets the seed of the random half splits and of the search; equal seeds give equal results.', low=0
-    )
+    seed: int = param(0, 'Seed of the random half splits and of the search; equal seeds give equal results.', low=0)
     objective: str = param(
         'accuracy',
-        "Sets the objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
+        "Objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
         choices=OBJECTIVES,
     )
     finalists: int = param(3, 'Number of best individuals that are evaluated on all half splits.', low=1, high=1000)

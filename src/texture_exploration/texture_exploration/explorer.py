@@ -64,13 +64,13 @@ class EarlyStoppingParams:
 
     min_confidence: float = param(
         0.0,
-        'Sets the lowest confidence that ends a slide early, besides the stopping rule of the model; a '
+        'Lowest confidence that ends a slide early, besides the stopping rule of the model; a '
         'higher value slides longer.',
         low=0.0,
         high=1.0,
     )
     estimate_timeout_s: float = param(
-        1.0, 'Sets how long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
+        1.0, 'How long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
     )
 
     def may_stop(self, estimate: TextureEstimate) -> bool:

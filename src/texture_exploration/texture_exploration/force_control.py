@@ -486,7 +486,7 @@ LEAST_NOISE = 0.1  # of that; a reading may also stand still
 BEARABLE = 0.2  # of the wanted force, that noise may cost by what looks like a slope
 NOISE_SAMPLES = 50  # a finger that is pressed or lifted changes its force more: the calmest so many tell the noise
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
-SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
+SETTLED = 0.3  # from an error of this fraction of the wanted force on, the slope is observed
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
 LONGEST_DELAY_S = 0.1  # of `ForceLoopParams`
 UNDECLARED_PERIODS = 1.5  # a lag that is longer than declared by more than this counts
@@ -505,14 +505,14 @@ class ForceLoopParams:
 
     loop_delay_s: float = param(
         0.008,
-        'Sets the largest delay from a measured force to the motion that answers it; a larger value lowers the gain.',
+        'Largest delay from a measured force to the motion that answers it; larger values lower the gain.',
         unit='s',
         low=0.0,
         high=0.1,
     )
     force_gain_m_s_n: float = param(
         0.0,
-        'Sets the normal speed per force error; 0 derives it from the estimated contact stiffness. A larger'
+        'Normal speed per force error; 0 derives it from the estimated contact stiffness. A larger'
         ' value settles faster and is less stable.',
         unit='m/s/N',
         low=0.0,
@@ -520,7 +520,7 @@ class ForceLoopParams:
     )
     max_stiffness_n_m: float = param(
         5000.0,
-        'Sets the stiffest contact of finger and surface that is expected; a larger value lowers the '
+        'Stiffest contact of finger and surface that is expected; larger values lower the '
         'approach speed and the first gain.',
         unit='N/m',
         low=100.0,
@@ -528,27 +528,27 @@ class ForceLoopParams:
     )
     gain_margin: float = param(
         4.0,
-        'Sets by which factor the gain stays below the stability limit; a larger factor is more stable and slower.',
+        'By which factor the gain stays below the stability limit; a larger factor is more stable and slower.',
         low=2.0,
         high=50.0,
     )
     integral_s: float = param(
         0.5,
-        'Sets the time constant of the integral part; a longer time removes a constant force error more slowly.',
+        'Time constant of the integral part; a longer time removes a constant force error more slowly.',
         unit='s',
         low=0.05,
         high=100.0,
     )
     force_speed_m_s: float = param(
         0.05,
-        'Sets the highest normal speed under force control; a higher speed corrects force errors faster.',
+        'Highest normal speed under force control; a higher speed corrects force errors faster.',
         unit='m/s',
         low=0.001,
         high=0.25,
     )
     max_impact_n: float = param(
         0.15,
-        'Sets the largest impact force on the stiffest surface before the arm can react; a larger force '
+        'Largest impact force on the stiffest surface before the arm can react; a larger force '
         'allows a faster approach.',
         unit='N',
         low=0.01,
@@ -557,14 +557,14 @@ class ForceLoopParams:
 
     press_impact_share: float = param(
         1.0,
-        'Sets the largest impact on the stiffest base under a soft layer, while pressing at rest, as a '
-        'share of the wanted force; a larger share presses faster.',
+        'Largest impact on the stiffest base under a soft layer, while pressing at rest, as a '
+        'fraction of the wanted force; a larger fraction presses faster.',
         low=0.05,
         high=100.0,
     )
     touching_n: float = param(
         TOUCHING_N,
-        'Sets the force above which the force control takes the finger for touching; it must exceed the noise of the '
+        'Force above which the force control takes the finger for touching; it must exceed the noise of the '
         'force sensor. A larger force meets the surface harder.',
         unit='N',
         low=0.005,

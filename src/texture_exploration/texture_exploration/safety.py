@@ -79,50 +79,49 @@ class SafetyLimits:
     """Limits of what is asked, of what is measured, and of how long each phase may take."""
 
     min_speed_m_s: float = param(
-        0.002, 'Sets the lowest speed that may be requested; slower requests are refused.', unit='m/s', low=1e-4
+        0.002, 'Lowest speed that may be requested; slower requests are refused.', unit='m/s', low=1e-4
     )
     max_speed_m_s: float = param(
         0.25,
-        'Sets the highest speed that may be requested; faster requests are refused.',
+        'Highest speed that may be requested; faster requests are refused.',
         unit='m/s',
         low=1e-4,
         high=1.0,
     )
     min_force_n: float = param(
-        0.1, 'Sets the lowest normal force that may be requested; smaller forces are refused.', unit='N', low=0.01
+        0.1, 'Lowest normal force that may be requested; smaller forces are refused.', unit='N', low=0.01
     )
     max_force_n: float = param(
         6.0,
-        'Sets the highest normal force that may be requested; larger forces are refused.',
+        'Highest normal force that may be requested; larger forces are refused.',
         unit='N',
         low=0.01,
         high=50.0,
     )
     force_limit_n: float = param(
         10.0,
-        'Sets the measured force, in any direction, above which an exploration is aborted.',
+        'Measured force, in any direction, above which an exploration is aborted.',
         unit='N',
         low=0.1,
         high=100.0,
     )
     friction_limit: float = param(
         2.0,
-        'Sets the highest force along the surface, as a multiple of the normal force, above which an exploration is '
+        'Highest force along the surface, as a multiple of the normal force, above which an exploration is '
         'aborted; it must exceed the friction of finger and samples.',
         low=0.1,
         high=20.0,
     )
     tangential_floor_n: float = param(
         1.0,
-        'Sets the force along the surface that is allowed beside friction; it must exceed the noise of the force '
-        'sensor.',
+        'Force along the surface that is allowed beside friction; it must exceed the noise of the force sensor.',
         unit='N',
         low=0.05,
         high=20.0,
     )
     frozen_force_s: float = param(
         0.06,
-        'Sets how long a measured force may stay exactly the same, where it should change, before the '
+        'How long a measured force may stay exactly the same, where it should change, before the '
         'exploration is aborted.',
         unit='s',
         low=0.02,
@@ -130,7 +129,7 @@ class SafetyLimits:
     )
     frozen_travel_m: float = param(
         0.00005,
-        'Sets the travel along the normal, in contact, after which the measured force must have changed; a '
+        'Travel along the normal, in contact, after which the measured force must have changed; a '
         'longer travel notices a frozen force later.',
         unit='m',
         low=1e-6,
@@ -138,103 +137,98 @@ class SafetyLimits:
     )
     force_drift_share: float = param(
         0.3,
-        'Sets the largest change of the force in free air over an exploration, as a share of the wanted '
+        'Largest change of the force in free air over an exploration, as a fraction of the wanted '
         'force; more aborts it.',
         low=0.01,
         high=10.0,
     )
     min_distance_m: float = param(
-        0.002, 'Sets the shortest slide that may be requested; shorter requests are refused.', unit='m', low=1e-4
+        0.002, 'Shortest slide that may be requested; shorter requests are refused.', unit='m', low=1e-4
     )
     max_distance_m: float = param(
-        1.0, 'Sets the longest slide that may be requested; longer requests are refused.', unit='m', low=1e-3
+        1.0, 'Longest slide that may be requested; longer requests are refused.', unit='m', low=1e-3
     )
     min_radius_m: float = param(
-        0.005, 'Sets the smallest circle radius that may be requested; smaller circles are refused.', unit='m', low=1e-3
+        0.005, 'Smallest circle radius that may be requested; smaller circles are refused.', unit='m', low=1e-3
     )
     max_radius_m: float = param(
-        0.1, 'Sets the largest circle radius that may be requested; larger circles are refused.', unit='m', low=1e-3
+        0.1, 'Largest circle radius that may be requested; larger circles are refused.', unit='m', low=1e-3
     )
-    min_turns: float = param(
-        0.1, 'Sets the smallest number of turns that may be requested; fewer turns are refused.', low=0.01
-    )
-    max_turns: float = param(
-        100.0, 'Sets the largest number of turns that may be requested; more turns are refused.', low=0.01
-    )
+    min_turns: float = param(0.1, 'Smallest number of turns that may be requested; fewer turns are refused.', low=0.01)
+    max_turns: float = param(100.0, 'Largest number of turns that may be requested; more turns are refused.', low=0.01)
     max_turning_m_s2: float = param(
         5.0,
-        'Sets the highest centripetal acceleration on a circle; a larger value allows faster and smaller circles.',
+        'Highest centripetal acceleration on a circle; larger values allow faster and smaller circles.',
         unit='m/s²',
         low=0.05,
         high=20.0,
     )
     min_duration_s: float = param(
-        0.1, 'Sets the shortest in-hand slide that may be requested; shorter requests are refused.', unit='s', low=0.01
+        0.1, 'Shortest in-hand slide that may be requested; shorter requests are refused.', unit='s', low=0.01
     )
     max_duration_s: float = param(
-        60.0, 'Sets the longest in-hand slide that may be requested; longer requests are refused.', unit='s', low=0.01
+        60.0, 'Longest in-hand slide that may be requested; longer requests are refused.', unit='s', low=0.01
     )
     x_low_m: float = param(
         -0.2,
-        'Sets the lowest x coordinate of the workspace in the surface frame; leaving it aborts.',
+        'Lowest x coordinate of the workspace in the surface frame; leaving it aborts.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     x_high_m: float = param(
         0.2,
-        'Sets the highest x coordinate of the workspace in the surface frame; leaving it aborts.',
+        'Highest x coordinate of the workspace in the surface frame; leaving it aborts.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     y_low_m: float = param(
         -0.2,
-        'Sets the lowest y coordinate of the workspace in the surface frame; leaving it aborts.',
+        'Lowest y coordinate of the workspace in the surface frame; leaving it aborts.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     y_high_m: float = param(
         0.2,
-        'Sets the highest y coordinate of the workspace in the surface frame; leaving it aborts.',
+        'Highest y coordinate of the workspace in the surface frame; leaving it aborts.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     z_low_m: float = param(
         -0.02,
-        'Sets the lowest z coordinate of the workspace in the surface frame; leaving it aborts.',
+        'Lowest z coordinate of the workspace in the surface frame; leaving it aborts.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     z_high_m: float = param(
         0.2,
-        'Sets the highest z coordinate of the workspace in the surface frame; leaving it aborts.',
+        'Highest z coordinate of the workspace in the surface frame; leaving it aborts.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     state_timeout_s: float = param(
         0.13,
-        'Sets the age of the newest arm state above which an exploration is aborted; a longer time notices '
-        'a dead arm later.',
+        'Age of the newest arm state above which an exploration is aborted; a longer time notices a dead arm later.',
         unit='s',
         low=0.01,
         high=2.0,
     )
     approach_timeout_s: float = param(
-        10.0, 'Sets how long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
+        10.0, 'How long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
     )
     contact_timeout_s: float = param(
-        3.0, 'Sets how long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
+        3.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
     )
     slide_overtime_s: float = param(
-        2.0, 'Sets how much longer than planned a slide may take before the exploration is aborted.', unit='s', low=0.1
+        2.0, 'How much longer than planned a slide may take before the exploration is aborted.', unit='s', low=0.1
     )
     lift_timeout_s: float = param(
-        5.0, 'Sets how long braking and lifting may take before the exploration is aborted.', unit='s', low=0.1
+        5.0, 'How long braking and lifting may take before the exploration is aborted.', unit='s', low=0.1
     )
 
     def __post_init__(self) -> None:
@@ -681,12 +675,11 @@ class SignalWatchParams:
     watch_signal: bool = param(True, "Aborts an exploration when no samples arrive on the topics of 'signal_topics'.")
     signal_topics: str = param(
         'signal',
-        "Sets the topics whose samples are watched, separated by spaces: 'finger0/signal finger1/signal' for two "
-        'fingers.',
+        "Topics whose samples are watched, separated by spaces: 'finger0/signal finger1/signal' for two fingers.",
     )
     signal_timeout_s: float = param(
         0.5,
-        'Sets how long no sample may arrive before the exploration is aborted.',
+        'How long no sample may arrive before the exploration is aborted.',
         unit='s',
         low=0.02,
         high=5.0,

@@ -179,22 +179,21 @@ class TouchParams:
 
     travel_speed_m_s: float = param(
         0.05,
-        'Sets the highest speed above the surface on the way back to the start; a stiff contact may ask for a lower '
-        'one.',
+        'Highest speed above the surface on the way back to the start; a stiff contact may ask for a lower one.',
         unit='m/s',
         low=0.01,
         high=1.0,
     )
     approach_speed_m_s: float = param(
         0.02,
-        'Sets the highest speed towards the surface; the wanted force may ask for a lower one.',
+        'Highest speed towards the surface; the wanted force may ask for a lower one.',
         unit='m/s',
         low=0.001,
         high=0.1,
     )
     approach_stiffness_n_m: float = param(
         2000.0,
-        'Sets the stiffest contact that is expected; a larger value lowers the approach speed, so that the '
+        'Stiffest contact that is expected; larger values lower the approach speed, so that the '
         'impact stays below the wanted force.',
         unit='N/m',
         low=10.0,
@@ -202,75 +201,74 @@ class TouchParams:
     )
     approach_travel_m: float = param(
         0.05,
-        'Sets how far the finger comes down in search of the surface before the motion is aborted.',
+        'How far the finger comes down in search of the surface before the motion is aborted.',
         unit='m',
         low=0.001,
         high=0.5,
     )
     unheard_force_share: float = param(
         1.5,
-        'Sets the highest force of the approach, as a share of the wanted one, on an arm that only its watchdog stops; '
+        'Highest force of the approach, as a fraction of the wanted one, on an arm that only its watchdog stops; '
         'a smaller share lowers the approach speed.',
         low=0.2,
         high=10.0,
     )
     contact_force_n: float = param(
         0.2,
-        'Sets the force above which the finger counts as in contact; a larger force needs a harder touch.',
+        'Force above which the finger counts as in contact; a larger force needs a harder touch.',
         unit='N',
         low=0.02,
         high=5.0,
     )
     force_tolerance: float = param(
         0.1,
-        'Sets the share of the wanted force within which the force has settled; a larger share settles sooner.',
+        'Fraction of the wanted force within which the force has settled; a larger fraction settles sooner.',
         low=0.01,
         high=0.5,
     )
     speed_tolerance: float = param(
         0.05,
-        'Sets the share of the wanted speed within which the speed is reached; a larger share starts the slide sooner.',
+        'Fraction of the wanted speed within which the speed is reached; a larger fraction starts the slide sooner.',
         low=0.005,
         high=0.5,
     )
     settle_s: float = param(
         0.1,
-        'Sets how long the force must stay within its tolerance before the finger starts to slide.',
+        'How long the force must stay within its tolerance before the finger starts to slide.',
         unit='s',
         low=0.0,
         high=2.0,
     )
     acceleration_m_s2: float = param(
         1.0,
-        'Sets the highest tangential acceleration; a larger value shortens the ramps before and after a slide.',
+        'Highest tangential acceleration; larger values shorten the ramps before and after a slide.',
         unit='m/s²',
         low=0.05,
         high=10.0,
     )
     jerk_m_s3: float = param(
         50.0,
-        'Sets the highest tangential jerk; a larger value shortens the ramps before and after a slide.',
+        'Highest tangential jerk; larger values shorten the ramps before and after a slide.',
         unit='m/s³',
         low=1.0,
         high=1000.0,
     )
     arm_lag_s: float = param(
         0.005,
-        'Sets the time after which the arm follows a command; the direction on a curved path is led by it.',
+        'Time after which the arm follows a command; the direction on a curved path is led by it.',
         unit='s',
         low=0.0,
         high=0.1,
     )
     lost_force_share: float = param(
         0.25,
-        'Sets the share of the wanted force below which contact counts as lost during a slide; a larger '
-        'share aborts sooner.',
+        'Fraction of the wanted force below which contact counts as lost during a slide; a larger share aborts sooner.',
         low=0.05,
         high=0.9,
     )
     lost_contact_s: float = param(
         0.1,
-        'Sets how long contact may be lost before the slide ends; shorter gaps are bounces on a rough surface.',
+        'How long contact may be lost before the slide ends; shorter gaps are bounces on a rough surface.',
         unit='s',
         low=0.02,
         high=5.0,
@@ -280,14 +278,14 @@ class TouchParams:
     )
     stall_speed_share: float = param(
         0.25,
-        'Sets the share of the commanded way below which a sliding finger counts as stalled; a larger share aborts '
+        'Fraction of the commanded way below which a sliding finger counts as stalled; a larger fraction aborts '
         'sooner.',
         low=0.05,
         high=0.9,
     )
     stall_s: float = param(
         0.25,
-        'Sets the time over which the commanded way and that of the finger are compared during a slide; a longer time '
+        'Time over which the commanded way and that of the finger are compared during a slide; a longer time '
         'notices a stall later.',
         unit='s',
         low=0.05,
@@ -295,53 +293,53 @@ class TouchParams:
     )
     mean_force_share: float = param(
         0.3,
-        'Sets the largest relative error of the mean measured force with which a slide succeeds.',
+        'Largest relative error of the mean measured force with which a slide succeeds.',
         low=0.05,
         high=1.0,
     )
     peak_force_share: float = param(
         0.5,
-        'Sets by which share of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
+        'By which fraction of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
         'it are not steady. A larger share bears a rougher surface.',
         low=0.05,
         high=20.0,
     )
     mean_speed_share: float = param(
         0.2,
-        'Sets the largest relative error of the mean speed with which a slide succeeds.',
+        'Largest relative error of the mean speed with which a slide succeeds.',
         low=0.02,
         high=5.0,
     )
     peak_speed_share: float = param(
         0.5,
-        'Sets by which share of the wanted speed the finger may be faster for 50 ms in a slide that succeeds; states '
+        'By which fraction of the wanted speed the finger may be faster for 50 ms in a slide that succeeds; states '
         'beyond it are not steady.',
         low=0.05,
         high=20.0,
     )
     mean_friction: float = param(
         2.0,
-        'Sets the largest mean force along the surface, as a multiple of the wanted force, with which a slide '
+        'Largest mean force along the surface, as a multiple of the wanted force, with which a slide '
         'succeeds; it counts where the arm measures that force.',
         low=0.1,
         high=50.0,
     )
     peak_friction: float = param(
         3.0,
-        'Sets the largest force along the surface for 50 ms, as a multiple of the wanted force, with which a slide '
+        'Largest force along the surface for 50 ms, as a multiple of the wanted force, with which a slide '
         'succeeds; states beyond it are not steady.',
         low=0.1,
         high=50.0,
     )
     lift_speed_m_s: float = param(
         0.05,
-        'Sets the speed away from the surface; a higher speed leaves the surface sooner.',
+        'Speed away from the surface; a higher speed leaves the surface sooner.',
         unit='m/s',
         low=0.005,
         high=0.5,
     )
     clearance_m: float = param(
-        0.005, 'Sets the least height by which the finger is lifted after a contact.', unit='m', low=0.001, high=0.1
+        0.005, 'Least height by which the finger is lifted after a contact.', unit='m', low=0.001, high=0.1
     )
 
     def approach_m_s(self, force_n: float, watchdog_s: float = 0.0) -> float:

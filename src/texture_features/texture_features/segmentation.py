@@ -536,7 +536,7 @@ class SegmentationParams:
     )
     ramp_s: float = param(
         0.2,
-        'Sets the acceleration and deceleration time of the robot, from its motion plan.',
+        'Acceleration and deceleration time of the robot, from its motion plan.',
         unit='s',
         low=0.0,
         high=10.0,
@@ -546,19 +546,19 @@ class SegmentationParams:
     )
     quantity: str = param(
         'either',
-        "Sets the quantity that the vibration channels measure: 'force', its 'change', or 'either' if unknown.",
+        "Quantity that the vibration channels measure: 'force', its 'change', or 'either' if unknown.",
         choices=tuple(MEASURED_QUANTITIES),
     )
     smooth_s: float = param(
         SMOOTH_S,
-        'Sets the time constant of the high-pass filter that removes the load; slow slides need a longer one.',
+        'Time constant of the high-pass filter that removes the load; slow slides need a longer one.',
         unit='s',
         low=0.01,
         high=1.0,
     )
     noise_rms: float = param(
         0.0,
-        'Sets the baseline noise of the sensor, rms; 0 estimates it from the quietest tenth of the recording.',
+        'Baseline noise of the sensor, rms; 0 estimates it from the quietest tenth of the recording.',
         low=0.0,
     )
 

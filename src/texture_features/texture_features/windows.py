@@ -645,14 +645,14 @@ class WindowParams:
 
     length_s: float = param(
         0.5,
-        'Sets the length of a window; longer ones give more certain decisions, later.',
+        'Length of a window; longer ones give more certain decisions, later.',
         unit='s',
         low=0.005,
         high=60.0,
     )
     hop_s: float = param(
         0.1,
-        'Sets the time between the starts of two windows; a smaller one gives more estimates and costs computing time.',
+        'Time between the starts of two windows; a smaller one gives more estimates and costs computing time.',
         unit='s',
         low=0.001,
         high=60.0,

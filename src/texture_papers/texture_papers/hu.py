@@ -47,13 +47,13 @@ class Spectrum:
 
     points: int = param(
         12288,
-        'Sets the number of frequency bins k · rate / (2 · points), k from 1; more bins resolve finer.',
+        'Number of frequency bins k · rate / (2 · points), k from 1; more bins resolve finer.',
         low=2,
         high=1 << 19,
     )
     scale: str = param(
         'log',
-        "Sets what is given of the power density: its logarithm 'log', 'power' itself, or its square root 'magnitude'.",
+        "What is given of the power density: its logarithm 'log', 'power' itself, or its square root 'magnitude'.",
         choices=tuple(SCALES),
     )
     floor: float = param(
@@ -99,20 +99,19 @@ class SvmMaxWins:
 
     variance: float = param(
         0.99,
-        'Sets the fraction of the variance that the kept principal components explain; a larger one keeps '
-        'more of them.',
+        'Fraction of the variance that the kept principal components explain; a larger one keeps more of them.',
         low=0.01,
         high=1.0,
     )
     blocks: int = param(
         1,
-        'Sets the number of equal feature blocks with separate components, such as the directions x and y.',
+        'Number of equal feature blocks with separate components, such as the directions x and y.',
         low=1,
         high=64,
     )
     c: float = param(
         10.0,
-        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        'Penalty of a training error (box constraint C); a larger one fits the training data more closely.',
         low=1e-6,
         high=1e9,
     )
@@ -122,7 +121,7 @@ class SvmMaxWins:
 
     centre: str = param(
         'features',
-        "Sets what is subtracted before the components are sought: 'features' the mean of each feature over the "
+        "What is subtracted before the components are sought: 'features' the mean of each feature over the "
         "examples, 'examples' the mean of each example over its features, as eq. 7 of the paper has it.",
         choices=('features', 'examples'),
     )

@@ -158,7 +158,7 @@ class MeanAmplitude:
 
     of: str = param(
         'deviation',
-        "Sets what is averaged: 'deviation' takes |s - mean(s)|, 'magnitude' takes |s|, 'signal' takes s itself.",
+        "What is averaged: 'deviation' takes |s - mean(s)|, 'magnitude' takes |s|, 'signal' takes s itself.",
         choices=tuple(AVERAGED),
     )
     logarithm: bool = param(False, 'Returns the logarithm of the absolute amplitude instead of the amplitude itself.')
@@ -201,9 +201,7 @@ class WaveletEnergy:
 
     per_channel: ClassVar[bool] = True
 
-    octaves: int = param(
-        6, 'Sets the number of octaves of the wavelet transform; more reach lower frequencies.', low=1, high=20
-    )
+    octaves: int = param(6, 'Number of octaves of the wavelet transform; more reach lower frequencies.', low=1, high=20)
     floor: float = param(
         1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
     )
@@ -278,7 +276,7 @@ class OrdinalPatterns:
     length: int = param(4, 'Number of samples in a pattern; there are factorial(length) patterns.', low=2, high=5)
     delay: int = param(
         2,
-        'Sets the distance between the samples of a pattern, in samples; a larger one describes lower frequencies.',
+        'Distance between the samples of a pattern, in samples; a larger one describes lower frequencies.',
         low=1,
         high=10_000,
     )
@@ -342,14 +340,13 @@ class NaiveBayes:
 
     smoothing: float = param(
         1e-9,
-        'Sets the variance added to each class, as a fraction of the variance over all classes; a larger '
-        'one smooths more.',
+        'Variance added to each class, as a fraction of the variance over all classes; a larger one smooths more.',
         low=1e-12,
         high=1.0,
     )
     bins: int = param(
         0,
-        'Sets the number of equally filled histogram bins per feature; 0 takes normal distributions.',
+        'Number of equally filled histogram bins per feature; 0 takes normal distributions.',
         low=0,
         high=1000,
     )

@@ -41,7 +41,7 @@ class MeanHjorth:
     )
 
     omit: str = param(
-        '', "Sets which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
+        '', "Which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
     )
 
     @property
@@ -90,7 +90,7 @@ class Correlation:
     joins: ClassVar[bool] = True
 
     omit: str = param(
-        '', "Sets which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
+        '', "Which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
     )
 
     def __call__(self, windows: WindowBatch) -> Array:
@@ -210,10 +210,10 @@ class SvmLinear:
     (True, True)
     """
 
-    folds: int = param(5, 'Sets the number of cross-validation folds; more folds take longer to train.', low=2, high=50)
+    folds: int = param(5, 'Number of cross-validation folds; more folds take longer to train.', low=2, high=50)
     repeats: int = param(
         10,
-        'Sets the number of repetitions of the cross-validation with other random folds; more take longer to train.',
+        'Number of repetitions of the cross-validation with other random folds; more take longer to train.',
         low=1,
         high=1000,
     )
@@ -223,7 +223,7 @@ class SvmLinear:
     least_c: float = param(1e-3, 'Smallest value of C that is tried.', low=1e-9, high=1e9)
     most_c: float = param(1e3, 'Largest value of C that is tried.', low=1e-9, high=1e9)
     examples: int = param(200, 'Largest number of examples with which C is chosen; more are subsampled evenly.', low=10)
-    seed: int = param(0, 'Sets the seed of the random folds; equal seeds give equal models.', low=0)
+    seed: int = param(0, 'Seed of the random folds; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
@@ -367,14 +367,14 @@ class PassiveAggressive:
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
     multiclass: str = param(
         'one_vs_rest',
-        "Sets how planes of several labels learn: 'one_vs_rest' moves the plane of each label by itself, "
+        "How planes of several labels learn: 'one_vs_rest' moves the plane of each label by itself, "
         "'crammer_singer' moves those of the true label and of its strongest rival alone.",
         choices=('one_vs_rest', 'crammer_singer'),
     )
-    rounds: int = param(0, 'Sets the number of examples of each label to train on; 0 takes all.', low=0)
+    rounds: int = param(0, 'Number of examples of each label to train on; 0 takes all.', low=0)
     passes: int = param(
         1,
-        'Sets how often all examples are gone through; more passes fit them more closely. The paper names no number.',
+        'How often all examples are gone through; more passes fit them more closely. The paper names no number.',
         low=1,
         high=10_000,
     )
@@ -579,7 +579,7 @@ class EmMixture:
     """
 
     clusters_per_label: int = param(
-        1, 'Sets the number of clusters per label; more clusters fit more diverse slides of one label.', low=1, high=50
+        1, 'Number of clusters per label; more clusters fit more diverse slides of one label.', low=1, high=50
     )
     covariance: str = param(
         'full',
@@ -588,14 +588,13 @@ class EmMixture:
     )
     regularisation: float = param(
         1e-3,
-        'Sets the variance added to the standardised features, which keeps clusters from collapsing; a '
-        'larger one smooths more.',
+        'Variance added to the standardised features, which keeps clusters from collapsing; a larger one smooths more.',
         low=1e-9,
     )
     starts: int = param(
         3, 'Number of random initialisations; the result with the highest likelihood is kept.', low=1, high=1000
     )
-    seed: int = param(0, 'Sets the seed of the random initialisations; equal seeds give equal models.', low=0)
+    seed: int = param(0, 'Seed of the random initialisations; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""

@@ -182,17 +182,15 @@ class Ann1:
 
     hidden: int = param(
         10,
-        'Sets the number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
+        'Number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
         low=1,
         high=200,
     )
-    iterations: int = param(
-        50, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
-    )
-    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    iterations: int = param(50, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
     transfer: str = param(
         'sigmoid',
-        "Sets the transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
+        "Transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
         choices=tuple(TRANSFERS),
     )
 
@@ -243,18 +241,15 @@ class Ann5:
 
     hidden: int = param(
         10,
-        'Sets the number of neurons in the hidden layer of each network; more neurons fit finer and cost '
-        'computing time.',
+        'Number of neurons in the hidden layer of each network; more neurons fit finer and cost computing time.',
         low=1,
         high=200,
     )
-    iterations: int = param(
-        30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
-    )
-    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
     transfer: str = param(
         'sigmoid',
-        "Sets the transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
+        "Transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
         choices=tuple(TRANSFERS),
     )
 
@@ -303,13 +298,13 @@ class Svm5:
 
     c: float = param(
         10.0,
-        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        'Penalty of a training error (box constraint C); a larger one fits the training data more closely.',
         low=1e-6,
         high=1e9,
     )
     kernel_scale: float = param(
         3.0,
-        'Sets the width of the kernel exp(-(d / scale)²) over standardised features; a larger one smooths more.',
+        'Width of the kernel exp(-(d / scale)²) over standardised features; a larger one smooths more.',
         low=1e-9,
         high=1e9,
     )

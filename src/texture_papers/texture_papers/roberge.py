@@ -99,7 +99,7 @@ class SpectralPeaks:
     )
     gap_hz: float = param(
         10.0,
-        'Sets the smallest distance between two peaks; a larger one suppresses side peaks.',
+        'Smallest distance between two peaks; a larger one suppresses side peaks.',
         unit='Hz',
         low=0.0,
         high=1e6,
@@ -527,13 +527,13 @@ class SvmPairs:
 
     box_constraint: float = param(
         10.0,
-        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        'Penalty of a training error (box constraint C); a larger one fits the training data more closely.',
         low=1e-6,
         high=1e9,
     )
     kernel_scale: float = param(
         3.0,
-        "Sets the width of the RBF kernel (MATLAB's KernelScale); a larger one smooths the decision more.",
+        "Width of the RBF kernel (MATLAB's KernelScale); a larger one smooths the decision more.",
         low=1e-9,
         high=1e9,
     )
@@ -612,14 +612,12 @@ class AnnPairs:
 
     hidden: int = param(
         10,
-        'Sets the number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
+        'Number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
         low=1,
         high=200,
     )
-    iterations: int = param(
-        30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
-    )
-    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
     ties: str = param(
         'unclassified',
         "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",

@@ -129,17 +129,17 @@ SPACINGS = ('even', 'interpolated')
 class FileFormat:
     """How a file is read, where its kind does not say it."""
 
-    delimiter: str = param('', "Sets the character between columns of a text file; '' finds one of , ; tab | or space.")
-    decimal: str = param('.', 'Sets the decimal sign of numbers in a text file.', choices=('.', ','))
+    delimiter: str = param('', "Character between columns of a text file; '' finds one of , ; tab | or space.")
+    decimal: str = param('.', 'Decimal sign of numbers in a text file.', choices=('.', ','))
     comment: str = param('#', "Lines of a text file that begin with it are skipped; '' skips none.")
     skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
     header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
     transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')
     reshape: list[int] = param(  # noqa: RUF009 – it gives a field
-        [], 'Sets the shape in which the values of an array are read, for arrays that were stored with mixed up axes.'
+        [], 'Shape in which the values of an array are read, for arrays that were stored with mixed up axes.'
     )
     axes: list[int] = param(  # noqa: RUF009 – it gives a field
-        [], 'Sets the order of the axes of `reshape` in which the values fill the shape of the array, all from 0.'
+        [], 'Order of the axes of `reshape` in which the values fill the shape of the array, all from 0.'
     )
 
     def __post_init__(self) -> None:
@@ -224,17 +224,13 @@ class SlideBorders:
         [],
         "Values of the column at which the finger slides, or patterns of them ('pass *'); [] takes all but empty ones.",
     )
-    pause_s: float = param(0.5, "Sets the shortest pause between slides, for 'pause'.", unit='s', low=0.0)
-    length_s: float = param(5.0, "Sets the length of a slide, for 'time'.", unit='s', low=0.05)
+    pause_s: float = param(0.5, "Shortest pause between slides, for 'pause'.", unit='s', low=0.0)
+    length_s: float = param(5.0, "Length of a slide, for 'time'.", unit='s', low=0.05)
     start_s: float = param(0.0, 'Time at the start of each slide that is left out.', unit='s', low=0.0)
     end_s: float = param(0.0, 'Time at the end of each slide that is left out.', unit='s', low=0.0)
     min_s: float = param(0.2, 'Shortest slide that is kept; shorter ones are counted.', unit='s', low=0.0)
-    on: float = param(
-        6.0, "Sets the power over that at rest above which sliding begins, for 'detection'.", low=1.0, high=1e6
-    )
-    off: float = param(
-        3.0, "Sets the power over that at rest below which sliding ends, for 'detection'.", low=1.0, high=1e6
-    )
+    on: float = param(6.0, "Power over that at rest above which sliding begins, for 'detection'.", low=1.0, high=1e6)
+    off: float = param(3.0, "Power over that at rest below which sliding ends, for 'detection'.", low=1.0, high=1e6)
 
 
 @dataclass(frozen=True)
@@ -242,7 +238,7 @@ class Quantity:
     """A number that holds for a slide or changes along it."""
 
     column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the number.')
-    value: str = param('', 'Sets the number for all slides, in place of a column.')
+    value: str = param('', 'Number for all slides, in place of a column.')
     unit: str = param('', "Unit of the number; '' is the SI unit.")
 
 

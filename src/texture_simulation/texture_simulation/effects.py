@@ -42,7 +42,7 @@ class PatchGrowth:
 
     exponent: float = param(
         1 / 3,
-        'Sets the exponent with which the contact radius grows with the force; 0 keeps it constant.',
+        'Exponent with which the contact radius grows with the force; 0 keeps it constant.',
         low=0.0,
         high=1.0,
     )
@@ -58,7 +58,7 @@ class ForceGain:
 
     exponent: float = param(
         1 / 3,
-        'Sets the exponent with which the contact stiffness grows with the force; 0 keeps it constant.',
+        'Exponent with which the contact stiffness grows with the force; 0 keeps it constant.',
         low=0.0,
         high=1.0,
     )
@@ -78,19 +78,15 @@ SALT = 41  # so that the gain of a finger is drawn apart from its other traits
 class FingerSpread:
     """Each individual of the sensor senses textures by a factor of its own more or less strongly."""
 
-    relative: float = param(
-        0.1, 'Sets the relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5
-    )
+    relative: float = param(0.1, 'Relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5)
     skin: float = param(
         0.0,
-        'Sets the relative spread of the skin from finger to finger: a thicker one touches over a larger area, is '
+        'Relative spread of the skin from finger to finger: a thicker one touches over a larger area, is '
         'softer and resonates lower.',
         low=0.0,
         high=0.5,
     )
-    noise: float = param(
-        0.0, 'Sets the relative spread of the strength of the noise from finger to finger.', low=0.0, high=1.0
-    )
+    noise: float = param(0.0, 'Relative spread of the strength of the noise from finger to finger.', low=0.0, high=1.0)
 
     def gain(self, path: Trajectory, finger: int) -> Array | float:
         """Return the factor of a finger, the same at all points."""
@@ -119,7 +115,7 @@ class Drift:
 
     count_per_sqrt_s: float = param(
         20.0,
-        'Sets the standard deviation of the random walk after one second; a larger value drifts faster.',
+        'Standard deviation of the random walk after one second; larger values drift faster.',
         unit='count',
         low=0.0,
     )
@@ -154,10 +150,10 @@ class Dropouts:
     """
 
     per_s: float = param(
-        0.5, 'Sets how often a dropout occurs; a higher rate gives more dropouts.', unit='1/s', low=0.0, high=100.0
+        0.5, 'How often a dropout occurs; a higher rate gives more dropouts.', unit='1/s', low=0.0, high=100.0
     )
     length_s: float = param(
-        0.02, 'Sets how long a dropout lasts; the last good sample is repeated during it.', unit='s', low=1e-3, high=1.0
+        0.02, 'How long a dropout lasts; the last good sample is repeated during it.', unit='s', low=1e-3, high=1.0
     )
 
     def start_signal(
@@ -197,9 +193,9 @@ class MainsHum:
     """A sine of the mains' frequency, and its third harmonic, on all channels alike."""
 
     rms_count: float = param(
-        20.0, 'Sets the root mean square of the fundamental; a larger value gives more hum.', unit='count', low=0.0
+        20.0, 'Root mean square of the fundamental; larger values give more hum.', unit='count', low=0.0
     )
-    mains_hz: float = param(50.0, 'Sets the frequency of the mains, 50 or 60 Hz.', unit='Hz', low=40.0, high=70.0)
+    mains_hz: float = param(50.0, 'Frequency of the mains, 50 or 60 Hz.', unit='Hz', low=40.0, high=70.0)
 
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
@@ -228,14 +224,14 @@ class MotorVibration:
 
     rms_n: float = param(
         2e-3,
-        'Sets the root mean square of the force ripple; a larger value vibrates more.',
+        'Root mean square of the force ripple; larger values vibrate more.',
         unit='N',
         low=0.0,
         high=1.0,
     )
     steps_1_m: float = param(
         1000.0,
-        'Sets the motor steps per metre of travel; the ripple has speed times this frequency.',
+        'Motor steps per metre of travel; the ripple has speed times this frequency.',
         unit='1/m',
         low=1.0,
         high=1e5,
@@ -271,12 +267,8 @@ class MotorVibration:
 class Noise:
     """White noise on every sample: its density is 2·count²/rate, from 0 Hz to half the rate."""
 
-    fast_count: float = param(
-        25.0, 'Sets the standard deviation of the noise on the fast channels.', unit='count', low=0.0
-    )
-    slow_count: float = param(
-        8.0, 'Sets the standard deviation of the noise on the slow channels.', unit='count', low=0.0
-    )
+    fast_count: float = param(25.0, 'Standard deviation of the noise on the fast channels.', unit='count', low=0.0)
+    slow_count: float = param(8.0, 'Standard deviation of the noise on the slow channels.', unit='count', low=0.0)
 
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
@@ -299,7 +291,7 @@ class Noise:
 class Quantisation:
     """Samples come in steps of several counts; steps of one count are always there."""
 
-    step_count: float = param(16.0, 'Sets the quantisation step; a larger step is coarser.', unit='count', low=1.0)
+    step_count: float = param(16.0, 'Quantisation step; a larger step is coarser.', unit='count', low=1.0)
 
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
@@ -327,12 +319,12 @@ class Skids:
 
     per_s: float = param(
         0.5,
-        'Sets how often the skin sticks and jumps; a higher rate disturbs more slides.',
+        'How often the skin sticks and jumps; a higher rate disturbs more slides.',
         unit='1/s',
         low=0.0,
         high=20.0,
     )
-    length_s: float = param(0.05, 'Sets how long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
+    length_s: float = param(0.05, 'How long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
 
     def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
         """Return what lets the skin lag behind the finger."""
@@ -384,12 +376,10 @@ class Skin:
     stable, and exact at the resonance.
     """
 
-    resonance_hz: float = param(
-        200.0, 'Sets the resonance frequency of the skin, √(k/m) / 2π.', unit='Hz', low=1.0, high=400.0
-    )
+    resonance_hz: float = param(200.0, 'Resonance frequency of the skin, √(k/m) / 2π.', unit='Hz', low=1.0, high=400.0)
     damping: float = param(
         0.3,
-        'Sets the damping ratio d / (2·√(k·m)); 1 is critical damping, a larger value is slower.',
+        'Damping ratio d / (2·√(k·m)); 1 is critical damping, larger values are slower.',
         low=0.01,
         high=10.0,
     )
@@ -432,12 +422,8 @@ MIN_SHARE = 0.05  # of what was wanted
 class SlideError:
     """Speed and force deviate from slide to slide (offline recordings; a simulated arm has errors of its own)."""
 
-    speed: float = param(
-        0.01, 'Sets the relative standard deviation of the speed from slide to slide.', low=0.0, high=0.5
-    )
-    force: float = param(
-        0.04, 'Sets the relative standard deviation of the force from slide to slide.', low=0.0, high=0.5
-    )
+    speed: float = param(0.01, 'Relative standard deviation of the speed from slide to slide.', low=0.0, high=0.5)
+    force: float = param(0.04, 'Relative standard deviation of the force from slide to slide.', low=0.0, high=0.5)
 
     def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return speed and force as they become, of the same shape."""
@@ -461,7 +447,7 @@ class Unevenness:
     """The texture is measured more strongly in some places of a sample than in others."""
 
     relative: float = param(
-        0.1, 'Sets the relative standard deviation of the texture strength over some centimetres.', low=0.0, high=1.0
+        0.1, 'Relative standard deviation of the texture strength over some centimetres.', low=0.0, high=1.0
     )
 
     def gain(self, path: Trajectory, finger: int) -> Array | float:

@@ -36,24 +36,22 @@ class Stribeck:
 
     static: float = param(
         0.9,
-        'Sets the coefficient of friction at rest, at which a sticking tip starts to slip, and of slow sliding.',
+        'Coefficient of friction at rest, at which a sticking tip starts to slip, and of slow sliding.',
         low=0.0,
         high=5.0,
     )
-    kinetic: float = param(0.5, 'Sets the coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
+    kinetic: float = param(0.5, 'Coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
     stribeck_m_s: float = param(
         0.05,
-        'Sets the Stribeck speed over which friction falls from static to kinetic; a larger value falls more slowly.',
+        'Stribeck speed over which friction falls from static to kinetic; larger values fall more slowly.',
         unit='m/s',
         low=1e-4,
         high=10.0,
     )
-    viscous_s_m: float = param(
-        0.0, 'Sets the growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0
-    )
+    viscous_s_m: float = param(0.0, 'Growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0)
     force_coupling: float = param(
         0.2,
-        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
+        'Measured force per tangential force on the skin; larger values show friction more strongly.',
         low=-10.0,
         high=10.0,
     )
@@ -80,42 +78,42 @@ class StickSlip(Stribeck):
 
     bristle_1_m: float = param(
         1.5e5,
-        'Sets the bristle stiffness per normal force; a larger value bends the bristles less.',
+        'Bristle stiffness per normal force; larger values bend the bristles less.',
         unit='1/m',
         low=1e2,
         high=1e8,
     )
     bristle_s_m: float = param(
         10.0,
-        'Sets the bristle damping per normal force; a larger value damps small motions more.',
+        'Bristle damping per normal force; larger values damp small motions more.',
         unit='s/m',
         low=0.0,
         high=1e4,
     )
     skin_n_m: float = param(
         1000.0,
-        'Sets the tangential stiffness of the skin; a larger value makes the stick phases shorter.',
+        'Tangential stiffness of the skin; larger values make the stick phases shorter.',
         unit='N/m',
         low=1.0,
         high=1e6,
     )
     skin_n_s_m: float = param(
         0.4,
-        'Sets the tangential damping of the skin; a larger value damps the slip phases more.',
+        'Tangential damping of the skin; larger values damp the slip phases more.',
         unit='N s/m',
         low=0.0,
         high=1e3,
     )
     mass_kg: float = param(
         5e-4,
-        'Sets the moving mass of the skin; a larger value makes the slip phases longer.',
+        'Moving mass of the skin; larger values make the slip phases longer.',
         unit='kg',
         low=1e-6,
         high=1.0,
     )
     step_s: float = param(
         2.5e-4,
-        'Sets the longest integration step; a shorter step is more exact and costs more computing time.',
+        'Longest integration step; a shorter step is more exact and costs more computing time.',
         unit='s',
         low=1e-7,
         high=0.1,
@@ -560,7 +558,7 @@ class SlidingFriction(Stribeck):
     For surfaces on which nothing sticks, hundreds of times cheaper than `StickSlip`.
     """
 
-    static: float = param(0.6, 'Sets the coefficient of friction of slow sliding.', low=0.0, high=5.0)
+    static: float = param(0.6, 'Coefficient of friction of slow sliding.', low=0.0, high=5.0)
 
 
 class SlidingDrag:

@@ -319,24 +319,20 @@ Logged = tuple[int, str, Any]
 class SlidePlan:
     """How each surface is explored."""
 
-    slides: int = param(10, 'Sets the number of slides over each surface.', low=1, high=100_000)
+    slides: int = param(10, 'Number of slides over each surface.', low=1, high=100_000)
     speed_m_s: float = param(
         0.1,
-        'Sets the speed along the surface; a higher speed raises all frequencies of the signal.',
+        'Speed along the surface; a higher speed raises all frequencies of the signal.',
         unit='m/s',
         low=0.001,
         high=1.0,
     )
-    force_n: float = param(
-        2.0, 'Sets the normal force; a larger force gives a stronger signal.', unit='N', low=0.05, high=20.0
-    )
-    slide_s: float = param(3.0, 'Sets the duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
-    direction_rad: float = param(
-        0.0, 'Sets the direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0
-    )
+    force_n: float = param(2.0, 'Normal force; a larger force gives a stronger signal.', unit='N', low=0.05, high=20.0)
+    slide_s: float = param(3.0, 'Duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
+    direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
     fingers: int = param(
         1,
-        "Sets the number of fingers that slide together; the topics of several are 'finger0/signal' and so on.",
+        "Number of fingers that slide together; the topics of several are 'finger0/signal' and so on.",
         low=1,
         high=5,
     )

@@ -25,21 +25,21 @@ class Contact:
 
     blur_m: float = param(
         1.2e-4,
-        'Sets the standard deviation of the spatial low-pass of the skin; a larger value removes coarser texture.',
+        'Standard deviation of the spatial low-pass of the skin; larger values remove coarser texture.',
         unit='m',
         low=1e-5,
         high=1e-3,
     )
     stiffness_n_m: float = param(
         2000.0,
-        'Sets the force per height of the texture; a larger value gives stronger signals.',
+        'Force per height of the texture; larger values give stronger signals.',
         unit='N/m',
         low=1.0,
         high=1e6,
     )
     tip_radius_m: float = param(
         7e-3,
-        'Sets the radius of curvature of the fingertip; on a curved object a larger one changes the contact more.',
+        'Radius of curvature of the fingertip; on a curved object a larger one changes the contact more.',
         unit='m',
         low=1e-3,
         high=0.1,

@@ -30,21 +30,19 @@ class ViewPlan:
 
     speed_m_s: float = param(
         0.1,
-        'Sets the speed along the surface; a higher speed raises all frequencies of the signal.',
+        'Speed along the surface; a higher speed raises all frequencies of the signal.',
         unit='m/s',
         low=0.001,
         high=1.0,
     )
-    force_n: float = param(
-        2.0, 'Sets the normal force; a larger force gives a stronger signal.', unit='N', low=0.01, high=20.0
-    )
+    force_n: float = param(2.0, 'Normal force; a larger force gives a stronger signal.', unit='N', low=0.01, high=20.0)
     duration_s: float = param(
-        0.5, 'Sets the duration of the slide; a longer slide shows more of the surface.', unit='s', low=0.05, high=20.0
+        0.5, 'Duration of the slide; a longer slide shows more of the surface.', unit='s', low=0.05, high=20.0
     )
     direction_rad: float = param(
-        0.0, 'Sets the direction of travel, from +x towards +y.', unit='rad', low=-2 * math.pi, high=2 * math.pi
+        0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-2 * math.pi, high=2 * math.pi
     )
-    radius_m: float = param(0.0, 'Sets the radius of a circle; 0 is a straight line.', unit='m', low=0.0, high=0.5)
+    radius_m: float = param(0.0, 'Radius of a circle; 0 is a straight line.', unit='m', low=0.0, high=0.5)
 
     @property
     def sliding(self) -> SimulatedSlide:

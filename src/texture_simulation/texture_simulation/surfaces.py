@@ -28,7 +28,7 @@ class Curved:
 
     radius_m: float = param(
         0.035,
-        'Sets the radius of curvature of the object; a smaller one makes the contact smaller and softer.',
+        'Radius of curvature of the object; a smaller one makes the contact smaller and softer.',
         unit='m',
         low=0.002,
         high=10.0,
@@ -182,20 +182,20 @@ class Ridges(Relief):
 
     pitch_m: float = param(
         2e-3,
-        'Sets the distance between ridges; a larger pitch lowers the frequency of the signal.',
+        'Distance between ridges; a larger pitch lowers the frequency of the signal.',
         unit='m',
         low=1e-5,
         high=0.1,
     )
     depth_m: float = param(
         2e-4,
-        'Sets the height of the ridges above the grooves; a larger depth gives a stronger signal.',
+        'Height of the ridges above the grooves; a larger depth gives a stronger signal.',
         unit='m',
         low=0.0,
         high=0.01,
     )
-    shape: str = param('sine', "Sets the cross-section of the ridges, 'sine' or 'square'.", choices=SHAPES)
-    duty: float = param(0.5, 'Sets the share of the pitch that a square ridge takes.', low=0.05, high=0.95)
+    shape: str = param('sine', "Cross-section of the ridges, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Fraction of the pitch that a square ridge takes.', low=0.05, high=0.95)
 
 
 # --------------------
@@ -206,12 +206,8 @@ class Ridges(Relief):
 class Circles(Ridges):
     """Concentric rings: blurred as straight ridges are, which is right but within a pitch or so of the centre."""
 
-    centre_x_m: float = param(
-        0.05, 'Sets the x coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
-    )
-    centre_y_m: float = param(
-        0.05, 'Sets the y coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m'
-    )
+    centre_x_m: float = param(0.05, 'X coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m')
+    centre_y_m: float = param(0.05, 'Y coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m')
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""
@@ -228,7 +224,7 @@ class Grating(Ridges):
     """Parallel ridges, `angle_rad` from +x towards +y: a slide along +x meets v·cos(angle)/pitch of them a second."""
 
     angle_rad: float = param(
-        0.0, 'Sets the direction across the ridges, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
+        0.0, 'Direction across the ridges, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
     )
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
@@ -252,28 +248,26 @@ class Grid(Relief):
 
     pitch_x_m: float = param(
         2e-3,
-        'Sets the distance of posts along the first direction; a larger pitch lowers the frequency of the signal.',
+        'Distance of posts along the first direction; a larger pitch lowers the frequency of the signal.',
         unit='m',
         low=1e-5,
         high=0.1,
     )
     pitch_y_m: float = param(
         2e-3,
-        'Sets the distance of posts along the second direction, across the first one.',
+        'Distance of posts along the second direction, across the first one.',
         unit='m',
         low=1e-5,
         high=0.1,
     )
     depth_m: float = param(
-        2e-4, 'Sets the height of posts or ribs; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
+        2e-4, 'Height of posts or ribs; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
     )
-    angle_rad: float = param(
-        0.0, 'Sets the first direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
-    )
-    shape: str = param('sine', "Sets the cross-section of the posts or hollows, 'sine' or 'square'.", choices=SHAPES)
-    duty: float = param(0.5, 'Sets the share of the pitch that a post or a hollow takes.', low=0.05, high=0.95)
+    angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
+    shape: str = param('sine', "Cross-section of the posts or hollows, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Fraction of the pitch that a post or a hollow takes.', low=0.05, high=0.95)
     relief: str = param(
-        'posts', "Sets what stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
+        'posts', "What stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
     )
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
@@ -466,17 +460,17 @@ class Sandpaper(RandomRelief):
     """
 
     grain_m: float = param(
-        2e-4, 'Sets the diameter of a grain; a larger grain gives lower frequencies.', unit='m', low=2e-5, high=0.01
+        2e-4, 'Diameter of a grain; a larger grain gives lower frequencies.', unit='m', low=2e-5, high=0.01
     )
     grain_height_m: float = param(
         5e-5,
-        'Sets the mean height of a grain above the sheet; a larger height gives a stronger signal.',
+        'Mean height of a grain above the sheet; a larger height gives a stronger signal.',
         unit='m',
         low=0.0,
         high=0.005,
     )
-    cover: float = param(0.5, 'Sets the share of the sheet that lies under grains.', low=0.02, high=2.0)
-    seed: int = param(0, 'Sets the seed of the places and heights of the grains.', low=0)
+    cover: float = param(0.5, 'Fraction of the sheet that lies under grains.', low=0.02, high=2.0)
+    seed: int = param(0, 'Seed of the places and heights of the grains.', low=0)
 
     @property
     def spacing_m(self) -> float:
@@ -509,15 +503,15 @@ class SelfAffine(RandomRelief):
 
     rms_m: float = param(
         1e-5,
-        'Sets the standard deviation of the height; a larger value gives a stronger signal.',
+        'Standard deviation of the height; larger values give a stronger signal.',
         unit='m',
         low=0.0,
         high=1e-3,
     )
-    hurst: float = param(0.8, 'Sets the Hurst exponent: 1 is smooth on small scales, 0 is jagged.', low=0.0, high=1.0)
-    longest_m: float = param(6e-3, 'Sets the longest wavelength of the relief.', unit='m', low=1e-4, high=0.1)
-    shortest_m: float = param(4e-4, 'Sets the shortest wavelength of the relief.', unit='m', low=1e-5, high=0.01)
-    seed: int = param(0, 'Sets the seed of the random relief.', low=0)
+    hurst: float = param(0.8, 'Hurst exponent: 1 is smooth on small scales, 0 is jagged.', low=0.0, high=1.0)
+    longest_m: float = param(6e-3, 'Longest wavelength of the relief.', unit='m', low=1e-4, high=0.1)
+    shortest_m: float = param(4e-4, 'Shortest wavelength of the relief.', unit='m', low=1e-5, high=0.01)
+    seed: int = param(0, 'Seed of the random relief.', low=0)
 
     def __post_init__(self) -> None:
         if not 1 < self.longest_m / self.shortest_m <= SIDE / POINTS_PER_WAVE / 2:
@@ -562,43 +556,43 @@ class Weave(Relief):
 
     pitch_x_m: float = param(
         8e-4,
-        'Sets the distance of the yarns that a slide along x crosses; a larger pitch lowers the frequency.',
+        'Distance of the yarns that a slide along x crosses; a larger pitch lowers the frequency.',
         unit='m',
         low=5e-5,
         high=0.05,
     )
     pitch_y_m: float = param(
         8e-4,
-        'Sets the distance of the yarns that a slide along y crosses; a larger pitch lowers the frequency.',
+        'Distance of the yarns that a slide along y crosses; a larger pitch lowers the frequency.',
         unit='m',
         low=5e-5,
         high=0.05,
     )
     thickness_x_m: float = param(
         1e-4,
-        'Sets how far the yarns crossed along x stand out; a larger value gives a stronger signal.',
+        'How far the yarns crossed along x stand out; larger values give a stronger signal.',
         unit='m',
         low=0.0,
         high=0.01,
     )
     thickness_y_m: float = param(
         1e-4,
-        'Sets how far the yarns crossed along y stand out; a larger value gives a stronger signal.',
+        'How far the yarns crossed along y stand out; larger values give a stronger signal.',
         unit='m',
         low=0.0,
         high=0.01,
     )
     repeat: int = param(
-        2, 'Sets the number of yarns after which the weave repeats: 2 is plain, more is a twill.', low=2, high=12
+        2, 'Number of yarns after which the weave repeats: 2 is plain, more is a twill.', low=2, high=12
     )
     irregular_m: float = param(
         0.0,
-        'Sets the standard deviation of the yarn positions; a larger value broadens the spectral lines.',
+        'Standard deviation of the yarn positions; larger values broaden the spectral lines.',
         unit='m',
         low=0.0,
         high=0.005,
     )
-    seed: int = param(0, 'Sets the seed of the yarn positions.', low=0)
+    seed: int = param(0, 'Seed of the yarn positions.', low=0)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""

@@ -33,13 +33,13 @@ class BringUpParams:
 
     nodes: str = param(
         'sensor feature_extractor classifier explorer',
-        'Sets the nodes, separated by spaces, in the order in which they are waited for.',
+        'Nodes, separated by spaces, in the order in which they are waited for.',
     )
     lifecycle_nodes: str = param(
-        'sensor explorer', 'Sets which of the nodes are configured and activated, separated by spaces.'
+        'sensor explorer', 'Which of the nodes are configured and activated, separated by spaces.'
     )
     timeout_s: float = param(
-        60.0, 'Sets how long each node may take to appear and to answer.', unit='s', low=0.1, high=3600.0
+        60.0, 'How long each node may take to appear and to answer.', unit='s', low=0.1, high=3600.0
     )
 
 

@@ -52,8 +52,8 @@ class DashboardParams:
     """Parameters of the web page and of its recordings."""
 
     host: str = param('127.0.0.1', 'Address to listen on; beyond loopback the page needs its token.')
-    port: int = param(8085, 'Sets the TCP port to listen on; 0 takes any free port.', low=0, high=65535)
-    recordings: str = param('recordings', 'Sets the folder in which the button `record` makes new bags.')
+    port: int = param(8085, 'TCP port to listen on; 0 takes any free port.', low=0, high=65535)
+    recordings: str = param('recordings', 'Folder in which the button `record` makes new bags.')
 
 
 class DashboardNode(Node):

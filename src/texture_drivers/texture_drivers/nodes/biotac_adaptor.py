@@ -24,15 +24,13 @@ class BiotacAdaptorParams:
     """Parameters that select which BioTac messages are converted."""
 
     message_type: str = param(
-        'biotac_sensors/msg/BioTacHand', 'Sets the type of the subscribed messages, written as package/msg/Type.'
+        'biotac_sensors/msg/BioTacHand', 'Type of the subscribed messages, written as package/msg/Type.'
     )
-    topic: str = param('biotac_pub', 'Sets the topic on which the other driver publishes.')
-    finger: int = param(
-        0, 'Sets the index of the finger that is converted; 0 is the first one of the message.', low=0, high=4
-    )
+    topic: str = param('biotac_pub', 'Topic on which the other driver publishes.')
+    finger: int = param(0, 'Index of the finger that is converted; 0 is the first one of the message.', low=0, high=4)
     frame_id: str = param(
         'fingertip',
-        'Sets the frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+        'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
     )
 
 

@@ -47,29 +47,29 @@ INERTIAL = ('Accelerometer', 'Gyroscope')
 class Tsf85AdaptorParams:
     """Parameters that select which TSF-85 messages are converted."""
 
-    package: str = param('robotiq_tsf', "Sets the package that defines the messages of the vendor's driver.")
-    prefix: str = param('TactileSensor', 'Sets the first part of the names of the subscribed topics.')
-    finger: int = param(0, 'Sets the index of the finger that is converted; 0 is the first one.', low=0, high=1)
+    package: str = param('robotiq_tsf', "Package that defines the messages of the vendor's driver.")
+    prefix: str = param('TactileSensor', 'First part of the names of the subscribed topics.')
+    finger: int = param(0, 'Index of the finger that is converted; 0 is the first one.', low=0, high=1)
     imu: bool = param(
         False, 'Converts acceleration and angular rate too, which costs two more messages in each millisecond.'
     )
     static_rate_hz: float = param(
         60.0,
-        'Sets the rate at which taxel images are published; a higher rate repeats images more often.',
+        'Rate at which taxel images are published; a higher rate repeats images more often.',
         unit='Hz',
         low=1.0,
         high=1000.0,
     )
     batch_s: float = param(
         0.01,
-        'Sets the duration of one published batch; a longer batch costs less computing time and adds latency.',
+        'Duration of one published batch; a longer batch costs less computing time and adds latency.',
         unit='s',
         low=0.001,
         high=0.1,
     )
     frame_id: str = param(
         'fingertip',
-        'Sets the frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+        'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
     )
 
 

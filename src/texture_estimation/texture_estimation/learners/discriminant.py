@@ -151,14 +151,14 @@ class Discriminant:
 
     shrinkage: float = param(
         0.1,
-        'Sets how far the correlations within classes are shrunk towards 0; more needs fewer slides and separates '
+        'How far the correlations within classes are shrunk towards 0; more needs fewer slides and separates '
         'less finely.',
         low=0.0,
         high=1.0,
     )
     folds: int = param(
         5,
-        'Sets the number of cross-validation folds for the calibration; more folds take longer to train.',
+        'Number of cross-validation folds for the calibration; more folds take longer to train.',
         low=2,
         high=50,
     )
@@ -303,27 +303,27 @@ class ForceDiscriminant(Discriminant):
 
     ranges: int = param(
         4,
-        'Sets the number of ranges of force; more follow the force more closely and need more windows.',
+        'Number of ranges of force; more follow the force more closely and need more windows.',
         low=1,
         high=32,
     )
     width: float = param(
         0.1,
-        'Sets how far from the middle of a range windows train its discriminant, standard deviation of the logarithm '
+        'How far from the middle of a range windows train its discriminant, standard deviation of the logarithm '
         'of the force; a larger one makes the ranges more alike.',
         low=0.01,
         high=10.0,
     )
     reach: float = param(
         0.1,
-        'Sets how fast a window counts less outside the trained forces: 1 / e where the logarithm of the force is so '
+        'How fast a window counts less outside the trained forces: 1 / e where the logarithm of the force is so '
         'far outside; a smaller one trusts the trained forces alone.',
         low=0.01,
         high=1e6,
     )
     stretch_weight: float = param(
         5.0,
-        'Sets how much differences between places along a slide add to the covariance; a larger one relies less on '
+        'How much differences between places along a slide add to the covariance; a larger one relies less on '
         'what changes from place to place.',
         low=0.0,
         high=1e3,

@@ -265,32 +265,31 @@ class Mlp:
 
     hidden: int = param(
         128,
-        'Sets the number of units in the hidden layer; more units separate finer and cost computing time.',
+        'Number of units in the hidden layer; more units separate finer and cost computing time.',
         low=1,
         high=4096,
     )
     noise: float = param(
         0.3,
-        'Sets the standard deviation of the noise added to the standardised features in training; more '
-        'noise smooths more.',
+        'Standard deviation of the noise added to the standardised features in training; more noise smooths more.',
         low=0.0,
         high=10.0,
     )
     decay: float = param(
-        0.01, 'Sets the weight decay, divided by the number of examples; a larger one smooths more.', low=0.0, high=1e6
+        0.01, 'Weight decay, divided by the number of examples; a larger one smooths more.', low=0.0, high=1e6
     )
     epochs: int = param(
-        60, 'Sets the number of passes over the training examples; more take longer to train.', low=1, high=100_000
+        60, 'Number of passes over the training examples; more take longer to train.', low=1, high=100_000
     )
     folds: int = param(
         5,
-        'Sets the number of cross-validation folds for the calibration; more folds take longer to train.',
+        'Number of cross-validation folds for the calibration; more folds take longer to train.',
         low=2,
         high=50,
     )
     seed: int = param(
         0,
-        'Sets the seed of the initial weights, the order of the examples and the noise; equal seeds give equal models.',
+        'Seed of the initial weights, the order of the examples and the noise; equal seeds give equal models.',
         low=0,
     )
 
@@ -559,14 +558,14 @@ class OnsetMlp(Mlp):
 
     onset_weight: float = param(
         1.0,
-        'Sets the weight of the discriminant of the first window, relative to the network; a larger one lets the first '
+        'Weight of the discriminant of the first window, relative to the network; a larger one lets the first '
         'window count more in the whole slide.',
         low=0.0,
         high=100.0,
     )
     shrinkage: float = param(
         0.3,
-        'Sets how far the correlations within classes are shrunk towards 0; more needs fewer slides and separates '
+        'How far the correlations within classes are shrunk towards 0; more needs fewer slides and separates '
         'less finely.',
         low=0.0,
         high=1.0,

@@ -378,7 +378,7 @@ class SvmRbf:
 
     c: float = param(
         10.0,
-        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        'Penalty of a training error (box constraint C); a larger one fits the training data more closely.',
         low=1e-6,
         high=1e9,
     )
@@ -389,18 +389,18 @@ class SvmRbf:
         high=1e9,
     )
     common_scale: bool = param(
-        False, 'Sets whether all features share one scale, for features of one kind such as taxel means.'
+        False, 'Whether all features share one scale, for features of one kind such as taxel means.'
     )
     folds: int = param(
         5,
-        'Sets the number of cross-validation folds for the calibration; more folds take longer to train.',
+        'Number of cross-validation folds for the calibration; more folds take longer to train.',
         low=2,
         high=50,
     )
 
     whitening: float = param(
         0.0,
-        'Sets the ridge of the whitening of what differs within a texture, relative to its mean variance: a smaller '
+        'Ridge of the whitening of what differs within a texture, relative to its mean variance: a smaller '
         'one leaves less of the directions in which slides of one texture differ; 0: no whitening.',
         low=0.0,
         high=1e6,

@@ -185,21 +185,21 @@ class CommandLimits:
 
     command_speed_m_s: float = param(
         1.0,
-        'Sets the highest tangential speed that one command may ask for; faster commands are refused.',
+        'Highest tangential speed that one command may ask for; faster commands are refused.',
         unit='m/s',
         low=0.001,
         high=2.0,
     )
     command_normal_m_s: float = param(
         0.5,
-        'Sets the highest normal speed that one command may ask for; faster commands are refused.',
+        'Highest normal speed that one command may ask for; faster commands are refused.',
         unit='m/s',
         low=0.001,
         high=1.0,
     )
     command_force_n: float = param(
         50.0,
-        'Sets the highest normal force that one command may ask for; larger forces are refused.',
+        'Highest normal force that one command may ask for; larger forces are refused.',
         unit='N',
         low=0.1,
         high=200.0,
@@ -255,26 +255,26 @@ class SurfacePoseParams:
     """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
 
     surface_x_m: float = param(
-        0.4, 'Sets the x coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+        0.4, 'X coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
     )
     surface_y_m: float = param(
-        0.0, 'Sets the y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+        0.0, 'Y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
     )
     surface_z_m: float = param(
-        0.1, 'Sets the z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+        0.1, 'Z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
     )
     surface_rx_rad: float = param(
         0.0,
-        'Sets the x component of the rotation vector of the surface frame; its z axis points away from the surface.',
+        'X component of the rotation vector of the surface frame; its z axis points away from the surface.',
         unit='rad',
         low=-7.0,
         high=7.0,
     )
     surface_ry_rad: float = param(
-        0.0, 'Sets the y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
+        0.0, 'Y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
     )
     surface_rz_rad: float = param(
-        0.0, 'Sets the z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
+        0.0, 'Z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
     )
 
     def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
@@ -535,15 +535,14 @@ class ZeroingParams:
 
     zero_rise_m: float = param(
         0.003,
-        'Sets the rise, at constant force, after which the force is zeroed; a larger rise zeroes it less often.',
+        'Rise, at constant force, after which the force is zeroed; a larger rise zeroes it less often.',
         unit='m',
         low=0.001,
         high=0.05,
     )
     zero_steady_n: float = param(
         0.5,
-        'Sets the largest change of the smoothed force that counts as constant; it must exceed the noise of the '
-        'sensor.',
+        'Largest change of the smoothed force that counts as constant; it must exceed the noise of the sensor.',
         unit='N',
         low=0.05,
         high=5.0,

@@ -23,37 +23,33 @@ SAMPLE_PERIOD_S = 0.01
 class InHandParams(CommandLimits):
     """Which hand holds what how."""
 
-    hand: str = param(
-        'simulated', "Sets the hand that is used: 'simulated' or 'dynamixel'.", choices=('simulated', 'dynamixel')
-    )
+    hand: str = param('simulated', "Hand that is used: 'simulated' or 'dynamixel'.", choices=('simulated', 'dynamixel'))
     finger_set: str = param(
-        'kaboli-train', 'Sets which fingers hold and which slide, by the name of a finger set of the hand.'
+        'kaboli-train', 'Which fingers hold and which slide, by the name of a finger set of the hand.'
     )
     grip_force_n: float = param(
         2.0,
-        'Sets the force with which each holding finger presses; a larger force grips more firmly.',
+        'Force with which each holding finger presses; a larger force grips more firmly.',
         unit='N',
         low=0.1,
         high=20.0,
     )
     grip_timeout_s: float = param(
         3.0,
-        'Sets how long the fingers may take to grip the object before connecting fails.',
+        'How long the fingers may take to grip the object before connecting fails.',
         unit='s',
         low=0.1,
         high=30.0,
     )
-    profile: str = param(
-        'leap', 'Sets the profile of a Dynamixel hand: the name of a shipped one or the path of a file.'
-    )
-    device: str = param('/tmp/texture/dynamixel', 'Sets the path of the serial device of a Dynamixel hand.')
+    profile: str = param('leap', 'Profile of a Dynamixel hand: the name of a shipped one or the path of a file.')
+    device: str = param('/tmp/texture/dynamixel', 'Path of the serial device of a Dynamixel hand.')
     torque_off_on_fault: bool = param(
         False,
         'Switches the torque of a Dynamixel hand off, so that it releases the object, when a motor reports a fault.',
     )
     finger_port: int = param(
         0,
-        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
         low=0,
         high=65535,
     )
@@ -165,7 +161,7 @@ class InHandArm(Arm):
             time.sleep(SAMPLE_PERIOD_S)
 
     def _weak(self, share: float) -> str:
-        """Return which holding finger presses with less than a share of the wanted force, '' if none."""
+        """Return which holding finger presses with less than a fraction of the wanted force, '' if none."""
         tips: Mapping[str, Fingertip] = self.hand.state().fingers
         wanted = self._params.grip_force_n
         weak = [name for name in self.fingers.hold if tips[name].force_n < share * wanted]

@@ -68,31 +68,31 @@ class RailsParams(CommandLimits):
 
     device: str = param(
         '/tmp/texture/rails',
-        'Sets the path of the serial device of the rails; the default is that of the emulated rails.',
+        'Path of the serial device of the rails; the default is that of the emulated rails.',
     )
     baud: int = param(
         230400,
-        'Sets the baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
         low=9600,
         high=12_000_000,
     )
     xy_counts_m: float = param(
         200_000.0,
-        'Sets the encoder counts per metre of the rails; a larger value gives shorter measured distances.',
+        'Encoder counts per metre of the rails; larger values give shorter measured distances.',
         unit='1/m',
         low=1e3,
         high=1e8,
     )
     z_counts_m: float = param(
         1_000_000.0,
-        'Sets the encoder counts per metre of the pressing motor; a larger value gives shorter measured distances.',
+        'Encoder counts per metre of the pressing motor; larger values give shorter measured distances.',
         unit='1/m',
         low=1e3,
         high=1e8,
     )
     height_m: float = param(
         0.01,
-        'Sets the height of the finger above the surface at 0 counts; a larger value moves the origin up.',
+        'Height of the finger above the surface at 0 counts; larger values move the origin up.',
         unit='m',
         low=-0.5,
         high=0.5,

@@ -45,62 +45,59 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
 
     twist_topic: str = param(
         'twist_controller/twist',
-        'Sets the topic of the commanded velocities (geometry_msgs/TwistStamped).',
+        'Topic of the commanded velocities (geometry_msgs/TwistStamped).',
     )
     pose_topic: str = param(
         'tcp_pose_broadcaster/pose',
-        'Sets the topic of the measured pose of the fingertip in the base frame (geometry_msgs/PoseStamped).',
+        'Topic of the measured pose of the fingertip in the base frame (geometry_msgs/PoseStamped).',
     )
     wrench_topic: str = param(
-        'force_torque_sensor_broadcaster/wrench', 'Sets the topic of the measured force (geometry_msgs/WrenchStamped).'
+        'force_torque_sensor_broadcaster/wrench', 'Topic of the measured force (geometry_msgs/WrenchStamped).'
     )
     target_wrench_topic: str = param(
         '',
-        'Sets the topic of the commanded force (geometry_msgs/WrenchStamped) for a compliance controller that presses '
+        'Topic of the commanded force (geometry_msgs/WrenchStamped) for a compliance controller that presses '
         "by itself; '' presses by velocities.",
     )
-    base_frame_id: str = param(
-        'base', 'Sets the name of the base frame, which the measured pose must carry in its header.'
-    )
+    base_frame_id: str = param('base', 'Name of the base frame, which the measured pose must carry in its header.')
     tool_frame_id: str = param(
         'tool0_controller',
-        'Sets the name of the frame of the fingertip; a force with another name than this and the base frame is '
-        'refused.',
+        'Name of the frame of the fingertip; a force with another name than this and the base frame is refused.',
     )
     twist_frame_id: str = param(
-        '', "Sets the frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
+        '', "Frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
     )
     controller_manager: str = param(
         '',
-        'Sets the controller manager that is asked to switch controllers when the arm is connected and let go, such as '
+        'Controller manager that is asked to switch controllers when the arm is connected and let go, such as '
         "'controller_manager'; '' switches nothing.",
     )
     activate_controllers: str = param(
         'twist_controller',
-        'Sets the controllers, separated by spaces, that are active only while the arm is connected.',
+        'Controllers, separated by spaces, that are active only while the arm is connected.',
     )
     deactivate_controllers: str = param(
         'scaled_joint_trajectory_controller',
-        'Sets the controllers, separated by spaces, that are inactive only while the arm is connected.',
+        'Controllers, separated by spaces, that are inactive only while the arm is connected.',
     )
     rate_hz: float = param(
         250.0,
-        'Sets the rate of commands; a higher rate reacts faster and costs more computing time.',
+        'Rate of commands; a higher rate reacts faster and costs more computing time.',
         unit='Hz',
         low=20.0,
         high=500.0,
     )
     loop_delay_s: float = param(
         0.02,
-        'Sets the largest delay from a measured force to the motion that answers it; a longer one is measured as the '
-        'finger comes down. A larger value lowers the gain.',
+        'Largest delay from a measured force to the motion that answers it; a longer one is measured as the '
+        'finger comes down. Larger values lower the gain.',
         unit='s',
         low=0.0,
         high=0.1,
     )
     command_timeout_s: float = param(
         0.1,
-        'Sets how long a command holds without a new one; afterwards the arm stands still.',
+        'How long a command holds without a new one; afterwards the arm stands still.',
         unit='s',
         low=0.02,
         high=2.0,
@@ -120,7 +117,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     heartbeat_s: float = param(
         0.05,
-        'Sets the longest silence of the commanding process after which its guard commands zero velocity; a larger '
+        'Longest silence of the commanding process after which its guard commands zero velocity; a larger '
         'value bears a busier machine.',
         unit='s',
         low=0.02,
@@ -128,7 +125,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     deadman_s: float = param(
         0.08,
-        'Sets the age of the newest pose or force above which zero velocity is commanded and a fault is reported; a '
+        'Age of the newest pose or force above which zero velocity is commanded and a fault is reported; a '
         'larger value bears more jitter.',
         unit='s',
         low=0.01,
@@ -136,7 +133,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     follow_m: float = param(
         0.002,
-        'Sets the commanded distance over which the arm must have followed, or its controller counts as lost; a larger '
+        'Commanded distance over which the arm must have followed, or its controller counts as lost; a larger '
         'value notices it later.',
         unit='m',
         low=0.0005,
@@ -144,7 +141,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     tool_mass_kg: float = param(
         0.0,
-        'Sets the mass of the tool whose weight is removed from the measured force; 0 if the sensor does so itself.',
+        'Mass of the tool whose weight is removed from the measured force; 0 if the sensor does so itself.',
         unit='kg',
         low=0.0,
         high=20.0,
@@ -159,7 +156,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     force_smoothing_s: float = param(
         0.0,
-        'Sets the time constant of the low-pass filter of the measured force; a longer one removes more noise and is '
+        'Time constant of the low-pass filter of the measured force; a longer one removes more noise and is '
         'added to the delay of the loop.',
         unit='s',
         low=0.0,
@@ -167,7 +164,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     connect_timeout_s: float = param(
         5.0,
-        'Sets how long the first pose, the first force and the controller may take before connecting fails.',
+        'How long the first pose, the first force and the controller may take before connecting fails.',
         unit='s',
         low=0.1,
         high=60.0,

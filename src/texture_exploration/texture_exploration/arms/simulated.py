@@ -37,60 +37,60 @@ class SimulatedSurfaceParams:
 
     tilt_rad: float = param(
         0.0,
-        'Sets the angle by which the surface rises along x; a larger angle is steeper.',
+        'Angle by which the surface rises along x; a larger angle is steeper.',
         unit='rad',
         low=-0.5,
         high=0.5,
     )
     bump_m: float = param(
-        0.0, 'Sets the height of a round bump on the path along x; 0 removes the bump.', unit='m', low=-0.01, high=0.01
+        0.0, 'Height of a round bump on the path along x; 0 removes the bump.', unit='m', low=-0.01, high=0.01
     )
-    bump_from_m: float = param(0.02, 'Sets the x coordinate at which the bump begins.', unit='m', low=-2.0, high=2.0)
+    bump_from_m: float = param(0.02, 'X coordinate at which the bump begins.', unit='m', low=-2.0, high=2.0)
     bump_length_m: float = param(
-        0.04, 'Sets the length of the bump along x; a longer bump is flatter.', unit='m', low=0.005, high=1.0
+        0.04, 'Length of the bump along x; a longer bump is flatter.', unit='m', low=0.005, high=1.0
     )
     step_m: float = param(
-        0.0, 'Sets the height of a step of the surface along x; 0 removes the step.', unit='m', low=-0.1, high=0.01
+        0.0, 'Height of a step of the surface along x; 0 removes the step.', unit='m', low=-0.1, high=0.01
     )
-    step_from_m: float = param(0.03, 'Sets the x coordinate of the step.', unit='m', low=-2.0, high=2.0)
-    edge_m: float = param(2.0, 'Sets the x coordinate at which the surface ends.', unit='m', low=-2.0, high=2.0)
+    step_from_m: float = param(0.03, 'X coordinate of the step.', unit='m', low=-2.0, high=2.0)
+    edge_m: float = param(2.0, 'X coordinate at which the surface ends.', unit='m', low=-2.0, high=2.0)
     ridge_m: float = param(
-        0.0, 'Sets the height of regular ridges along x; 0 removes the ridges.', unit='m', low=0.0, high=0.005
+        0.0, 'Height of regular ridges along x; 0 removes the ridges.', unit='m', low=0.0, high=0.005
     )
     ridge_length_m: float = param(
         0.002,
-        'Sets the distance between the ridges; a larger distance lowers their frequency.',
+        'Distance between the ridges; a larger distance lowers their frequency.',
         unit='m',
         low=0.0002,
         high=0.1,
     )
     layer_m: float = param(
-        0.0, 'Sets the thickness of a soft layer on the surface; 0 removes the layer.', unit='m', low=0.0, high=0.02
+        0.0, 'Thickness of a soft layer on the surface; 0 removes the layer.', unit='m', low=0.0, high=0.02
     )
     base_stiffness_n_m: float = param(
         20000.0,
-        'Sets the stiffness below the soft layer; a larger value gives harder impacts there.',
+        'Stiffness below the soft layer; larger values give harder impacts there.',
         unit='N/m',
         low=10.0,
         high=200000.0,
     )
     wall_m: float = param(
         2.0,
-        'Sets the x coordinate of a wall of `base_stiffness_n_m` across the way of the finger.',
+        'X coordinate of a wall of `base_stiffness_n_m` across the way of the finger.',
         unit='m',
         low=-2.0,
         high=2.0,
     )
     adhesion_n: float = param(
         0.0,
-        'Sets the largest pulling force with which the surface adheres to the finger; 0 removes adhesion.',
+        'Largest pulling force with which the surface adheres to the finger; 0 removes adhesion.',
         unit='N',
         low=0.0,
         high=10.0,
     )
     stick_slip_n: float = param(
         0.0,
-        'Sets the amplitude of the force while the finger sticks and slips every 2 mm; 0 removes stick-slip.',
+        'Amplitude of the force while the finger sticks and slips every 2 mm; 0 removes stick-slip.',
         unit='N',
         low=0.0,
         high=5.0,
@@ -157,42 +157,42 @@ class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams, CommandLimits)
 
     undeclared_lag_s: float = param(
         0.0,
-        "Sets the lag of an arm without force mode beyond 'loop_delay_s', unknown to its force control.",
+        "Lag of an arm without force mode beyond 'loop_delay_s', unknown to its force control.",
         unit='s',
         low=0.0,
         high=0.2,
     )
     force_noise_n: float = param(
         0.001,
-        'Sets the standard deviation of the force noise of an arm without force mode.',
+        'Standard deviation of the force noise of an arm without force mode.',
         unit='N',
         low=0.0,
         high=1.0,
     )
-    seed: int = param(1, 'Sets the seed of the noise; equal seeds give equal noise.', low=0)
+    seed: int = param(1, 'Seed of the noise; equal seeds give equal noise.', low=0)
     stiffness_n_m: float = param(
-        2000.0, 'Sets the stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
+        2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
     )
     admittance_m_s_n: float = param(
         0.01,
-        "Sets the normal speed per force error of the arm's own force mode; a larger value settles faster.",
+        "Normal speed per force error of the arm's own force mode; larger values settle faster.",
         unit='m/s/N',
         low=1e-4,
         high=1.0,
     )
     start_height_m: float = param(
-        0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
+        0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
     )
     command_timeout_s: float = param(
         0.1,
-        'Sets how long a command holds without a new one; afterwards the arm stands still.',
+        'How long a command holds without a new one; afterwards the arm stands still.',
         unit='s',
         low=0.02,
         high=2.0,
     )
     finger_port: int = param(
         0,
-        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
         low=0,
         high=65535,
     )

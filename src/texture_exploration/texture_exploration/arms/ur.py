@@ -201,52 +201,52 @@ def failure_message(text: str) -> bytes:
 class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
-    ip: str = param('127.0.0.2', 'Sets the IP address of the controller; the default is that of the emulated one.')
+    ip: str = param('127.0.0.2', 'IP address of the controller; the default is that of the emulated one.')
     rate_hz: float = param(
         250.0,
-        'Sets the rate of commands and states; a higher rate reacts faster and costs more computing time.',
+        'Rate of commands and states; a higher rate reacts faster and costs more computing time.',
         unit='Hz',
         low=50.0,
         high=500.0,
     )
     arm_acceleration_m_s2: float = param(
         2.0,
-        'Sets the acceleration towards a new velocity; a larger value follows commands faster.',
+        'Acceleration towards a new velocity; larger values follow commands faster.',
         unit='m/s²',
         low=0.1,
         high=10.0,
     )
     force_speed_m_s: float = param(
         0.05,
-        'Sets the highest normal speed under force control; a higher speed corrects force errors faster.',
+        'Highest normal speed under force control; a higher speed corrects force errors faster.',
         unit='m/s',
         low=0.001,
         high=0.25,
     )
     command_timeout_s: float = param(
         0.2,
-        'Sets how long a command holds without a new one; afterwards the arm stands still.',
+        'How long a command holds without a new one; afterwards the arm stands still.',
         unit='s',
         low=0.02,
         high=2.0,
     )
     watchdog_hz: float = param(
         10.0,
-        'Sets the lowest rate of commands at which the controller keeps the arm moving; a higher rate stops it sooner.',
+        'Lowest rate of commands at which the controller keeps the arm moving; a higher rate stops it sooner.',
         unit='Hz',
         low=1.0,
         high=50.0,
     )
     silence_s: float = param(
         0.1,
-        'Sets how long the controller may send no state before that is a fault; a longer time notices faults later.',
+        'How long the controller may send no state before that is a fault; a longer time notices faults later.',
         unit='s',
         low=0.02,
         high=2.0,
     )
     acknowledge_s: float = param(
         1.0,
-        'Sets how long the controller may take to stop, to end its force control and to zero the force '
+        'How long the controller may take to stop, to end its force control and to zero the force '
         'sensor; the watchdog waits as long.',
         unit='s',
         low=0.2,
@@ -265,14 +265,14 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     )
     probe_timeout_s: float = param(
         1.5,
-        'Sets how long the controller may take to answer the first requests before connecting fails.',
+        'How long the controller may take to answer the first requests before connecting fails.',
         unit='s',
         low=0.1,
         high=10.0,
     )
     connect_timeout_s: float = param(
         10.0,
-        'Sets how long the arm may take to be ready to move before connecting fails.',
+        'How long the arm may take to be ready to move before connecting fails.',
         unit='s',
         low=0.5,
         high=60.0,

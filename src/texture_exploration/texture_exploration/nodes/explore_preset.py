@@ -24,12 +24,10 @@ SAMPLE_PERIOD_S = 0.1
 class ExplorePresetParams:
     """Which motions are made on what."""
 
-    preset: str = param(
-        'ets-linear', 'Sets the preset that is explored: the name of a shipped one or the path of a file.'
-    )
-    surface: str = param('', 'Sets the true label of the surface if it is known; it labels the recording.')
+    preset: str = param('ets-linear', 'Preset that is explored: the name of a shipped one or the path of a file.')
+    surface: str = param('', 'True label of the surface if it is known; it labels the recording.')
     repeats: int = param(
-        0, 'Sets the number of rounds through all combinations; 0 takes the number of the preset.', low=0, high=10000
+        0, 'Number of rounds through all combinations; 0 takes the number of the preset.', low=0, high=10000
     )
 
 

@@ -69,11 +69,10 @@ class FrameParams:
 
     surface_frame_id: str = param(
         'surface',
-        'Sets the frame of the surface in the headers of the published states; in a namespace NAMESPACE/ is put before '
-        'it.',
+        'Frame of the surface in the headers of the published states; in a namespace NAMESPACE/ is put before it.',
     )
     fingertip_frame_id: str = param(
-        'fingertip', 'Sets the frame of the fingertip that is broadcast; in a namespace NAMESPACE/ is put before it.'
+        'fingertip', 'Frame of the fingertip that is broadcast; in a namespace NAMESPACE/ is put before it.'
     )
     broadcast_surface: bool = param(
         True, 'Broadcasts the surface in the base frame of the arm on /tf_static, if tf2_msgs is installed.'
@@ -172,7 +171,7 @@ class ArmParams:
     """Parameters that select the arm of the explorer."""
 
     arm: str = param(
-        'simulated', "Sets the arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."
+        'simulated', "Arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."
     )
 
 

@@ -92,7 +92,7 @@ class LowFftBins:
 
     bins: int = param(
         32,
-        'Sets the number of FFT bins, from the first above 0 Hz; more bins reach higher frequencies.',
+        'Number of FFT bins, from the first above 0 Hz; more bins reach higher frequencies.',
         low=1,
         high=512,
     )
@@ -183,10 +183,10 @@ class PacinianPower:
         250.0, 'Frequency at which the detection threshold is lowest.', unit='Hz', low=1.0, high=10_000.0
     )
     slope_below_db: float = param(
-        12.0, 'Sets the slope of the threshold below that frequency, in dB per octave.', low=0.0, high=100.0
+        12.0, 'Slope of the threshold below that frequency, in dB per octave.', low=0.0, high=100.0
     )
     slope_above_db: float = param(
-        12.0, 'Sets the slope of the threshold above that frequency, in dB per octave.', low=0.0, high=100.0
+        12.0, 'Slope of the threshold above that frequency, in dB per octave.', low=0.0, high=100.0
     )
     rate_of_change: bool = param(
         True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
@@ -293,9 +293,7 @@ class PowerAutocorrelation:
 
     per_channel: ClassVar[bool] = True
 
-    lags: int = param(
-        12, 'Sets the number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24
-    )
+    lags: int = param(12, 'Number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24)
     floor: float = param(
         1e-3,
         'Ratio added before the logarithm, so that a lag without any power gives a finite value.',
@@ -353,7 +351,7 @@ class ShortTimeFourier:
     per_channel: ClassVar[bool] = True
 
     parts: int = param(
-        4, 'Sets the number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
+        4, 'Number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
     )
     bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
     overlap: float = param(

@@ -80,7 +80,7 @@ class LogShares:
 
     floor: float = param(
         0.01,
-        'Sets the share of the load below which a channel counts as free; a larger one keeps out more noise.',
+        'Fraction of the load below which a channel counts as free; a larger one keeps out more noise.',
         low=1e-6,
         high=0.5,
     )
@@ -120,7 +120,7 @@ class ChannelMeanStatistics:
     names: ClassVar[tuple[str, ...]] = ('mean', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
 
     floor: float = param(
-        1e-4, 'Sets the power added to the variance before logarithm and split, in unit².', low=1e-300, high=1e300
+        1e-4, 'Power added to the variance before logarithm and split, in unit².', low=1e-300, high=1e300
     )
 
     def __call__(self, windows: WindowBatch) -> Array:
@@ -205,14 +205,13 @@ class DifferenceCorrelation:
 
     lags: list[int] = param(  # noqa: RUF009 – it gives a field
         [1, 4],
-        'Sets the lags of the differences in samples, at most a quarter of the window; longer ones compare slower '
-        'changes.',
+        'Lags of the differences in samples, at most a quarter of the window; longer ones compare slower changes.',
         low=1,
         high=10_000,
     )
     floor: float = param(
         0.1,
-        'Sets the variance added to that of each difference, in unit²: channels that hardly change, as those quantised '
+        'Variance added to that of each difference, in unit²: channels that hardly change, as those quantised '
         'to integers, are not correlated by their noise.',
         low=1e-300,
         high=1e300,
@@ -301,12 +300,12 @@ class SpatialBandPower:
 
     per_channel: ClassVar[bool] = True
 
-    bands: int = param(4, 'Sets the number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
+    bands: int = param(4, 'Number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
     longest_m: float = param(
-        2e-3, 'Sets the longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
+        2e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
     )
     shortest_m: float = param(
-        4.5e-4, 'Sets the shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
+        4.5e-4, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
     )
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=8, high=16384
@@ -320,9 +319,7 @@ class SpatialBandPower:
         low=0.0,
         high=4.0,
     )
-    floor: float = param(
-        1e-20, 'Sets the spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300
-    )
+    floor: float = param(1e-20, 'Spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300)
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:
@@ -394,17 +391,15 @@ class SpatialBands:
 
     per_channel: ClassVar[bool] = True
 
-    bands: int = param(32, 'Sets the number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
+    bands: int = param(32, 'Number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
     longest_m: float = param(
-        33e-3, 'Sets the longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1e3
+        33e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1e3
     )
     shortest_m: float = param(
-        0.67e-3, 'Sets the shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-7, high=1e3
+        0.67e-3, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-7, high=1e3
     )
     normalised: bool = param(True, 'Subtracts the mean over the bands, which depends mainly on force and speed.')
-    floor: float = param(
-        1e-7, 'Sets the spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300
-    )
+    floor: float = param(1e-7, 'Spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300)
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:
@@ -482,7 +477,7 @@ class SpatialVariation:
 
     lag_m: float = param(
         5e-4,
-        'Sets the distance on the surface between the two compared points; longer lags compare coarser texture.',
+        'Distance on the surface between the two compared points; longer lags compare coarser texture.',
         unit='m',
         low=1e-6,
         high=1.0,

@@ -189,7 +189,7 @@ class LogDifferenceVariance:
 
     floor: float = param(
         1e-20,
-        'Sets the power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
+        'Power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
         low=1e-300,
         high=1e300,
     )
@@ -218,7 +218,7 @@ class LogVariance:
 
     floor: float = param(
         1e-20,
-        'Sets the power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
+        'Power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
         low=1e-300,
         high=1e300,
     )
@@ -330,7 +330,7 @@ class SlideOnset:
 
     within_s: float = param(
         0.03,
-        'Sets how long after the start of a slide a window may begin and be one of the onset.',
+        'How long after the start of a slide a window may begin and be one of the onset.',
         unit='s',
         low=0.0,
         high=60.0,
@@ -389,7 +389,7 @@ class TemporalVariation:
 
     lag_s: float = param(
         0.002,
-        'Sets the time lag between the compared samples, at least one sample; a longer one compares lower frequencies.',
+        'Time lag between the compared samples, at least one sample; a longer one compares lower frequencies.',
         unit='s',
         low=0.0,
         high=10.0,

@@ -37,7 +37,7 @@ class ExtractorParams:
 
     recipe: str = param(
         'default',
-        "Sets the recipe: the name of a shipped one, or the path of a recipe (YAML) or of a model's card (JSON).",
+        "Recipe: the name of a shipped one, or the path of a recipe (YAML) or of a model's card (JSON).",
     )
 
 

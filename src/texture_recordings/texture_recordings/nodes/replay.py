@@ -76,29 +76,27 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=5)
 class ReplayParams:
     """What is published, how fast, and who must be listening."""
 
-    bag: str = param('', 'Sets the bag, or the folder of bags, that is published.')
+    bag: str = param('', 'Bag, or the folder of bags, that is published.')
     rate: float = param(1.0, 'Playback rate relative to the recording; 2 is twice as fast.', low=0.01, high=1000.0)
-    slides: str = param(
-        '', "Sets which slides of each surface are published, such as '1-30'; '' takes the whole recording."
-    )
+    slides: str = param('', "Which slides of each surface are published, such as '1-30'; '' takes the whole recording.")
     from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
     longest_pause_s: float = param(
         1.0, 'Longest pause that is replayed; longer ones are shortened to it.', unit='s', low=0.0
     )
     subscribers: int = param(
         1,
-        "Sets the number of subscribers that 'signal', 'exploration' and 'features' need before the start.",
+        "Number of subscribers that 'signal', 'exploration' and 'features' need before the start.",
         low=0,
         high=100,
     )
-    deadline_s: float = param(30.0, 'Sets how long to wait for the subscribers before giving up.', unit='s', low=0.0)
+    deadline_s: float = param(30.0, 'How long to wait for the subscribers before giving up.', unit='s', low=0.0)
     end_delay_s: float = param(
         0.0,
         'Time to wait after the last message, in which the last estimates come, before the node ends.',
         unit='s',
         low=0.0,
     )
-    start_delay_s: float = param(1.0, 'Sets the time between finding the subscribers and the start.', unit='s', low=0.0)
+    start_delay_s: float = param(1.0, 'Time between finding the subscribers and the start.', unit='s', low=0.0)
     clock: bool = param(
         False,
         "Publishes the time of the recording on '/clock', for nodes whose parameter 'use_sim_time' is true.",

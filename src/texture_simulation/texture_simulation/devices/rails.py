@@ -42,26 +42,20 @@ LIFT_SPEED_M_S = 0.05
 class RailsMachine:
     """Parameters of the emulated rails and of the surface under the finger."""
 
-    start_height_m: float = param(
-        0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0
-    )
+    start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
     stiffness_n_m: float = param(
-        2000.0, 'Sets the stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
+        2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
     )
-    travel_m: float = param(0.3, 'Sets the distance of the end switches from the start.', unit='m', low=0.01)
+    travel_m: float = param(0.3, 'Distance of the end switches from the start.', unit='m', low=0.01)
     acceleration_m_s2: float = param(
         5.0,
-        'Sets the acceleration of the stepper motors; a larger value reaches a commanded speed sooner.',
+        'Acceleration of the stepper motors; larger values reach a commanded speed sooner.',
         unit='m/s²',
         low=0.1,
     )
-    xy_counts_m: float = param(200_000.0, 'Sets the encoder counts per metre of the rails.', unit='1/m', low=1e3)
-    z_counts_m: float = param(
-        1_000_000.0, 'Sets the encoder counts per metre of the pressing motor.', unit='1/m', low=1e3
-    )
-    overload_n: float = param(
-        14.0, 'Sets the force above which the firmware lifts the finger by itself.', unit='N', low=0.1
-    )
+    xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3)
+    z_counts_m: float = param(1_000_000.0, 'Encoder counts per metre of the pressing motor.', unit='1/m', low=1e3)
+    overload_n: float = param(14.0, 'Force above which the firmware lifts the finger by itself.', unit='N', low=0.1)
     stalled: bool = param(False, 'Blocks the rails mechanically, so that the encoders do not follow the motors.')
     reports_stall: bool = param(True, 'Lets the firmware stop and report encoders that do not follow the motors.')
 

@@ -21,17 +21,17 @@ class LeapHandParams:
 
     link: str = param(
         '/tmp/texture/dynamixel',
-        'Sets the path of the symbolic link to the emulated hand, which is the device path of the arm.',
+        'Path of the symbolic link to the emulated hand, which is the device path of the arm.',
     )
-    finger: str = param('index', 'Sets the finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
+    finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
     finger_port: int = param(
         0,
-        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
         low=0,
         high=65535,
     )
     stiffness_n_m: float = param(
-        2000.0, 'Sets the stiffness of fingertip and object in contact; 0 removes the object.', unit='N/m', low=0.0
+        2000.0, 'Stiffness of fingertip and object in contact; 0 removes the object.', unit='N/m', low=0.0
     )
 
 

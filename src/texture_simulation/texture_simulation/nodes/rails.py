@@ -21,11 +21,11 @@ class RailsLinkParams:
 
     link: str = param(
         '/tmp/texture/rails',
-        'Sets the path of the symbolic link to the emulated rails, which is the device path of the arm.',
+        'Path of the symbolic link to the emulated rails, which is the device path of the arm.',
     )
     finger_port: int = param(
         0,
-        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
         low=0,
         high=65535,
     )

@@ -28,15 +28,15 @@ LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
 class ControllerTopicParams:
     """Names of the topics and frames, which are those of `ur_robot_driver` by default."""
 
-    twist_topic: str = param('twist_controller/twist', 'Sets the topic of the commanded velocities.')
-    target_wrench_topic: str = param('target_wrench', 'Sets the topic of the commanded force.')
-    pose_topic: str = param('tcp_pose_broadcaster/pose', 'Sets the topic of the measured pose.')
-    wrench_topic: str = param('force_torque_sensor_broadcaster/wrench', 'Sets the topic of the measured force.')
-    base_frame_id: str = param('base', 'Sets the name of the base frame; commands in other frames are ignored.')
-    tool_frame_id: str = param('tool0_controller', 'Sets the name of the frame of the measured force.')
+    twist_topic: str = param('twist_controller/twist', 'Topic of the commanded velocities.')
+    target_wrench_topic: str = param('target_wrench', 'Topic of the commanded force.')
+    pose_topic: str = param('tcp_pose_broadcaster/pose', 'Topic of the measured pose.')
+    wrench_topic: str = param('force_torque_sensor_broadcaster/wrench', 'Topic of the measured force.')
+    base_frame_id: str = param('base', 'Name of the base frame; commands in other frames are ignored.')
+    tool_frame_id: str = param('tool0_controller', 'Name of the frame of the measured force.')
     rate_hz: float = param(
         250.0,
-        'Sets the rate of pose and force; a higher rate costs more computing time.',
+        'Rate of pose and force; a higher rate costs more computing time.',
         unit='Hz',
         low=10.0,
         high=1e3,
@@ -58,7 +58,7 @@ class ControllerTopicParams:
     )
     finger_port: int = param(
         0,
-        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
         low=0,
         high=65535,
     )
