@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the pages of docs/reference from the source: `python tools/reference.py`, or `--check` to compare only.
 
-They hold the messages with their comments, the arguments of the launch files, all parameters, the catalogues of
-sensors, motions, features and simulated surfaces, the shipped recipes, and the figures of the papers beside ours.
+They hold the messages with their comments, the commands with their options, the arguments of the launch files, all
+parameters, the catalogues of sensors, motions, features and simulated surfaces, the shipped recipes, and the figures of
+the papers next to ours. The README of each package is made from its docstring, its nodes and its commands.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import dataclasses
 import importlib
 import inspect
@@ -15,11 +17,13 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from xml.etree import ElementTree
 
 import yaml
 
+from texture_bringup.command import installed, summary
+from texture_core.cli import Command
 from texture_core.config import markdown_table
 from texture_drivers.catalogue import SENSORS
 from texture_estimation.learners.catalogue import LEARNERS
@@ -75,6 +79,75 @@ def _launch_file(path: Path) -> str:
         shown = 'required' if default is None else f'`{default}`' if default else 'empty'
         rows.append(f'| `{argument.get("name")}` | {shown} | {argument.get("description")} |')
     return f'## {name}\n\n{" ".join(about.split())}\n\n' + '\n'.join(rows) + '\n'
+
+
+def commands(root: Path) -> str:
+    """Return the options of each sub-command of `texture` as Markdown, from its parser."""
+    return '\n'.join(_command(name) for name in installed())
+
+
+def _command(name: str) -> str:
+    entry = installed()[name]
+    parser = argparse.ArgumentParser(prog=f'texture {name}')
+    cast(Command, entry.load()).configure(parser)
+    return f'## {name}\n\n{_sentence(summary(entry))}\n\n{_options(parser)}'
+
+
+def _options(parser: argparse.ArgumentParser, of: str = '') -> str:
+    """Return a table of the arguments of a parser, followed by those of its sub-commands."""
+    rows, below = ['| argument | meaning |', '|---|---|'], []
+    for action in parser._actions:
+        if isinstance(action, argparse._HelpAction) or action.help == argparse.SUPPRESS:
+            continue
+        if isinstance(action, argparse._SubParsersAction):
+            below += [_options(found, f'{of}{name} ') for name, found in action.choices.items()]
+            continue
+        names = ', '.join(f'`{name}`' for name in action.option_strings) or f'`{action.metavar or action.dest}`'
+        choices = f' ({", ".join(f"`{choice}`" for choice in action.choices)})' if action.choices else ''
+        meaning = ((action.help or '') % {**vars(action), 'prog': parser.prog}).replace('|', '\\|')
+        rows.append(f'| {of}{names} | {meaning}{choices} |')
+    return '\n'.join([*(rows if len(rows) > 2 else []), '', *below])
+
+
+def _sentence(text: str) -> str:
+    return f'{text[:1].upper()}{text[1:]}.'
+
+
+def package_readme(package: Path) -> str:
+    """Return the README of a package: its docstring, its messages or nodes, and its commands."""
+    name, parts = package.name, []
+    if name == 'texture_msgs':
+        parts.append(_interfaces(package))
+    else:
+        parts.append((_docstring(package / name / '__init__.py')).strip() + '\n')
+        nodes = sorted((package / name / 'nodes').glob('[a-z]*.py'))
+        if nodes:
+            rows = [f'| `ros2 run {name} {path.stem}` | {_docstring(path).splitlines()[0]} |' for path in nodes]
+            parts.append('\n'.join(['| node | what it is |', '|---|---|', *rows, '']))
+    found = [(command, entry) for command, entry in installed().items() if entry.module.split('.')[0] == name]
+    if found:
+        rows = [
+            f'| [`texture {c}`](../../docs/reference/commands.md#{c}) | {_sentence(summary(e))} |' for c, e in found
+        ]
+        parts.append('\n'.join(['| command | what it does |', '|---|---|', *rows, '']))
+    if f'\n## {name}\n' in (FOLDER / 'parameters.md').read_text(encoding='utf-8'):
+        parts.append(f'All parameters are in the [reference](../../docs/reference/parameters.md#{name}).\n')
+    return f'{GENERATED}\n\n# {name}\n\n' + '\n'.join(parts)
+
+
+def _docstring(path: Path) -> str:
+    return ast.get_docstring(ast.parse(path.read_text(encoding='utf-8'))) or ''
+
+
+def _interfaces(package: Path) -> str:
+    description = ElementTree.parse(package / 'package.xml').findtext('description')
+    rows = ['| interface | meaning |', '|---|---|']
+    for kind in INTERFACE_KINDS:
+        for path in sorted((package / kind).glob(f'*.{kind}')):
+            about = split(path.read_text(encoding='utf-8'))[0].split('. ')[0].removesuffix('.')
+            rows.append(f'| [{path.stem}](../../docs/reference/messages.md#{path.stem.lower()}), {kind} | {about}. |')
+    where = 'Who publishes what, and how often: [interfaces](../../docs/interfaces.md).'
+    return f'{description}\n\n{where}\n\n' + '\n'.join(rows) + '\n'
 
 
 def parameters(root: Path) -> str:
@@ -326,6 +399,12 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
         'NAME.launch.xml ARGUMENT:=VALUE`. Files that start a robot pass on the arguments of `tactile`.',
         launch_files,
     ),
+    'commands': (
+        'Commands',
+        'Each is called as `texture NAME`, and has `--help`. It ends with 0 for success, 2 if an argument is wrong or '
+        'something is missing, and 1 for a bad outcome.',
+        commands,
+    ),
     'parameters': (
         'Parameters',
         'Each parameter is a field of a frozen dataclass. Nodes take it as `--ros-args -p NAME:=VALUE`, recipes and '
@@ -391,12 +470,18 @@ def page(name: str, root: Path = ROOT) -> str:
     return f'{GENERATED}\n\n# {title}\n\n{about}\n\n{make(root).strip()}\n'
 
 
+def made(root: Path = ROOT) -> dict[Path, str]:
+    """Return every generated page of the repository and its text."""
+    pages = {FOLDER / f'{name}.md': page(name, root) for name in PAGES}
+    return pages | {path.parent / 'README.md': package_readme(path.parent) for path in root.glob('src/*/package.xml')}
+
+
 def stale() -> list[str]:
     """Return one sentence for each page that is not what the source makes now."""
     return [
-        f'docs/reference/{name}.md is not up to date; run .venv/bin/ros-run python tools/reference.py'
-        for name in PAGES
-        if not (FOLDER / f'{name}.md').exists() or (FOLDER / f'{name}.md').read_text(encoding='utf-8') != page(name)
+        f'{path.relative_to(ROOT)} is not up to date; run .venv/bin/ros-run python tools/reference.py'
+        for path, text in made().items()
+        if not path.exists() or path.read_text(encoding='utf-8') != text
     ]
 
 
@@ -409,8 +494,8 @@ def main() -> int:
         print('\n'.join(found))
         return int(bool(found))
     FOLDER.mkdir(exist_ok=True)
-    for name in PAGES:
-        (FOLDER / f'{name}.md').write_text(page(name), encoding='utf-8')
+    for path, text in made().items():
+        path.write_text(text, encoding='utf-8')
     return 0
 
 

@@ -246,6 +246,27 @@ def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line:
         assert {text.split(':=')[0] for text in given} <= launch_arguments(options.file)
 
 
+def options_of(parser: argparse.ArgumentParser) -> set[str]:
+    """Return all options of a parser and of its sub-commands."""
+    below = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    own = {option for action in parser._actions for option in action.option_strings}
+    return own.union(*(options_of(found) for action in below for found in action.choices.values()))
+
+
+def test_every_option_that_a_page_names_is_one_of_a_command() -> None:
+    known = {'--version', '--check'}  # of `texture` itself and of the tools
+    for entry in installed().values():
+        parser = argparse.ArgumentParser()
+        entry.load().configure(parser)
+        known |= options_of(parser)
+    pages = [ROOT / 'README.md', *DOCS.glob('*.md')]
+    named = {(page.name, option) for page in pages for option in re.findall(r'`(--[a-z][\w-]*)', page.read_text())}
+    assert sorted(found for found in named if found[1] not in known | OF_OTHERS) == []
+
+
+OF_OTHERS = {'--build-arg'}  # docker
+
+
 def launch_arguments(name: str) -> set[str]:
     """Return the arguments that a launch file of the suite declares, with those of the files it includes."""
     text = (ROOT / 'src/texture_bringup/launch' / f'{name}.launch.xml').read_text()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ('README.md', 'CONTRIBUTING.md', 'docs/*.md', 'docs/appendix/*.md', 'src/*/README.md')
+GENERATED = '<!-- This page is generated'
 LEFT_OUT = re.compile(r'<!--.*?-->|^```.*?^```|^    .*?$', re.DOTALL | re.MULTILINE)
 
 
@@ -16,8 +17,13 @@ def words(page: Path) -> int:
     return len(LEFT_OUT.sub('', page.read_text(encoding='utf-8')).split())
 
 
+def written(pattern: str) -> list[Path]:
+    """Return the pages of a pattern that no tool generates."""
+    return [page for page in sorted(ROOT.glob(pattern)) if not page.read_text(encoding='utf-8').startswith(GENERATED)]
+
+
 if __name__ == '__main__':
-    counts = {page.relative_to(ROOT): words(page) for pattern in PAGES for page in sorted(ROOT.glob(pattern))}
+    counts = {page.relative_to(ROOT): words(page) for pattern in PAGES for page in written(pattern)}
     for path, count in sorted(counts.items(), key=lambda item: item[1]):
         print(f'{count:6d} {path}')
     print(f'{sum(counts.values()):6d} words on {len(counts)} pages')

@@ -1,2 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launch files, configuration, the stand-alone launcher and the texture command."""
+"""Launch files, configuration, the `texture` command, the dashboard and the demonstration.
+
+Data in: arguments of launch files and commands. Data out: running nodes, sentences for people, and exit codes: 0 for
+success, 2 if an argument is wrong or something is missing, 1 for a bad outcome such as an aborted exploration.
+
+```sh
+texture demo
+texture launch emulator surface:=leather      # or: ros2 launch texture_bringup emulator.launch.xml surface:=leather
+texture explore linear_slide --speed 0.05 --distance 0.06
+texture dashboard
+```
+
+Limits: `respawn` never restarts a node that moves a robot. Other packages add commands through the entry point group
+`texture.commands`.
+"""

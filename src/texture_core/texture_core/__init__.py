@@ -1,2 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Data types, parameters, catalogues and ROS glue shared by all packages of the suite."""
+"""What all packages share: data types, parameters, catalogues, errors, framing of serial lines and ROS glue.
+
+Data: frozen dataclasses, which are checked when they are made. Times are integers in ns and quantities are SI.
+Nothing reads a clock. Only the module `ros` needs ROS.
+
+```python
+from texture_core.config import find, param
+from texture_core.types import TactileSignal, lost_samples
+
+lost = lost_samples(batches)  # batches: TactileSignals of one stream, in order
+feature = find({'hjorth': hjorth}, 'hjorth', 'feature')  # a wrong name is answered with the nearest one
+```
+
+Limits: a parameter is declared once, as a `param` field; YAML, ROS and the reference read it there.
+"""

@@ -1,2 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exploratory motions, the robots that perform them, and their safety."""
+"""Exploratory motions, the robots that perform them, and their safety.
+
+Data in: an `ExplorationRequest` with speed in m/s, force in N and lengths in m. Data out: `ExplorationState`, which
+says what the finger does and how long speed and force are guaranteed, and an outcome in one sentence.
+
+```python
+from texture_core.types import ExplorationRequest
+from texture_exploration.arms.simulated import SimulatedArm
+from texture_exploration.explorer import Explorer
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import TouchParams
+
+explorer = Explorer(SimulatedArm(), TouchParams(), SafetyLimits(), on_state=print)
+explorer.connect()
+exploration = explorer.begin('my-first', ExplorationRequest('linear_slide', distance_m=0.05))
+exploration.ended.wait()
+print(exploration.outcome)
+```
+
+With ROS: `ros2 run texture_exploration explorer --ros-args -p arm:=simulated`
+
+Limits: no arm has been tested on a real robot, and nothing here is a safety function: [safety](../../docs/safety.md).
+Arm and sensor are fixed when the node starts; other parameters change with the next exploration.
+"""

@@ -1,2 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Windows of a tactile signal and the features that describe them."""
+"""Windows of a tactile signal and the features that describe them.
+
+Data in: `TactileSignal`s of any rate and number of channels, and `ExplorationState`s, which say when the finger slides.
+Data out: a `FeatureVector` per window, with names such as `signal/log_bands/12/dynamic` (input, feature, value,
+channel). The node and the offline functions give the same numbers to the last bit.
+
+```python
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import cut_recording
+
+features = FeatureSet.load('default')  # the name or path of a recipe
+vectors = features.extract_many(cut_recording({'signal': batches}, states, features.windows))
+```
+
+With ROS: `ros2 run texture_features feature_extractor --ros-args -p recipe:=default`
+
+Limits: signals and states may arrive at most 10 s apart.
+"""
