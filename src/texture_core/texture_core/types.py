@@ -608,8 +608,7 @@ def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
     # sin(a)/a and (1 − cos a)/a² in a form that holds for a = 0; numpy's sinc(t) is sin(πt)/(πt).
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-    matrix: Array = np.eye(3) + first * cross + second * cross @ cross
-    return matrix
+    return np.eye(3) + first * cross + second * cross @ cross
 
 
 def quaternion(rotation_vector_rad: Sequence[float] | Array) -> tuple[float, float, float, float]:
@@ -655,8 +654,7 @@ def quaternion_matrix(quaternion: Sequence[float]) -> Array:
     vector, w = vector / length, w / length
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    matrix: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
-    return matrix
+    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
 
 
 def rotation_vector(matrix: Array) -> Array:
@@ -689,8 +687,7 @@ def rotation_vector(matrix: Array) -> Array:
     length = float(np.linalg.norm(quaternion[:3]))
     if length == 0.0:
         return np.zeros(3)
-    vector: Array = quaternion[:3] * (2.0 * np.arctan2(length, quaternion[3]) / length)
-    return vector
+    return quaternion[:3] * (2.0 * np.arctan2(length, quaternion[3]) / length)
 
 
 # --------------------

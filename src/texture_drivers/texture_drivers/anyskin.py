@@ -186,8 +186,7 @@ def in_range(values: Values) -> NDArray[np.bool_]:
         warm = (temperature_c >= LOWEST_TEMPERATURE_C) & (temperature_c <= HIGHEST_TEMPERATURE_C)
         weak = (magnitudes[..., 1:] <= LARGEST_FIELD_UT).all(axis=(1, 2))
         measured = ((magnitudes >= SMALLEST) | (magnitudes == 0)).all(axis=(1, 2))
-    valid: NDArray[np.bool_] = warm.all(axis=1) & weak & measured
-    return valid
+    return warm.all(axis=1) & weak & measured
 
 
 # --------------------

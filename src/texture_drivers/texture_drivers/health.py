@@ -66,8 +66,7 @@ class Baseline:
             0 or more.
         """
         floor = np.maximum(RELATIVE_FLOOR * np.abs(self.level), np.median(self.noise))
-        off: Array = np.abs(level - self.level) / np.maximum(np.maximum(self.noise, floor), np.finfo(float).tiny)
-        return off
+        return np.abs(level - self.level) / np.maximum(np.maximum(self.noise, floor), np.finfo(float).tiny)
 
     def as_signal(self) -> TactileSignal:
         """Return the baseline as a batch of one sample."""
@@ -145,8 +144,7 @@ def saturated(
     (n_channels,) bool
     """
     at_end = (samples <= lowest) | (samples >= highest)
-    too_often: NDArray[np.bool_] = at_end.mean(axis=0) > least_share
-    return too_often
+    return at_end.mean(axis=0) > least_share
 
 
 # --------------------
@@ -268,8 +266,7 @@ class StreamWatch:
         self._last = samples[-1]
         self._still_s = np.where(changed, 0.0, self._still_s + elapsed_s)
         still: Flags = self._still_s >= DEAD_S
-        dead: Flags = invalid | (still & (2 * still.sum() < len(still)))
-        return dead
+        return invalid | (still & (2 * still.sum() < len(still)))
 
     def _drift_faults(self, samples: NDArray[np.float32], channels: Sequence[str], limit: float) -> list[str]:
         assert self.baseline is not None
@@ -409,8 +406,7 @@ class SensorHealth:
     @property
     def details(self) -> Mapping[str, Any]:
         """What the sensor reports about itself, such as its 'serial number'; a user's own need not."""
-        details: Mapping[str, Any] = getattr(self._reader.sensor, 'details', {})
-        return details
+        return getattr(self._reader.sensor, 'details', {})
 
     def report(self, now_s: float) -> HealthReport:
         """Return the state at a time of a monotonic clock."""

@@ -8,9 +8,9 @@ from scipy.signal import lfilter
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES
-from texture_features.features.spectral import LogBands, PacinianPower, PeakToMedianPower, SpectralExponent
+from texture_features.features.spectral import PacinianPower, PeakToMedianPower, SpectralExponent
 from texture_features.features.taxels import SpatialBandPower, SpatialVariation
-from texture_features.features.temporal import TemporalVariation, hjorth
+from texture_features.features.temporal import hjorth
 from texture_features.spectra import hann, mean_over_segments, segment_densities
 
 RATE_HZ = 1000.0
@@ -95,11 +95,11 @@ def test_values_come_for_each_channel_and_name(name):
 
 @EVERY
 def test_many_windows_give_the_very_values_of_each(name):
-    samples = noise(4, 500, 3)
+    samples, speeds = noise(4, 500, 3), np.array([0.02, np.nan, 0.1, 0.0])
     feature = FEATURES[name]()
-    together = feature(windows(samples))
-    for window, values in zip(samples, together, strict=True):
-        np.testing.assert_array_equal(feature(windows(window)), values)
+    together = feature(windows(samples, speeds))
+    for window, speed, values in zip(samples, speeds, together, strict=True):
+        np.testing.assert_array_equal(feature(windows(window, speed)), values)
 
 
 @pytest.mark.parametrize('shape', [(0, 2), (500, 0), (500,)])
@@ -137,25 +137,6 @@ def test_density_agrees_with_scipy(n_samples):
     )
 
 
-def test_the_highest_band_holds_the_tone():
-    feature = LogBands(bands=32)
-    highest = int(feature(windows(tone(203.0)))[0].argmax())
-    assert feature.names[highest] == '13'  # band k reaches around k · 500 Hz / 32
-
-
-def test_bursts_lie_above_what_is_typical_and_a_steady_hum_does_not():
-    steady, bursts = tone(203.0), tone(203.0) * (np.arange(1000) % 250 < 50)[:, None]
-    for samples, apart in ((steady, False), (bursts, True)):
-        mean, typical = (FEATURES[name]()(windows(samples))[0, 12] for name in ('log_bands', 'mean_log_bands'))
-        assert (mean - typical > 1.0) == apart
-
-
-def test_low_lines_report_ridges_apart_that_share_a_band():
-    feature = FEATURES['low_fft_bins'](points=256)
-    lines = [feature.names[int(feature(windows(tone(hz)))[0].argmax())] for hz in (98.0, 106.0)]
-    assert lines == ['25', '27']  # line k stands at k · 1000 / 256 Hz
-
-
 def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():
     activity, mobility, complexity = hjorth(tone(50.0, 10_000, amplitude=2.0).T)[0]
     assert activity == pytest.approx(2.0, rel=1e-3)
@@ -164,16 +145,10 @@ def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():
 
 
 @EVERY
-@pytest.mark.parametrize('speed_m_s', [0.0, np.nan])
+@pytest.mark.parametrize('speed_m_s', [0.0, np.nan, -0.1])
 def test_without_a_speed_what_needs_one_is_not_a_number_and_the_rest_is_as_ever(name, speed_m_s):
     still, moving = (FEATURES[name]()(windows(noise(500, 2), speed_m_s=speed)) for speed in (speed_m_s, 0.1))
     assert np.array_equal(still, moving) or np.isnan(still).all() or name == 'speed'
-
-
-def test_speed_and_force_pass_through_whatever_they_are():
-    for speed in (0.0, 0.15, np.nan):
-        np.testing.assert_array_equal(FEATURES['speed']()(windows(noise(5, 1), speed_m_s=speed)), [[speed]])
-        np.testing.assert_array_equal(FEATURES['force']()(windows(noise(5, 1), force_n=speed)), [[speed]])
 
 
 def plain_typical_bands(row):
@@ -237,18 +212,6 @@ def value(feature, window):
     return float(feature(window)[0, 0])
 
 
-def test_a_tone_at_the_best_frequency_has_its_own_power() -> None:
-    tone = 2.0 * np.sin(2 * np.pi * 250.0 * times())
-    assert value(PacinianPower(rate_of_change=False), row_windows(tone)) == pytest.approx(np.log(2.0), abs=0.05)
-
-
-def test_an_octave_off_the_best_frequency_twelve_decibels_are_missing() -> None:
-    feature = PacinianPower(rate_of_change=False, points=512)
-    best, low, high = (value(feature, row_windows(np.sin(2 * np.pi * hz * times()))) for hz in (250.0, 125.0, 499.0))
-    for off in (low, high):
-        assert 10 * (best - off) / np.log(10) == pytest.approx(12.0, abs=0.3)
-
-
 def test_weighed_at_one_speed_a_ridge_is_as_rough_whatever_the_speed() -> None:
     measured = [value(PacinianPower(), row_windows(wave(v), v)) for v in SPEEDS]
     constant = [value(PacinianPower(at_speed_m_s=0.15), row_windows(wave(v), v)) for v in SPEEDS]
@@ -262,10 +225,6 @@ def test_white_noise_has_the_exponent_zero_and_its_sum_two(coefficients, exponen
     row = lfilter([1.0], coefficients, noise)
     feature = SpectralExponent(points=512, low_hz=20.0, high_hz=100.0)
     assert value(feature, row_windows(row)) == pytest.approx(exponent, abs=0.1)
-
-
-def test_temporal_variation_of_a_ramp_is_its_slope() -> None:
-    assert value(TemporalVariation(lag_s=0.004), row_windows(3.0 * np.arange(100.0))) == pytest.approx(np.log(12.0))
 
 
 @pytest.mark.parametrize('speed_m_s', SPEEDS)
@@ -282,7 +241,7 @@ def test_the_spatial_level_is_that_of_the_surface_at_any_speed() -> None:
     assert np.ptp(levels[:, 1]) < 0.1
 
 
-@pytest.mark.parametrize('feature', [SpatialBandPower(bands=2), SpatialVariation(), PacinianPower(at_speed_m_s=0.1)])
+@pytest.mark.parametrize('feature', [SpectralExponent(at_speed_m_s=0.1), PacinianPower(at_speed_m_s=0.1)])
 def test_without_a_speed_there_is_no_value(feature) -> None:
     assert np.isnan(feature(row_windows(wave(0.15), np.nan))).all()
 
@@ -333,15 +292,6 @@ def rough(seed=0, waves=60):
     return lambda x: np.sin(2 * np.pi * x[..., None] * per_m + phase).sum(axis=-1)
 
 
-@pytest.mark.parametrize('speed', SPEEDS_M_S)
-@pytest.mark.parametrize('name', ['spatial_bands', 'mean_spatial_bands'])
-def test_the_line_of_a_grating_stands_at_one_over_its_pitch_at_every_speed(name, speed):
-    feature = FEATURES[name](bands=24, longest_m=32e-3, shortest_m=1e-3)
-    highest = feature(measured(speed)).argmax(axis=-1)
-    low, high = feature.edges_per_m[highest], feature.edges_per_m[highest + 1]
-    assert ((low <= 1 / PITCH_M) & (high >= 1 / PITCH_M)).all()
-
-
 def test_spatial_bands_are_those_of_the_surface_not_of_the_speed():
     feature = FEATURES['mean_spatial_bands'](bands=8, longest_m=20e-3, shortest_m=2e-3, normalised=False)
     slow, fast = (feature(measured(speed, distance_m=0.5, surface=rough())) for speed in (0.05, 0.1))
@@ -370,22 +320,6 @@ def test_a_harder_touch_leaves_the_normalised_bands_and_no_offset_counts(name):
     np.testing.assert_allclose(soft, hard, atol=1e-4)
 
 
-@pytest.mark.parametrize('speed', [np.nan, 0.0, -0.1])
-@pytest.mark.parametrize('name', ['spatial_bands', 'mean_spatial_bands'])
-def test_without_movement_there_are_no_waves(name, speed):
-    assert np.isnan(FEATURES[name]()(WindowBatch(slide(0.05), SPATIAL_RATE_HZ, np.array(speed)))).all()
-
-
-def test_windows_of_different_speeds_are_described_together_as_each_alone():
-    samples = np.stack([slide(0.05, distance_m=0.02, surface=rough(seed)) for seed in range(3)])
-    speed = np.array([0.02, np.nan, 0.1])
-    for name in ('spatial_bands', 'mean_spatial_bands'):
-        feature = FEATURES[name]()
-        together = feature(WindowBatch(samples, SPATIAL_RATE_HZ, speed))
-        for window, at, values in zip(samples, speed, together, strict=True):
-            np.testing.assert_array_equal(feature(WindowBatch(window, SPATIAL_RATE_HZ, np.array(at))), values)
-
-
 def test_shape_has_its_closed_forms():
     ramp = np.arange(8.0)[:, None]
     level, log_variance, rise, absolute, above, skewness = FEATURES['mean_statistics'](floor=1e-12)(
@@ -403,18 +337,3 @@ def test_shares_keep_the_sign_and_leave_the_noise_of_free_taxels_out():
     )
     np.testing.assert_allclose(calm - calm[2], [np.log(60 / 1.001), -np.log(40 / 1.001), 0.0], rtol=0.01)
     np.testing.assert_allclose(calm, noisy, atol=0.01)
-
-
-@pytest.mark.parametrize('name', ['centred_log_ratio', 'log_shares', 'relative_changes'])
-def test_features_of_shares_are_the_same_however_hard_it_is_pressed(name):
-    samples = np.random.default_rng(0).uniform(-10.0, 20.0, (50, 3))
-    soft, hard = (FEATURES[name]()(WindowBatch(x, SPATIAL_RATE_HZ)) for x in (samples, 3.0 * samples))
-    np.testing.assert_allclose(soft, hard)
-
-
-def test_relative_changes_do_not_know_which_level_a_taxel_has():
-    samples = np.random.default_rng(0).normal(size=(50, 2))
-    one, other = (
-        FEATURES['relative_changes']()(WindowBatch(samples + x, SPATIAL_RATE_HZ)) for x in ([90, 10], [10, 90])
-    )
-    np.testing.assert_allclose(one, other, rtol=1e-2)  # the same load in all

@@ -53,18 +53,6 @@ def test_what_would_lie_above_half_the_rate_is_left_out():
     assert np.abs(resample(fast, 250)[10:-10]).max() < 0.05
 
 
-def test_the_stretched_feature_is_reported_the_new_speed():
-    class Told:
-        per_channel, names = False, ('',)
-
-        def __call__(self, windows):
-            return np.asarray(windows.speed_m_s)[..., None, None]
-
-    samples = np.zeros((3, 500, 1))
-    reported = Stretched(Told(), 0.1)(WindowBatch(samples, RATE_HZ, np.array([0.2, 0.0501, np.nan])))
-    np.testing.assert_allclose(reported[:, 0, 0], [0.1, 0.1, np.nan], rtol=0.01)
-
-
 def cut(speed_m_s, seed=0):
     window = Window(np.random.default_rng(seed).normal(size=(500, 1)), RATE_HZ, ('c',))
     return CutWindow(seed, 'e', 0.5, 0.1, {'signal': window}, speed_m_s=speed_m_s)

@@ -332,12 +332,6 @@ def test_windows_along_x_and_y_are_joined_whichever_comes_first(first, second):
     assert all(math.isnan(event.direction_rad) and event.surface == 'linen' for event in windows)
 
 
-def test_speed_and_force_are_means_over_both_legs():
-    window, *_ = cut(leg(0.0, 1.0, 0.0, speed_m_s=0.02), leg(3.0, 1.0, Y, speed_m_s=0.03))
-    assert window.speed_m_s == pytest.approx(0.025)
-    assert window.force_n == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize('directions', [(0.0,), (Y,), (0.0, math.pi), (0.25 * math.pi, 0.75 * math.pi)])
 def test_without_both_axes_there_is_no_window(directions):
     events = cut(*(leg(3.0 * number, 2.0, direction) for number, direction in enumerate(directions)))
@@ -431,10 +425,6 @@ def test_the_feature_is_the_coefficient_of_coulomb_friction_at_any_stretch(coeff
 
 def test_each_window_has_the_mean_of_its_own_time():
     assert friction_of(lambda time_s: 0.4 if time_s < 0.4999 else 1.0) == pytest.approx([0.2, 0.5])
-
-
-def test_states_without_direction_are_left_out_of_the_mean():
-    assert friction_of(lambda time_s: math.nan if time_s < 0.1 else 0.8) == pytest.approx([0.4, 0.4])
 
 
 def test_an_arm_that_does_not_measure_it_gives_no_number():

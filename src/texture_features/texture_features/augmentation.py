@@ -119,14 +119,12 @@ class SlideWindows:
     @property
     def mean(self) -> Array:
         """Mean of each channel over the slide, (n_channels,)."""
-        mean: Array = self.samples.mean(axis=(0, 1))
-        return mean
+        return self.samples.mean(axis=(0, 1))
 
     @property
     def rms(self) -> Array:
         """Root mean square of each channel about its mean over the slide, (n_channels,)."""
-        rms: Array = self.samples.std(axis=(0, 1))
-        return rms
+        return self.samples.std(axis=(0, 1))
 
 
 # Takes the windows of one input, a strength, of which each disturbance says the unit, and the source of all that is
@@ -158,15 +156,13 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
     if ratio != 1:
         taps = _resampling_filter(max(ratio.numerator, ratio.denominator))
         longer = resample_poly(longer, ratio.numerator, ratio.denominator, axis=1, window=taps, padtype='line')
-    resampled: Array = longer[:, :count]
-    return resampled
+    return longer[:, :count]
 
 
 @lru_cache(maxsize=RATIO_LIMIT)
 def _resampling_filter(rate: int) -> Array:
     """Return the low-pass that `resample_poly` makes anew at each call, which takes as long as the rest of the call."""
-    taps: Array = firwin(20 * rate + 1, 1.0 / rate, window=('kaiser', 5.0))
-    return taps
+    return firwin(20 * rate + 1, 1.0 / rate, window=('kaiser', 5.0))
 
 
 def add_noise(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
@@ -197,8 +193,7 @@ def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) 
     lost = np.repeat(rng.random((n_windows, -(-n_samples // burst))) < strength, burst, axis=1)[:, :n_samples]
     lost[:, 0] = False
     last = np.maximum.accumulate(np.where(lost, 0, np.arange(n_samples)), axis=1)
-    held: Array = np.take_along_axis(windows.samples, last[..., None], axis=1)
-    return held
+    return np.take_along_axis(windows.samples, last[..., None], axis=1)
 
 
 def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
@@ -258,8 +253,7 @@ def smooth_response(count: int, strength_db: float, rng: np.random.Generator) ->
     frequencies = np.linspace(0.0, 1.0, count)
     terms = np.cos(np.pi * np.arange(CURVE_TERMS)[:, None] * frequencies)
     curve = rng.standard_normal(CURVE_TERMS) @ terms / math.sqrt(3.0)  # standard deviation about 1
-    response: Array = 10.0 ** (strength_db * curve / 20.0)
-    return response
+    return 10.0 ** (strength_db * curve / 20.0)
 
 
 # Of each kind the disturbance, and its smallest and largest strength on which early stopping is fitted: from harmless

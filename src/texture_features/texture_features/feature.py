@@ -10,6 +10,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from texture_core.config import param
 from texture_core.errors import InvalidData
 from texture_core.types import Array, Samples
 
@@ -110,8 +111,7 @@ class WindowBatch:
         """Return an intermediate result that several features need; it is computed once."""
         if key not in self._memo:
             self._memo[key] = compute()
-        result: T = self._memo[key]
-        return result
+        return self._memo[key]
 
 
 class Feature(Protocol):
@@ -157,6 +157,20 @@ class Feature(Protocol):
         """
 
 
+def floor_param(added: str = 'Power', unit: str = 'unit²', default: float = 1e-20) -> Any:
+    """Return the parameter `floor` of a feature that is a logarithm.
+
+    Parameters
+    ----------
+    added, unit
+        What it is added to, and the unit of that.
+    default
+        Far below any value of a sensor that works.
+    """
+    sentence = f'{added} added before the logarithm, so that silence gives a finite value, {unit}.'
+    return param(default, sentence, low=1e-300, high=1e300)
+
+
 def centred(rows: Array) -> Array:
     """Return rows less their mean, (..., n_samples).
 
@@ -170,8 +184,7 @@ def centred(rows: Array) -> Array:
         In the unit of the rows.
     """
     # A product with equal shares is the fastest mean, and has the same rounding for one row as for many.
-    difference: Array = rows - (rows @ mean_weights(rows.shape[-1]))[..., None]
-    return difference
+    return rows - (rows @ mean_weights(rows.shape[-1]))[..., None]
 
 
 @lru_cache(maxsize=64)

@@ -30,7 +30,6 @@ from texture_features.features.spectral import (
     SpectralExponent,
 )
 from texture_features.features.taxels import (
-    CentredLogRatio,
     ChannelMeanStatistics,
     DifferenceCorrelation,
     LoadLevel,
@@ -53,7 +52,7 @@ from texture_features.features.temporal import (
     Speed,
     TemporalVariation,
 )
-from texture_features.windows import CutWindow, SlideEnd, Stretched, WindowEvent, WindowParams, check_axes, split_axis
+from texture_features.windows import CutWindow, SlideEnd, Stretched, WindowEvent, WindowParams, check_axes, topic_of
 
 # --------------------
 # The features that a recipe can name.
@@ -78,7 +77,6 @@ FEATURES: Mapping[str, type[Feature]] = {
     'spatial_bands': SpatialBands,
     'mean_spatial_bands': MeanSpatialBands,
     'mean_statistics': ChannelMeanStatistics,
-    'centred_log_ratio': CentredLogRatio,
     'log_shares': LogShares,  # Aitchison 1986, with signs
     'relative_changes': RelativeChanges,
     'difference_correlation': DifferenceCorrelation,
@@ -138,8 +136,7 @@ def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) 
 def entry_of(chosen: Any) -> dict[str, Any]:
     """Return the parameters of what was chosen, as a recipe writes them."""
     write = getattr(chosen, 'as_recipe', None)
-    entry: dict[str, Any] = write() if write else dataclasses.asdict(chosen)
-    return entry
+    return write() if write else dataclasses.asdict(chosen)
 
 
 # --------------------
@@ -222,7 +219,7 @@ class InputFeatures:
     @cached_property
     def topics(self) -> tuple[str, ...]:
         """What is subscribed to."""
-        return tuple(dict.fromkeys(map(_topic_of, self.window_names)))
+        return tuple(dict.fromkeys(map(topic_of, self.window_names)))
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the section of a recipe."""
@@ -329,7 +326,7 @@ class FeatureSet:
     @cached_property
     def topics(self) -> tuple[str, ...]:
         """What is subscribed to, in order, each once."""
-        return tuple(dict.fromkeys(map(_topic_of, self.window_names)))
+        return tuple(dict.fromkeys(map(topic_of, self.window_names)))
 
     def tare_faults(self, tared: Mapping[str, bool]) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round.
@@ -421,7 +418,7 @@ class FeatureSet:
         flat = (*inputs[0].samples.shape[:-2], -1)
         by_name = dict(zip(self.window_names, inputs, strict=True))
         if self.correction is not None:
-            by_name = {name: self.correction.apply(_topic_of(name), window) for name, window in by_name.items()}
+            by_name = {name: self.correction.apply(topic_of(name), window) for name, window in by_name.items()}
         blocks = [
             feature(windows).reshape(flat)
             for item in self.inputs
@@ -503,10 +500,6 @@ def _joined(windows: Sequence[WindowBatch]) -> WindowBatch:
     return windows[0] if len(windows) == 1 else dataclasses.replace(windows[0], joined=tuple(windows[1:]))
 
 
-def _topic_of(name: str) -> str:
-    return split_axis(name)[0]
-
-
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
     for name, feature in item.features:
         columns = channels if feature.per_channel else ('',)
@@ -524,4 +517,4 @@ def _layout(inputs: Sequence[Window]) -> InputLayout:
 def _parameters(feature: Feature) -> dict[str, Any]:
     if isinstance(feature, Stretched):
         feature = feature.feature
-    return dataclasses.asdict(feature)  # type: ignore[call-overload, no-any-return]
+    return dataclasses.asdict(feature)  # type: ignore[call-overload]

@@ -114,8 +114,7 @@ def baseline_power(powers: Array) -> Array:
     smooth[share < 0.5] = np.inf
     quiet = REST_OVER_QUANTILE * np.quantile(smooth, REST_QUANTILE, axis=0, method='lower')
     quiet[np.isinf(quiet)] = smooth.min(axis=0)[np.isinf(quiet)]
-    rest: Array = np.maximum(np.maximum(quiet, MIN_REST * np.where(known, powers, 0.0).max(axis=0)), TINY)
-    return rest
+    return np.maximum(np.maximum(quiet, MIN_REST * np.where(known, powers, 0.0).max(axis=0)), TINY)
 
 
 def _smoothed(rate_hz: float, smooth_s: float) -> int:
@@ -138,8 +137,7 @@ def median_centred(fast: Samples) -> Samples:
     known = np.where(np.isfinite(fast), fast, np.nan)
     some = np.isfinite(known).any(axis=0)
     middle = np.nanmedian(np.where(some, known, 0.0), axis=0)
-    about: Samples = np.nan_to_num(known - middle)
-    return about
+    return np.nan_to_num(known - middle)
 
 
 def highpass_gain(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Array:
@@ -160,8 +158,7 @@ def highpass_gain(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Ar
         Power behind the high-pass filter over that before it.
     """
     grid_hz, passed = _highpass_response(rate_hz, smooth_s)
-    share: Array = np.interp(frequency_hz, grid_hz, passed)
-    return share
+    return np.interp(frequency_hz, grid_hz, passed)
 
 
 @lru_cache(maxsize=8)
@@ -432,8 +429,7 @@ class OnsetModel:
         ways = (sensed[:, None, :, None] * squeezed).reshape(-1, len(SHARES), len(bins_hz))
         measured = np.einsum('wapf,p->waf', ways[:, at], POINT_WEIGHTS)
         rest = noise * highpass_gain(bins_hz, self.rate_hz, self.smooth_s)
-        expected: Array = np.maximum(self.rate_hz / 2 * (rest + measured), MIN_POWER)
-        return expected
+        return np.maximum(self.rate_hz / 2 * (rest + measured), MIN_POWER)
 
     def _squeezed(self, frequency_hz: Array, texture: Array, bins_hz: AnyArray) -> Array:
         """Return the density at `SHARES` of the speed, as windows see it at their frequencies: (2, n_shares, n_bins).
@@ -467,22 +463,19 @@ def _whole(known: NDArray[np.bool_], length: int) -> NDArray[np.bool_]:
 def _spectra(windows: Samples) -> Array:
     """Return the mean power over the channels at each frequency, 1 for white noise of power 1: (n_windows, n_bins)."""
     transforms = np.fft.rfft(windows * _hann(windows.shape[1])[:, None], axis=1)
-    powers: Array = np.square(np.abs(transforms)).mean(axis=2)
-    return powers
+    return np.square(np.abs(transforms)).mean(axis=2)
 
 
 def _hann(length: int) -> Array:
     """Return a Hann window of power 1."""
     window = np.hanning(length + 2)[1:-1]
-    unit: Array = window / np.sqrt(np.square(window).sum())
-    return unit
+    return window / np.sqrt(np.square(window).sum())
 
 
 def _fit(powers: Array, expected: Array) -> Array:
     """Return the log-likelihood of each window at each age, (n_ways, n_windows, n_ages)."""
     ratio = np.maximum(powers, MIN_POWER)[:, None, :] / expected[:, None]
-    fit: Array = np.maximum(np.log(ratio) - ratio, ANYTHING).sum(axis=-1)
-    return fit
+    return np.maximum(np.log(ratio) - ratio, ANYTHING).sum(axis=-1)
 
 
 # --------------------

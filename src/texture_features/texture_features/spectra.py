@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
+from texture_core.config import param
 from texture_core.types import Array
-from texture_features.feature import WindowBatch, mean_weights
+from texture_features.feature import WindowBatch, floor_param, mean_weights
 
 # --------------------
 # Short spectra along a window: what the spectral features are made of.
@@ -63,8 +66,7 @@ def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: i
     """
     squares = _squares(rows, rate_hz, segment, step, bins)
     means = squares @ mean_weights(squares.shape[-1])
-    densities: Array = means[..., :bins] + means[..., bins:]
-    return densities
+    return means[..., :bins] + means[..., bins:]
 
 
 def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
@@ -158,8 +160,7 @@ def mean_over_segments(densities: Array) -> Array:
     (..., n_bins)
         In the unit of the densities.
     """
-    mean: Array = mean_weights(densities.shape[-2]) @ densities
-    return mean
+    return mean_weights(densities.shape[-2]) @ densities
 
 
 def long_densities(rows: Array, rate_hz: float, bins: int) -> Array:
@@ -298,8 +299,7 @@ def mean_subtracted(log_bands: Array) -> Array:
     (..., n_bands)
         Of zero mean.
     """
-    shape: Array = log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
-    return shape
+    return log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
 
 
 def _mean_between(density: Array, edges: Array) -> Array:
@@ -320,6 +320,28 @@ def _mean_between(density: Array, edges: Array) -> Array:
 
 # --------------------
 # The spectrum of windows as lines: mean density and frequency of each, of the signal or of what it is the rate of.
+
+
+@dataclass(frozen=True)
+class WelchPower:
+    """What features have in common that weigh the power of the lines of the mean spectrum."""
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    rate_of_change: bool = param(
+        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
+    )
+    force_exponent: float = param(
+        0.0,
+        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
+        low=0.0,
+        high=4.0,
+    )
+    floor: float = floor_param()
 
 
 def welch_spectrum(windows: WindowBatch, points: int, rate_of_change: bool) -> tuple[Array, Array]:
@@ -401,8 +423,7 @@ def force_normalised(log_power: Array, windows: WindowBatch, exponent: float) ->
     """
     if not exponent:
         return log_power
-    less: Array = log_power - exponent * np.log(np.asarray(windows.force_n))[..., None, None]
-    return less
+    return log_power - exponent * np.log(np.asarray(windows.force_n))[..., None, None]
 
 
 @lru_cache(maxsize=64)

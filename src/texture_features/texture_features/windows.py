@@ -55,6 +55,11 @@ def split_axis(name: str) -> tuple[str, str]:
     return topic, axis
 
 
+def topic_of(name: str) -> str:
+    """Return the topic of an input."""
+    return split_axis(name)[0]
+
+
 def axis_along(direction_rad: float) -> str:
     """Return the axis to or against which a direction points within 30 degrees; '' if there is none.
 
@@ -620,8 +625,7 @@ def resample(samples: Samples, length: int) -> Samples:
     waves = np.fft.rfft(rows - first - rise * (np.arange(n_samples) / n_samples))
     bins = min(n_samples, length) // 2 + 1
     steps = np.fft.irfft(waves[..., :bins], length) * (length / n_samples)
-    stretched: Samples = (steps + first + rise * (np.arange(length) / length)).swapaxes(-1, -2)
-    return stretched
+    return (steps + first + rise * (np.arange(length) / length)).swapaxes(-1, -2)
 
 
 # --------------------
@@ -753,7 +757,7 @@ class WindowCutter:
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
         self._params = params
-        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in dict.fromkeys(map(_topic_of, inputs))}
+        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in dict.fromkeys(map(topic_of, inputs))}
         self._joiner = AxisJoiner(inputs)
         self._unpaired = 0
         self._slides: deque[SlideCoverage] = deque()
@@ -983,10 +987,6 @@ def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSp
 
 def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:
     return ((item.stamp_ns, add, item) for item in items)
-
-
-def _topic_of(name: str) -> str:
-    return split_axis(name)[0]
 
 
 def _to_ns(seconds: float) -> int:

@@ -253,8 +253,7 @@ class MotorVibration:
             )
             ripple = np.sqrt(2) * self.rms_n * np.sin(2 * np.pi * self.steps_1_m * travelled_m) * (path.force_n > 0)
             # All elements of a finger with several shake alike: they have an axis more than the path.
-            shaken: Array = variation_n + (ripple if variation_n.ndim == ripple.ndim else ripple[..., None, :])
-            return shaken
+            return variation_n + (ripple if variation_n.ndim == ripple.ndim else ripple[..., None, :])
 
         return add
 
@@ -360,8 +359,7 @@ def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array
     """Return where the skin is: `weight` of the way back to where the last skid began, (..., n)."""
     began = np.take_along_axis(place_m, np.maximum(last, 0), axis=-1)
     began = np.where(last >= 0, began, held_m[..., None])
-    lagging: Array = place_m + weight * (began - place_m)
-    return lagging
+    return place_m + weight * (began - place_m)
 
 
 # --------------------
@@ -456,8 +454,7 @@ class Unevenness:
 
     def _at(self, x_m: Array, y_m: Array) -> Array:
         waves = sum(np.cos(kx * x_m + ky * y_m + phase) for (kx, ky), phase in zip(WAVES_1_M, PHASES, strict=True))
-        gain: Array = np.maximum(1 + self.relative * np.sqrt(2 / len(PHASES)) * waves, 0.0)
-        return gain
+        return np.maximum(1 + self.relative * np.sqrt(2 / len(PHASES)) * waves, 0.0)
 
 
 # --------------------

@@ -448,8 +448,7 @@ def steady_force_n(friction: Stribeck, speed_m_s: Array, force_n: float) -> Arra
         Force in N, of the sign of the speed.
     """
     speed = np.asarray(speed_m_s)
-    force: Array = force_n * (np.sign(speed) * coefficient(friction, speed) + friction.viscous_s_m * speed)
-    return force
+    return force_n * (np.sign(speed) * coefficient(friction, speed) + friction.viscous_s_m * speed)
 
 
 # --------------------

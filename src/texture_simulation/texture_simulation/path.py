@@ -53,8 +53,7 @@ class Filter:
             return np.zeros((len(self._sections), *values.shape[:-1], 2))
         steady = _steady(self._sections.tobytes())
         shape = (len(self._sections), *[1] * (values.ndim - 1), 2)
-        beginning: Array = steady.reshape(shape) * values[..., :1]
-        return beginning
+        return steady.reshape(shape) * values[..., :1]
 
 
 # --------------------

@@ -107,8 +107,7 @@ class Converter:
         (..., n_samples, n_channels)
             Counts of the type `kind`.
         """
-        whole: NDArray[Integer] = self.exact(counts).astype(kind)
-        return whole
+        return self.exact(counts).astype(kind)
 
 
 # --------------------
@@ -341,8 +340,7 @@ class BioTacModel(SensorModel):
         texture_n = self.touch.static_variation_n(at, ELECTRODE_BLUR_M, (self._x_m, self._y_m))
         # Squeezing stiffens: the fluid over an electrode thins out, and never vanishes.
         load = np.maximum(ELECTRODE_COUNTS_PER_N * nearness * (force_n + texture_n), 0.0)
-        counts: Array = self._baseline / (1 + load / self._baseline)
-        return counts
+        return self._baseline / (1 + load / self._baseline)
 
 
 def points_per_frame(layout: BioTacLayout) -> int:
@@ -844,8 +842,7 @@ class Tsf85Model(SensorModel):
         """Return the share of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact, as Hertz'."""
         radius_m = TSF85_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[..., None, :]
         dome = np.maximum(0.0, 1 - (self._taxel_x_m**2 + self._taxel_y_m**2) / radius_m**2)
-        shares: Array = dome / np.maximum(dome.sum(axis=-2, keepdims=True), 1e-9)
-        return shares
+        return dome / np.maximum(dome.sum(axis=-2, keepdims=True), 1e-9)
 
 
 def tsf85_kind(layout: Tsf85Layout) -> SensorKind:

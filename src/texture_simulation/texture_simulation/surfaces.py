@@ -75,8 +75,7 @@ class PlaceVariation:
 
         def fields(x_m: Array, y_m: Array) -> Array:
             kx, ky, phase = (values.reshape(shape) for values in (waves_1_m[0], waves_1_m[1], phases))
-            waves: Array = np.cos(kx * x_m + ky * y_m + phase).sum(axis=1) * math.sqrt(2 / FIELD_WAVES)
-            return waves
+            return np.cos(kx * x_m + ky * y_m + phase).sum(axis=1) * math.sqrt(2 / FIELD_WAVES)
 
         level, blur, friction, shift_x, shift_y = self.strength * interpolated_field(fields, x_m, y_m, FIELD_KNOT_M)
         # The gradient of a field of unit variance has a standard deviation of k/√2 along each axis.
@@ -441,8 +440,7 @@ def waves_1_m(spacing_m: float) -> Array:
     (SIDE, SIDE // 2 + 1)
         1/m.
     """
-    waves: Array = np.hypot(np.fft.fftfreq(SIDE, spacing_m)[:, None], np.fft.rfftfreq(SIDE, spacing_m)[None, :])
-    return waves
+    return np.hypot(np.fft.fftfreq(SIDE, spacing_m)[:, None], np.fft.rfftfreq(SIDE, spacing_m)[None, :])
 
 
 # --------------------

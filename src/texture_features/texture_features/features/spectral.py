@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Features of the spectrum: band powers, peaks, spectral exponent, short-time spectra, wavelets."""
+"""Features of the spectrum: band powers, peaks, spectral exponent, short-time spectra."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_features.feature import WindowBatch, mean_weights, power
+from texture_features.feature import WindowBatch, floor_param, mean_weights, power
 from texture_features.features.temporal import squares
 from texture_features.spectra import (
+    WelchPower,
     at_reference_speed,
     densities_of,
     force_normalised,
@@ -48,12 +49,7 @@ class LogBands:
         low=0.0,
         high=0.9,
     )
-    floor: float = param(
-        1e-20,
-        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param('Power density', 'unit²/Hz')
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -99,12 +95,7 @@ class LowFftBins:
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
     )
-    floor: float = param(
-        1e-20,
-        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param('Power density', 'unit²/Hz')
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -155,7 +146,7 @@ OCTAVES_PER_DB = 0.1 / np.log10(2.0)  # of power
 
 
 @dataclass(frozen=True)
-class PacinianPower:
+class PacinianPower(WelchPower):
     """Logarithm of Σ (amplitude / threshold amplitude)² over the lines of the spectrum.
 
     The threshold is that of the Pacinian channel in two straight lines: it falls by 12 dB an octave up to `best_hz`
@@ -173,12 +164,6 @@ class PacinianPower:
     (0.5, 24)
     """
 
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
-
-    points: int = param(
-        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
-    )
     best_hz: float = param(
         250.0, 'Frequency at which the detection threshold is lowest.', unit='Hz', low=1.0, high=10_000.0
     )
@@ -188,24 +173,12 @@ class PacinianPower:
     slope_above_db: float = param(
         12.0, 'Slope of the threshold above that frequency, in dB per octave.', low=0.0, high=100.0
     )
-    rate_of_change: bool = param(
-        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
-    )
     at_speed_m_s: float = param(
         0.0,
         'Reference speed to which frequencies are scaled before weighting; 0: no scaling.',
         unit='m/s',
         low=0.0,
         high=10.0,
-    )
-    force_exponent: float = param(
-        0.0,
-        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
-        low=0.0,
-        high=4.0,
-    )
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
     )
 
     def __call__(self, windows: WindowBatch) -> Array:
@@ -250,9 +223,7 @@ class PeakToMedianPower:
         'Segment with whose power the largest is compared: the median or the minimum one.',
         choices=(MEDIAN, MINIMUM),
     )
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
-    )
+    floor: float = floor_param()
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(strongest / other)."""
@@ -360,12 +331,7 @@ class ShortTimeFourier:
         low=0.0,
         high=0.9,
     )
-    floor: float = param(
-        1e-20,
-        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param('Power density', 'unit²/Hz')
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -436,12 +402,7 @@ class SpectralExponent:
         low=0.0,
         high=10.0,
     )
-    floor: float = param(
-        1e-20,
-        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param('Power density', 'unit²/Hz')
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return s."""

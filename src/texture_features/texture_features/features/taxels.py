@@ -12,45 +12,8 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
-from texture_features.feature import WindowBatch, centred, first_difference, power
-from texture_features.spectra import force_normalised, mean_subtracted, spatial_log_bands, welch_spectrum
-
-# --------------------
-# Centred log-ratio of the channel means: how the load is distributed over the taxels.
-
-
-@dataclass(frozen=True)
-class CentredLogRatio:
-    """Logarithm of each channel's mean level less the mean of these logarithms; for levels above 0.
-
-    A force that presses all taxels harder by the same factor changes nothing; friction and mounting do.
-
-    Examples
-    --------
-    >>> levels = np.array([[1.0, 4.0]])  # the second taxel carries four times the load of the first
-    >>> CentredLogRatio()(WindowBatch(levels, rate_hz=100.0))[:, 0].round(3).tolist()
-    [-0.693, 0.693]
-    >>> CentredLogRatio()(WindowBatch(10 * levels, rate_hz=100.0))[:, 0].round(3).tolist()  # pressed ten times as hard
-    [-0.693, 0.693]
-    """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
-
-    floor: float = param(
-        1e-3,
-        'Smallest channel mean; smaller means are replaced by it, in the unit of the signal.',
-        low=1e-300,
-        high=1e300,
-    )
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return the log shares."""
-        rows = windows.rows
-        levels = np.log(np.maximum(np.add.reduce(rows, axis=-1) / rows.shape[-1], self.floor))
-        shares: Array = levels - np.add.reduce(levels, axis=-1, keepdims=True) / levels.shape[-1]
-        return shares[..., None]
-
+from texture_features.feature import WindowBatch, centred, first_difference, floor_param, power
+from texture_features.spectra import WelchPower, force_normalised, mean_subtracted, spatial_log_bands, welch_spectrum
 
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
@@ -135,8 +98,7 @@ class ChannelMeanStatistics:
         cubes = np.add.reduce(centred**3, axis=-1) / n_samples
         skewness = cubes / (variance + self.floor) ** 1.5
         values = np.stack([level, np.log(variance + self.floor), rise, np.abs(rise), above, skewness], axis=-1)
-        mean: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
-        return mean
+        return np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
 
 
 # --------------------
@@ -170,8 +132,7 @@ class RelativeChanges:
         steps = first_difference(rows)
         steps = steps - np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
         deviations = np.sqrt(np.stack([power(windows.centred_rows), power(steps)], axis=-1))
-        changes: Array = np.sqrt(deviations / np.maximum(load, self.floor)[..., None])
-        return changes
+        return np.sqrt(deviations / np.maximum(load, self.floor)[..., None])
 
 
 # --------------------
@@ -263,15 +224,12 @@ class LoadLevel:
     per_channel: ClassVar[bool] = False
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that no load gives a finite value, unit².', low=1e-300, high=1e300
-    )
+    floor: float = floor_param()
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean square + floor), (..., 1, 1)."""
         mean = np.add.reduce(power(windows.rows), axis=-1, keepdims=True) / windows.samples.shape[-1]
-        level: Array = np.log(mean + self.floor)[..., None]
-        return level
+        return np.log(mean + self.floor)[..., None]
 
 
 # --------------------
@@ -282,7 +240,7 @@ MIN_LINES = 1e-3
 
 
 @dataclass(frozen=True)
-class SpatialBandPower:
+class SpatialBandPower(WelchPower):
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
@@ -298,8 +256,6 @@ class SpatialBandPower:
     [2, 2, 2]
     """
 
-    per_channel: ClassVar[bool] = True
-
     bands: int = param(4, 'Number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
     longest_m: float = param(
         2e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
@@ -307,19 +263,7 @@ class SpatialBandPower:
     shortest_m: float = param(
         4.5e-4, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
     )
-    points: int = param(
-        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=8, high=16384
-    )
-    rate_of_change: bool = param(
-        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
-    )
-    force_exponent: float = param(
-        0.0,
-        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
-        low=0.0,
-        high=4.0,
-    )
-    floor: float = param(1e-20, 'Spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300)
+    floor: float = floor_param('Spatial power density', 'unit² m')
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:
@@ -328,7 +272,7 @@ class SpatialBandPower:
             )
 
     @property
-    def names(self) -> tuple[str, ...]:
+    def names(self) -> tuple[str, ...]:  # type: ignore[override]
         """Number of the band, from 1."""
         return tuple(str(band + 1) for band in range(self.bands))
 
@@ -399,7 +343,7 @@ class SpatialBands:
         0.67e-3, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-7, high=1e3
     )
     normalised: bool = param(True, 'Subtracts the mean over the bands, which depends mainly on force and speed.')
-    floor: float = param(1e-7, 'Spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300)
+    floor: float = floor_param('Spatial power density', 'unit² m', 1e-7)
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:
@@ -445,8 +389,7 @@ class MeanSpatialBands(SpatialBands):
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean over the channels of the log bands."""
         bands = SpatialBands.__call__(self, windows)
-        mean: Array = np.add.reduce(bands, axis=-2, keepdims=True) / bands.shape[-2]
-        return mean
+        return np.add.reduce(bands, axis=-2, keepdims=True) / bands.shape[-2]
 
 
 # --------------------
@@ -454,7 +397,7 @@ class MeanSpatialBands(SpatialBands):
 
 
 @dataclass(frozen=True)
-class SpatialVariation:
+class SpatialVariation(WelchPower):
     """Logarithm of the mean square difference between places `lag_m` apart along the way of the finger.
 
     In nerves the rougher surface makes neighbouring fibres differ more; here one channel meets the places one after
@@ -472,30 +415,12 @@ class SpatialVariation:
     (2.0, True)
     """
 
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
-
     lag_m: float = param(
         5e-4,
         'Distance on the surface between the two compared points; longer lags compare coarser texture.',
         unit='m',
         low=1e-6,
         high=1.0,
-    )
-    points: int = param(
-        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
-    )
-    rate_of_change: bool = param(
-        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
-    )
-    force_exponent: float = param(
-        0.0,
-        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
-        low=0.0,
-        high=4.0,
-    )
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
     )
 
     def __call__(self, windows: WindowBatch) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Features of the signal over time: moments, Hjorth parameters, differences, ordinal patterns; speed and force."""
+"""Features of the signal over time: moments, Hjorth parameters, differences; speed, force and friction."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_features.feature import WindowBatch, centred, first_difference, mean_weights, power
+from texture_features.feature import WindowBatch, centred, first_difference, floor_param, mean_weights, power
 
 # --------------------
 # The signal with its first and second difference, in one array.
@@ -120,9 +120,7 @@ class Hjorth:
     per_channel: ClassVar[bool] = True
 
     log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
-    )
+    floor: float = floor_param()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -172,6 +170,8 @@ def hjorth(rows: Array) -> Array:
 # --------------------
 # Logarithm of the variance of the steps.
 
+QUANTISED = 'unit²; 1/12 is right for signals quantised to integers'
+
 
 @dataclass(frozen=True)
 class LogDifferenceVariance:
@@ -187,12 +187,7 @@ class LogDifferenceVariance:
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    floor: float = param(
-        1e-20,
-        'Power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param(unit=QUANTISED)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(variance of the steps + floor)."""
@@ -216,12 +211,7 @@ class LogVariance:
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    floor: float = param(
-        1e-20,
-        'Power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param(unit=QUANTISED)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(variance + floor)."""
@@ -394,12 +384,7 @@ class TemporalVariation:
         low=0.0,
         high=10.0,
     )
-    floor: float = param(
-        1e-20,
-        'Difference added before the logarithm, so that silence gives a finite value, unit.',
-        low=1e-300,
-        high=1e300,
-    )
+    floor: float = floor_param('Difference', 'unit')
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean |s(t + lag) - s(t)|)."""

@@ -38,8 +38,7 @@ PAC, PDC, TAC, TDC, ELECTRODE_1 = 0, 1, 2, 3, 17  # indices of the sampling comm
 def with_parity(upper: Bytes) -> Bytes:
     """Return bytes with bit 0 set so that the number of ones is odd."""
     ones = np.unpackbits(upper[..., None], axis=-1).sum(axis=-1)
-    complete: Bytes = upper | (1 - ones % 2).astype(np.uint8)
-    return complete
+    return upper | (1 - ones % 2).astype(np.uint8)
 
 
 def commands(electrodes: int) -> Bytes:

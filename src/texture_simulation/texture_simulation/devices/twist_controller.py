@@ -242,5 +242,4 @@ class EmulatedTwistArm:
         if size == 0.0:
             return np.zeros(3)
         direction = self._pressing / size
-        yielding: Array = self.params.compliance_m_s_n * (size + float(self.force_n @ direction)) * direction
-        return yielding
+        return self.params.compliance_m_s_n * (size + float(self.force_n @ direction)) * direction

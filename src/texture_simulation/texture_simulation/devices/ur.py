@@ -121,8 +121,7 @@ class ServoMove(RobotMove):
 
     def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
         """Take the share of the way that the step has in the look-ahead time."""
-        follow: Array = (self._goal - pose) * -math.expm1(-step_s / self._lookahead_s) / step_s
-        return follow
+        return (self._goal - pose) * -math.expm1(-step_s / self._lookahead_s) / step_s
 
 
 def approach(now: Array, wanted: Array, step: float) -> Array:
@@ -391,8 +390,7 @@ class ContactPlane:
             return wall
         along = velocity_m_s - (velocity_m_s @ normal) * normal
         speed = math.sqrt(along @ along)
-        force: Array = wall + pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
-        return force
+        return wall + pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
 
     def _depth_and_normal(self, position_m: Array) -> tuple[float, Array]:
         params = self._params
