@@ -139,10 +139,19 @@ def _fabricslide(options: BenchmarkOptions) -> Iterator[BorderTrial]:
         yield BorderTrial('fabricslide halves', TAXELS, trained, across_places(second, trained))
 
 
-def _fingersense(options: BenchmarkOptions) -> Iterator[BorderTrial]:
+def fingersense(options: BenchmarkOptions, since: str = DATES[0]) -> Iterator[BorderTrial]:
+    """Yield each date left out in turn, and every other slide; before the first of them levels are twenty times lower.
+
+    Parameters
+    ----------
+    options
+        Where the recordings lie.
+    since
+        First date of the training.
+    """
     with imported(options, 'fingersense') as bags:
-        slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session >= DATES[0])
-    slides = middles(slides)  # before, the levels are lower by a factor of twenty
+        slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session >= since)
+    slides = middles(slides)
     for date in DATES:
         trained = slides.select(where=_having('session', date, but=True))
         known = set(trained.labels.tolist())
@@ -167,7 +176,7 @@ def _simulated(options: BenchmarkOptions) -> Iterator[BorderTrial]:
 
 SETS: Mapping[str, Callable[[BenchmarkOptions], Iterator[BorderTrial]]] = {
     'biotac20': _biotac20,
-    'fingersense': _fingersense,
+    'fingersense': fingersense,
     'ntp21': _ntp21,
     'fabricslide': _fabricslide,
     'lmt29': _lmt29,

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.borders import DATES, DAY, BorderTrial, for_recipe, recipe_of
-from texture_benchmarks.borders import SETS as BORDER_SETS
+from texture_benchmarks.borders import DATES, DAY, BorderTrial, fingersense, for_recipe, recipe_of
 from texture_benchmarks.recipes import DATA
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, map_forked
 from texture_benchmarks.trust import ROWS, TRAINED, Outcome, disturbed, evaluate_slides, simulate
@@ -45,7 +44,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     with imported(options, 'biotac20') as bags:
         slides = SlideDataset.from_bags(bags)
     finger = _other_finger(slides, 'default', (TRAINED_ON, REFERENCE, TODAY, TESTED))
-    trials = [trial for trial in BORDER_SETS['fingersense'](options) if DAY in trial.tested]
+    trials = [trial for trial in fingersense(options, since='2021-05-23') if DAY in trial.tested]
     return BenchmarkResult(
         name='finger_check',
         measured=run.__doc__,
