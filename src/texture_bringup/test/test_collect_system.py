@@ -2,6 +2,7 @@
 """`texture collect` and `texture check` on the emulated rig, over a sample that varies."""
 
 import os
+from dataclasses import replace
 
 import pytest
 
@@ -13,7 +14,7 @@ from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.nodes.collector import collect_surface
 from texture_bringup.operator import Operator
-from texture_core.errors import InvalidData
+from texture_core.errors import CollectionError, InvalidData
 from texture_evaluation.collection import CollectionParams
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
@@ -59,7 +60,7 @@ def operator(folder):
 def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, folder):
     told = []
     end, bag = collect_surface(operator, 'cork', folder / 'bags', QUICK, lambda text, slides: told.append(text))
-    assert end.success, end.message
+    assert end.error is CollectionError.NONE, end.message
     assert 'no other surface' in end.message
     dataset = SlideDataset.from_bags([bag])
     assert len(dataset) == end.slides >= 2
@@ -71,6 +72,16 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
     end, other = collect_surface(operator, 'sandpaper', folder / 'bags', QUICK, lambda text, slides: told.append(text))
     assert 'left-out places right' in end.message, end.message
     train_from_bags('fast', [bag, other], out=folder / 'two')
+
+
+def test_a_collection_that_is_stopped_keeps_its_slides_and_lifts_the_finger(operator, folder):
+    many = replace(QUICK, places=3, most_places=9)
+
+    def stop(_sentence, _slides):
+        raise KeyboardInterrupt
+
+    end, bag = collect_surface(operator, 'suede', folder / 'bags', many, stop)
+    assert (end.error, end.slides, len(SlideDataset.from_bags([bag]))) == (CollectionError.CANCELLED, 3, 3)
 
 
 def test_a_patch_that_was_never_taught_is_named(operator, folder):

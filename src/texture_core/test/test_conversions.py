@@ -11,7 +11,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from texture_msgs import msg
 
-from texture_core.errors import ExplorationError, InvalidData
+from texture_core.errors import CollectionError, ExplorationError, InvalidData
 from texture_core.ros import from_msg, to_msg
 from texture_core.types import (
     ExplorationRequest,
@@ -120,7 +120,11 @@ def test_each_phase_has_the_constant_of_the_message(phase: Phase) -> None:
 
 @pytest.mark.parametrize(
     ('codes', 'message', 'prefix'),
-    [(ExplorationError, msg.ExplorationResult, 'ERROR_'), (Rejection, msg.TextureEstimate, 'REJECTION_')],
+    [
+        (ExplorationError, msg.ExplorationResult, 'ERROR_'),
+        (CollectionError, msg.CollectionResult, 'ERROR_'),
+        (Rejection, msg.TextureEstimate, 'REJECTION_'),
+    ],
 )
 def test_the_codes_are_the_constants_of_the_messages(codes, message, prefix) -> None:
     constants = {name: getattr(message, name) for name in dir(message) if name.startswith(prefix) and '__' not in name}

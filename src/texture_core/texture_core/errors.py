@@ -66,6 +66,21 @@ class ExplorationError(enum.IntEnum):
     NO_SAMPLES = 30
 
 
+class CollectionError(enum.IntEnum):
+    """Why a collection is no success: `error_code` of the message CollectionResult, which describes each value."""
+
+    NONE = 0
+    INTERNAL = 1
+    INVALID_REQUEST = 11
+    BUSY = 12
+    NOT_ACTIVE = 13
+    STOPPED = 20
+    CANCELLED = 21
+    MOTION_FAILED = 24
+    NOT_RECORDED = 31
+    BOUND_MISSED = 32
+
+
 class MotionRefused(TextureError):
     """A motion that is unknown, unsafe or impossible now."""
 

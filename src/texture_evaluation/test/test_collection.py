@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter
 from texture_evaluation.collection import (
     CollectionParams,
     Patch,
@@ -79,13 +79,24 @@ def test_left_out_places_are_told_right_or_taken_for_another_surface():
     assert PlaceAccuracy(6, 6, '', 0).bound == 0.0
 
 
-def run(judgements, faults=(), params=PARAMS):
-    given, failing, told = iter(judgements), iter(faults), []
+DONE = (ExplorationError.NONE, '')
+
+
+def run(judgements, touches=(), params=PARAMS):
+    """Collect; a touch that is not given is done, and one that is an exception is raised."""
+    given, ends, told = iter(judgements), iter(touches), []
+
+    def explore(_request):
+        end = next(ends, DONE)
+        if isinstance(end, BaseException):
+            raise end
+        return end
+
     end = collect(
         PlacePlan('oak', params, PATCH),
         params,
-        lambda _request: next(failing, ''),
-        lambda: next(given),
+        explore,
+        lambda _slides: next(given),
         lambda sentence, slides: told.append((slides, sentence)),
     )
     return end, told
@@ -93,28 +104,44 @@ def run(judgements, faults=(), params=PARAMS):
 
 def test_it_ends_at_the_bound_not_before_the_fewest_places():
     end, told = run([PlaceAccuracy(3, 3, '', 2), PlaceAccuracy(4, 3, 'felt', 2), PlaceAccuracy(6, 6, '', 2)])
-    assert (end.success, end.slides) == (True, 6)
+    assert (end.error, end.slides) == (CollectionError.NONE, 6)
     assert [slides for slides, _ in told] == [3, 4, 6]
     assert end.message.startswith('6 of 6 left-out places right; at new places at least 68 %')
 
 
 def test_a_bound_that_is_not_met_says_what_is_missing():
     end, _ = run([PlaceAccuracy(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
-    assert (end.success, end.slides) == (False, 9)
+    assert (end.error, end.slides) == (CollectionError.BOUND_MISSED, 9)
     assert 'mostly taken for felt' in end.message and 'collect felt at more places, too' in end.message
 
 
 def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
     end, _ = run([PlaceAccuracy(3, 0), PlaceAccuracy(4, 0)])
-    assert (end.success, end.slides) == (True, 4)
+    assert (end.error, end.slides) == (CollectionError.NONE, 4)
     assert 'no other surface is in the folder yet' in end.message
 
 
 def test_three_failures_in_a_row_end_it_and_two_do_not():
-    end, told = run([PlaceAccuracy(3, 3, '', 1)] * 3, ['', 'off the patch', 'stopped', '', '', 'a', 'b', 'c'])
-    assert (end.success, end.slides) == (False, 3)
+    failed = [(ExplorationError.FORCE_LIMIT, text) for text in ('the patch ends', 'too hard', 'a', 'b', 'c')]
+    end, told = run([PlaceAccuracy(3, 3, '', 1)] * 3, [DONE, *failed[:2], DONE, DONE, *failed[2:]])
+    assert (end.error, end.slides, end.accuracy.places) == (CollectionError.MOTION_FAILED, 3, 3)
     assert end.message == '3 touches in a row failed, the last: c'
-    assert (1, 'a touch failed: off the patch') in told
+    assert (1, 'a touch failed: the patch ends') in told
+
+
+@pytest.mark.parametrize(
+    ('how', 'error', 'message'),
+    [
+        ((ExplorationError.STOPPED, 'stopped on request'), CollectionError.STOPPED, 'stopped on request'),
+        (KeyboardInterrupt('the finger is lifted'), CollectionError.CANCELLED, 'stopped: the finger is lifted'),
+        (KeyboardInterrupt(), CollectionError.CANCELLED, 'stopped'),
+        (InvalidData('the recorder ended: no space'), CollectionError.NOT_RECORDED, 'the recorder ended: no space'),
+        (OSError('no space'), CollectionError.NOT_RECORDED, 'no space'),
+    ],
+)
+def test_who_stops_it_ends_it_at_once_and_the_slides_so_far_count(how, error, message):
+    end, _ = run([PlaceAccuracy(3, 3, '', 1)], [DONE, DONE, DONE, how])
+    assert (end.error, end.message, end.slides, end.accuracy.right) == (error, message, 3, 3)
 
 
 def test_bags_of_a_surface_are_counted():

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import beta
 
 from texture_core.config import param
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError
 from texture_core.types import Array, ExplorationRequest, checked_label
 from texture_estimation.learners.discriminant import linear_discriminant
 from texture_features.examples import LabelledFeatures, SlideConditions
@@ -223,13 +223,14 @@ def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
 
 EVERY = 3  # places after which it is judged
 FAILURES = 3  # in a row end it
+ASKED_TO_END = {ExplorationError.STOPPED, ExplorationError.CANCELLED, ExplorationError.NOT_ACTIVE}
 
 
 @dataclass(frozen=True)
 class CollectionEnd:
-    """How it ended: whether the bound was met, in a sentence, the number of slides, and the last accuracy."""
+    """How it ended: why it is no success, in a sentence, the number of slides, and the last accuracy."""
 
-    success: bool
+    error: CollectionError
     message: str
     slides: int
     accuracy: PlaceAccuracy = PlaceAccuracy(0, 0)
@@ -238,47 +239,61 @@ class CollectionEnd:
 def collect(
     plan: PlacePlan,
     params: CollectionParams,
-    explore: Callable[[ExplorationRequest], str],
-    evaluate_all: Callable[[], PlaceAccuracy],
+    explore: Callable[[ExplorationRequest], tuple[ExplorationError, str]],
+    evaluate_all: Callable[[int], PlaceAccuracy],
     tell: Callable[[str, int], None],
 ) -> CollectionEnd:
-    """Touch place after place until the bound is met, the places are used up, or the finger cannot go on.
+    """Touch place after place until the bound is met, the places are used up, or it cannot or shall not go on.
+
+    Ctrl-C, a recorder that ends and recordings that cannot be read are such ends, too: the slides so far count.
 
     Parameters
     ----------
     plan, params
         Where to touch, and when to end.
     explore
-        Makes one slide; returns why it failed, '' if it did not.
+        Makes one slide; returns why it is no success, and a sentence.
     evaluate_all
-        Judges what has been recorded so far.
+        Judges what has been recorded so far, given the number of slides.
     tell
         Called with a sentence and the number of slides after each accuracy and each failure.
     """
     slides, failures, accuracy = 0, 0, PlaceAccuracy(0, 0)
-    while slides < params.most_places:
-        fault = explore(plan.next())
-        if fault:
-            failures += 1
-            tell(f'a touch failed: {fault}', slides)
-            if failures == FAILURES:
-                return CollectionEnd(False, f'{FAILURES} touches in a row failed, the last: {fault}', slides, accuracy)
-            continue
-        slides, failures = slides + 1, 0
-        if slides % EVERY and slides not in (params.places, params.most_places):
-            continue
-        accuracy = evaluate_all()
-        tell(accuracy.sentence, slides)
-        met = accuracy.bound >= params.bound if accuracy.others else True
-        if slides >= params.places and met:
-            return CollectionEnd(True, accuracy.sentence, slides, accuracy)
+
+    def ended(error: CollectionError, message: str) -> CollectionEnd:
+        return CollectionEnd(error, message, slides, accuracy)
+
+    try:
+        while slides < params.most_places:
+            error, fault = explore(plan.next())
+            if error in ASKED_TO_END:
+                return ended(CollectionError.STOPPED, fault)
+            if error:
+                failures += 1
+                tell(f'a touch failed: {fault}', slides)
+                if failures == FAILURES:
+                    last = f'{FAILURES} touches in a row failed, the last: {fault}'
+                    return ended(CollectionError.MOTION_FAILED, last)
+                continue
+            slides, failures = slides + 1, 0
+            if slides % EVERY and slides not in (params.places, params.most_places):
+                continue
+            accuracy = evaluate_all(slides)
+            tell(accuracy.sentence, slides)
+            met = accuracy.bound >= params.bound if accuracy.others else True
+            if slides >= params.places and met:
+                return ended(CollectionError.NONE, accuracy.sentence)
+    except KeyboardInterrupt as stop:
+        return ended(CollectionError.CANCELLED, f'stopped: {stop}' if str(stop) else 'stopped')
+    except (TextureError, OSError) as error:
+        return ended(CollectionError.NOT_RECORDED, str(error))
     missing = f'; the bound of {100 * params.bound:.0f} % is not met: '
     missing += (
         f'collect {accuracy.confused} at more places, too, or other speeds and forces, or add slow channels'
         if accuracy.confused
         else 'allow more places'
     )
-    return CollectionEnd(False, accuracy.sentence + missing, slides, accuracy)
+    return ended(CollectionError.BOUND_MISSED, accuracy.sentence + missing)
 
 
 def next_bag(existing: Sequence[str], surface: str) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from texture_bringup.nodes.collector import collect_surface, params_from
 from texture_bringup.operator import Operator
+from texture_core.errors import CollectionError
 from texture_evaluation.collection import CollectionParams
 
 
@@ -33,17 +34,15 @@ def run(options: argparse.Namespace) -> int:
     """Collect, say after a few places how well left-out ones are told; return 0 if the bound is met, else 1."""
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(10.0)
-        try:
-            end, bag = collect_surface(
-                operator,
-                options.surface,
-                options.folder,
-                params_from(options),
-                lambda sentence, slides: print(f'{slides} slides: {sentence}', flush=True),
-                namespace=options.namespace,
-            )
-        except KeyboardInterrupt as stop:
-            print(stop, file=sys.stderr)
-            raise
-    print(f"{end.message}; {end.slides} slides in '{bag}'")
-    return 0 if end.success else 1
+        end, bag = collect_surface(
+            operator,
+            options.surface,
+            options.folder,
+            params_from(options),
+            lambda sentence, slides: print(f'{slides} slides: {sentence}', flush=True),
+            namespace=options.namespace,
+        )
+    print(f"{end.message}; {end.slides} slides in '{bag}'", file=sys.stderr if end.error else sys.stdout)
+    if end.error is CollectionError.CANCELLED:
+        raise KeyboardInterrupt
+    return 0 if end.error is CollectionError.NONE else 1

@@ -12,16 +12,25 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
-from texture_msgs import action, srv
+from texture_msgs import action, msg, srv
 
 from texture_bringup.operator import Operator
-from texture_core.errors import InvalidData, MotionAborted, MotionRefused, TextureError
+from texture_core.errors import (
+    CollectionError,
+    ExplorationError,
+    InvalidData,
+    LaunchFailed,
+    MotionAborted,
+    MotionRefused,
+    TextureError,
+)
 from texture_core.ros import WaitingExecutor, run
 from texture_core.types import ExplorationRequest
 from texture_evaluation.collection import (
@@ -47,7 +56,7 @@ Tell = Callable[[str, int], None]
 def collect_surface(
     operator: Operator, surface: str, folder: Path, params: CollectionParams, tell: Tell, *, namespace: str = ''
 ) -> tuple[CollectionEnd, Path]:
-    """Collect a surface; return how it ended, and the bag, which is complete however it ended.
+    """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
 
     Parameters
     ----------
@@ -67,9 +76,7 @@ def collect_surface(
     Raises
     ------
     InvalidData
-        If no surface is taught, or no slide lies on the patch.
-    KeyboardInterrupt
-        If it was stopped; its sentence says what is kept.
+        If no surface is taught, no slide lies on the patch, or the recorder does not begin.
     """
     low_x, high_x, low_y, high_y = operator.parameters('explorer', PATCH)
     if not (low_x < high_x and low_y < high_y):
@@ -80,33 +87,18 @@ def collect_surface(
     plan = PlacePlan(surface, params, Patch(low_x, high_x, low_y, high_y))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
-    count = 0
-
-    def told(sentence: str, slides: int) -> None:
-        nonlocal count
-        count = slides
-        tell(sentence, slides)
-
     with recorder(bag, namespace) as check:
         operator.wait_for_listeners(('signal', 'exploration'), 2, check)
 
-        def explore(request: ExplorationRequest) -> str:
-            nonlocal count
+        def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
             check()
             try:
                 explored = operator.explore(request)
             except (MotionRefused, MotionAborted) as error:
-                return str(error)
-            count += explored.success
-            return '' if explored.success else explored.message
+                return error.error, str(error)
+            return explored.error, explored.message
 
-        try:
-            end = collect(plan, params, explore, lambda: _evaluate_bag(bag, surface, count), told)
-        except KeyboardInterrupt as stop:
-            raise KeyboardInterrupt(f"stopped: {stop}; {count} slides are kept in '{bag}'") from None
-        except TextureError as error:
-            raise InvalidData(f"{error}; {count} slides are kept in '{bag}'") from error
-    return end, bag
+        return collect(plan, params, explore, partial(_evaluate_bag, bag, surface), tell), bag
 
 
 def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
@@ -172,30 +164,32 @@ class Collector(Node):
             pass
 
     def _on_service(self, request: srv.Collect.Request, response: srv.Collect.Response) -> srv.Collect.Response:
-        return self._collect(request, response, lambda _sentence, _slides: None, lambda: False)
+        response.result = self._collect(request.request, lambda _sentence, _slides: None, lambda: False)
+        return response
 
     def _on_goal(self, goal: Any) -> action.Collect.Result:
         def tell(sentence: str, slides: int) -> None:
             goal.publish_feedback(action.Collect.Feedback(message=sentence, slides=slides))
 
-        result = self._collect(goal.request, action.Collect.Result(), tell, lambda: bool(goal.is_cancel_requested))
+        result = self._collect(goal.request.request, tell, lambda: bool(goal.is_cancel_requested))
         if goal.is_cancel_requested:
             goal.canceled()
-        elif result.success:
+        elif result.error_code == CollectionError.NONE:
             goal.succeed()
         else:
             goal.abort()
-        return result
+        return action.Collect.Result(result=result)
 
-    def _collect(self, request: Any, result: Any, tell: Tell, cancelled: Callable[[], bool]) -> Any:
+    def _collect(self, request: msg.CollectionRequest, tell: Tell, cancelled: Callable[[], bool]) -> Any:
         if not self._busy.acquire(blocking=False):
-            result.message = 'another collection is running; wait for its end, or cancel it'
-            return result
+            busy = 'another collection is running; wait for its end, or cancel it'
+            return msg.CollectionResult(error_code=CollectionError.BUSY, message=busy)
 
         def guard() -> None:
             if cancelled() or self._closing:
                 raise KeyboardInterrupt('cancelled')
 
+        result = msg.CollectionResult()
         namespace = self.get_namespace().strip('/')
         try:
             with Operator(namespace, guard=guard) as operator:
@@ -204,10 +198,14 @@ class Collector(Node):
                 end, bag = collect_surface(
                     operator, request.surface, Path(request.folder), params, tell, namespace=namespace
                 )
-        except (TextureError, OSError, KeyboardInterrupt) as error:
-            result.message = str(error)
+        except LaunchFailed as error:
+            result.error_code, result.message = CollectionError.NOT_ACTIVE, str(error)
+        except (TextureError, OSError) as error:
+            result.error_code, result.message = CollectionError.INVALID_REQUEST, str(error)
+        except KeyboardInterrupt as error:
+            result.error_code, result.message = CollectionError.CANCELLED, str(error)
         else:
-            result.success, result.message, result.bag = end.success, end.message, str(bag)
+            result.error_code, result.message, result.bag = end.error, end.message, str(bag)
             result.slides, result.places, result.right = end.slides, end.accuracy.places, end.accuracy.right
         finally:
             self._busy.release()
