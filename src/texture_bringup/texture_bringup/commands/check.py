@@ -56,9 +56,9 @@ def _slide(options: argparse.Namespace, bag: Path) -> None:
         distance_m=options.distance,
         surface=PLATE,
     )
-    with Operator(options.namespace) as operator, recorder(bag, options.namespace) as check:
+    with Operator(options.namespace) as operator:
         operator.wait_for_explorer(10.0)
-        operator.wait_for_listeners(('signal', 'exploration'), 2, check)
-        explored = operator.explore(request)
+        with recorder(operator, bag, options.namespace):
+            explored = operator.explore(request)
         if not explored.success:
             raise MotionAborted(f'the slide over the plate failed: {explored.message}')

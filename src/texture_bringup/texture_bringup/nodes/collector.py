@@ -49,6 +49,7 @@ from texture_recordings.dataset import SlideDataset
 RECIPE = 'fast'  # whose features tell the places apart
 RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
+RECORDED = ('signal', 'exploration')
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 Tell = Callable[[str, int], None]
 
@@ -87,8 +88,7 @@ def collect_surface(
     plan = PlacePlan(surface, params, Patch(low_x, high_x, low_y, high_y))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
-    with recorder(bag, namespace) as check:
-        operator.wait_for_listeners(('signal', 'exploration'), 2, check)
+    with recorder(operator, bag, namespace) as check:
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
             check()
@@ -114,8 +114,10 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
 
 
 @contextmanager
-def recorder(bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
+def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
     """Record into a bag by a process of its own; the function raises InvalidData, with what it said, if that ended."""
+    operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
+    wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
     command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
     with tempfile.TemporaryFile('w+') as output:
         process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
@@ -129,6 +131,8 @@ def recorder(bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
                 raise InvalidData(f'the recorder ended: {said()}')
 
         try:
+            for topic, number in wanted.items():
+                operator.wait_for_listeners((topic,), number, check)
             yield check
         finally:
             if process.poll() is None:
