@@ -112,7 +112,7 @@ def test_simulated_slides_are_evaluated_live_as_offline(
     rate: float, slides: str, domain_id: int, simulated: Path, tmp_path: Path
 ) -> None:
     train_from_bags('vibration-and-taxels', [simulated], '1-4', tmp_path / 'model')
-    estimates, health = live(tmp_path / 'model.skops', simulated, slides, rate, domain_id)
+    estimates, health = live(tmp_path / 'model.npz', simulated, slides, rate, domain_id)
     assert_equal(estimates, offline(load_model(tmp_path / 'model'), simulated, slides))
     assert (health['lost_samples'], health['skipped']) == ('0', '0')
 
@@ -124,7 +124,7 @@ def test_recorded_slides_are_evaluated_live_as_offline(recipe: str, rate: float,
     materials = ['material03', 'material05', 'material12']
     import_biotac20(DATA, tmp_path / 'bags', '1-4,40', materials)
     train_from_bags(recipe, [tmp_path / 'bags'], '1-4', tmp_path / 'model')
-    estimates, health = live(tmp_path / 'model.skops', tmp_path / 'bags', '5', rate, 55)
+    estimates, health = live(tmp_path / 'model.npz', tmp_path / 'bags', '5', rate, 55)
     assert_equal(estimates, offline(load_model(tmp_path / 'model'), tmp_path / 'bags', '5'))
     assert (health['lost_samples'], health['skipped']) == ('0', '0')
     assert len(estimates) == len(materials)

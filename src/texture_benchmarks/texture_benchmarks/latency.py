@@ -105,9 +105,10 @@ def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: Ben
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
     cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
-    alone_us, without_us = _in_turn((model, replace(model, novelty_detector=None)), cut)
+    undetected = replace(model, decisions=replace(model.decisions, novelty_detector=None))
+    alone_us, without_us = _in_turn((model, undetected), cut)
     slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
-    [live] = measure(folder / f'{recipe}.skops', slide).values()
+    [live] = measure(folder / f'{recipe}.npz', slide).values()
     return _Timing(alone_us, without_us, live)
 
 
@@ -150,7 +151,7 @@ def run_hand(options: BenchmarkOptions) -> BenchmarkResult:
         recipes = QUICK_RECIPES if options.quick else HAND_RECIPES
         for recipe in recipes:
             train_from_bags(recipe, bags, f'1-{plan.slides}', Path(folder) / recipe)
-        rows = {recipe: _live_hand(Path(folder) / f'{recipe}.skops', surfaces[0], options) for recipe in recipes}
+        rows = {recipe: _live_hand(Path(folder) / f'{recipe}.npz', surfaces[0], options) for recipe in recipes}
     return BenchmarkResult(
         name='hand',
         measured=run_hand.__doc__,

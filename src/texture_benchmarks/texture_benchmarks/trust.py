@@ -378,8 +378,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
                 name: {
                     **_figures(clean[name]),
                     'early': metrics.early_decision(clean[name]),
-                    'stopping_rule': asdict(model.stopping_rule),
-                    'confidence_floor': asdict(model.confidence_floor),
+                    'stopping_rule': asdict(model.decisions.stopping_rule),
+                    'confidence_floor': asdict(model.decisions.confidence_floor),
                     'above_allowed': [row for row, own in outcomes[name].items() if own.worst_wrong > MAX_WRONG_KNOWN],
                     'outcomes': {row: asdict(outcome) for row, outcome in outcomes[name].items()},
                 }

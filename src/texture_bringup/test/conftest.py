@@ -17,7 +17,7 @@ TWO = ('glass', 'ridge_2mm_deep')
 
 @pytest.fixture(scope='session')
 def two_surfaces(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
-    """Return a folder with `bags/` of four simulated slides over each of two surfaces, and `model.skops` of them."""
+    """Return a folder with `bags/` of four simulated slides over each of two surfaces, and `model.npz` of them."""
     own = tmp_path_factory.getbasetemp()
     # The workers of a run have one parent folder: who comes first makes it for all.
     folder = (own.parent if hasattr(request.config, 'workerinput') else own) / 'two_surfaces'

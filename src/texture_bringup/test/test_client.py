@@ -208,13 +208,17 @@ SLIDES = {
 }
 
 
+def with_decisions(model, **changes):
+    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, **changes))
+
+
 @pytest.mark.parametrize('name', SLIDES)
 def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path, name):
     centre, count, said, action = SLIDES[name]
     if name == 'a doubtful surface':
-        model = dataclasses.replace(model, confidence_floor=ConfidenceFloor((1.0,), (36.0,)))
+        model = with_decisions(model, confidence_floor=ConfidenceFloor((1.0,), (36.0,)))
     if name == 'another motion':
-        model = dataclasses.replace(model, domain=dataclasses.replace(model.domain, speed_m_s=(0.05, 0.05)))
+        model = with_decisions(model, domain=dataclasses.replace(model.decisions.domain, speed_m_s=(0.05, 0.05)))
     classifier = graph.add(Classifier, model=str(model.save(tmp_path / 'm')))
     with World(graph) as world:
         windows = graph.peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)

@@ -99,7 +99,7 @@ def test_every_sub_command_explains_itself(name, capsys) -> None:
         (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
         (['identify', 'm', '--slides', '0'], '--slides is 0'),
         (['identify', '/nowhere'], "model card '/nowhere.json' cannot be read"),
-        (['identify', '/nowhere.skops'], "'/nowhere.skops' was given"),
+        (['identify', '/nowhere.npz'], "'/nowhere.npz' was given"),
     ],
 )
 def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:

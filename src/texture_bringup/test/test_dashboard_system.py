@@ -143,7 +143,7 @@ def address(folder, two_surfaces):
         'device': folder / 'tsf85',
         'finger_port': free_port(),
         'surface': SURFACES[1],
-        'model': two_surfaces / 'model.skops',
+        'model': two_surfaces / 'model.npz',
     }
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
     page = {'dashboard': 'true', 'dashboard_port': port}

@@ -85,7 +85,7 @@ def operator(emulator):
 def models(folder, bags, two_surfaces):
     """Return the paths of a model on the vibration alone and of one with the taxels, both of simulated slides."""
     train_from_bags('vibration-and-taxels', bags, out=folder / 'taxels')
-    return {'vibration': two_surfaces / 'model.skops', 'taxels': folder / 'taxels.skops'}
+    return {'vibration': two_surfaces / 'model.npz', 'taxels': folder / 'taxels.npz'}
 
 
 def test_the_security_policy_allows_all_that_the_nodes_use(operator) -> None:

@@ -36,7 +36,7 @@ def trained(folder, directions):
         )
     ]
     train_from_bags('fast', bags, out=folder / 'model')
-    return str(folder / 'model.skops')
+    return str(folder / 'model.npz')
 
 
 @pytest.fixture(scope='module')

@@ -69,7 +69,7 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, two_surfaces, 
         'hand': {'robot': tmp_path / robot, 'profile': patient_hand(tmp_path)},
     }[robot]
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, **place}
-    given['model'] = two_surfaces / 'model.skops'
+    given['model'] = two_surfaces / 'model.npz'
     given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
         with Operator(guard=launcher.check) as operator:

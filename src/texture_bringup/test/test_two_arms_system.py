@@ -49,7 +49,7 @@ def arms(tmp_path: Path, two_surfaces: Path):
     plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0, fingers=2)
     bags = write_simulated(tmp_path / 'bags', plan, np.random.default_rng(0), surfaces=tuple(SURFACES.values()))
     train_from_bags('two-fingers', bags, out=tmp_path / 'pair')
-    models = {'left': two_surfaces / 'model.skops', 'right': tmp_path / 'pair.skops'}
+    models = {'left': two_surfaces / 'model.npz', 'right': tmp_path / 'pair.npz'}
     given: dict[str, Any] = {'robot': 'emulator', 'right_sensor': 'tsf85_pair', 'right_signal_topics': FINGERS}
     given |= {'autostart': False, 'right_recipe': 'two-fingers', 'record_both': True, 'both_bag': tmp_path / 'bag'}
     for arm, surface in SURFACES.items():

@@ -508,7 +508,7 @@ def _clear(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for bag in (LEARNING_BAG, RECOGNITION_BAG):
             shutil.rmtree(folder / bag, ignore_errors=True)
-        for file in (PICTURE, FIGURES, LOG, f'{MODEL}.skops', f'{MODEL}.json'):
+        for file in (PICTURE, FIGURES, LOG, f'{MODEL}.npz', f'{MODEL}.json'):
             (folder / file).unlink(missing_ok=True)
     except OSError as error:
         raise InvalidData(f"'{folder}' cannot be used: {error.strerror}; name another with --out") from error
@@ -610,7 +610,7 @@ def _report(
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
     refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
-    note = '\n'.join(filter(None, [model.error_bound.reason, refusal]))
+    note = '\n'.join(filter(None, [model.decisions.error_bound.reason, refusal]))
     draw(out / RECOGNITION_BAG, plan.shown, model, report, out / PICTURE, note=note)
     progress.section(f'Done. Look at {out / PICTURE}')
     progress.line(f'recordings, model, figures and the log of the nodes are in {out}/')

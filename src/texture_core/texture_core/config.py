@@ -364,6 +364,8 @@ class Archive:
     ----------
     file
         Open file; stays with the caller.
+    most_bytes
+        To which it may unpack.
 
     Raises
     ------
@@ -371,14 +373,14 @@ class Archive:
         If it is no zip file, or states that it unpacks to more.
     """
 
-    def __init__(self, file: IO[bytes]) -> None:
+    def __init__(self, file: IO[bytes], most_bytes: int = MAX_FILE_BYTES) -> None:
         try:
             self._zip = zipfile.ZipFile(file)
         except BROKEN_CONTENT as error:
             raise FileRefused(f'it is no archive that can be read: {error}') from error
         self.names = tuple(dict.fromkeys(self._zip.namelist()))
-        if sum(member.file_size for member in self._zip.infolist()) > MAX_FILE_BYTES:
-            raise FileRefused(f'it unpacks to more than {MAX_FILE_BYTES // MB} MB, which is the limit for a file')
+        if sum(member.file_size for member in self._zip.infolist()) > most_bytes:
+            raise FileRefused(f'it unpacks to more than {most_bytes // MB} MB, which is the limit for such a file')
 
     def __enter__(self) -> Archive:
         return self
@@ -410,8 +412,8 @@ class Archive:
 class Arrays:
     """The arrays of an .npz file by name, read one at a time; see `Archive`."""
 
-    def __init__(self, file: IO[bytes]) -> None:
-        self._archive = Archive(file)
+    def __init__(self, file: IO[bytes], most_bytes: int = MAX_FILE_BYTES) -> None:
+        self._archive = Archive(file, most_bytes)
         self.names = tuple(name.removesuffix('.npy') for name in self._archive.names if name.endswith('.npy'))
 
     def __contains__(self, name: str) -> bool:

@@ -2,13 +2,11 @@
 """Novelty detection against what is known of the distributions that the slides are drawn from."""
 
 import dataclasses
-import json
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from texture_core.errors import ModelMismatch
 from texture_core.types import FeatureVector
 from texture_estimation.decisions import (
     FEATURES,
@@ -33,7 +31,6 @@ from texture_estimation.decisions import (
     space_means,
 )
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.model import load_model
 from texture_estimation.model_files import AddedSlide
 from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import load_recipe
@@ -228,6 +225,10 @@ WORD = 'too few slides for early stopping'
 ANY_ERROR_RATE = ErrorBound(0, 1.0)  # allows any, so nothing has to be shown
 
 
+def with_decisions(model, **changes):
+    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, **changes))
+
+
 def estimates(model, examples):
     """Return the true surface and the estimates of each slide, window by window and at its end."""
     for slide in np.unique(examples.groups).tolist():
@@ -274,7 +275,7 @@ def test_a_limited_confidence_keeps_the_order_of_the_labels_and_the_sum_of_the_p
 def test_no_wrong_label_of_a_model_of_three_slides_a_surface_is_certain_or_confident(make_examples):
     """Its held-out slides are all right, so that the stopping rule alone ends slides at the first windows."""
     model = train(RECIPE, make_examples(slides=3, spread=1.5))
-    trusting = dataclasses.replace(model, error_bound=ANY_ERROR_RATE)
+    trusting = with_decisions(model, error_bound=ANY_ERROR_RATE)
     new = make_examples(slides=20, seed=1, spread=1.5)
     wrong = {
         own: [e for surface, course in estimates(own, new) for e in course if e.decided and e.label != surface]
@@ -288,7 +289,7 @@ def test_no_wrong_label_of_a_model_of_three_slides_a_surface_is_certain_or_confi
 
 def test_only_the_final_estimate_says_why_no_slide_of_few_was_certain(make_examples):
     few = train(RECIPE, make_examples(labels=('cork', 'felt')))
-    enough = dataclasses.replace(few, error_bound=ErrorBound(149, RECIPE.training.max_error_rate))
+    enough = with_decisions(few, error_bound=ErrorBound(149, RECIPE.training.max_error_rate))
     for model, said in ((few, True), (enough, False)):
         courses = [course for _, course in estimates(model, make_examples(seed=1, slides=2, labels=('cork', 'felt')))]
         assert [WORD in course[-1].message for course in courses] == [said] * 4
@@ -336,42 +337,23 @@ def after_one_window(model, examples, slide='felt/0'):
 
 def test_a_slide_below_the_limit_is_neither_known_nor_decided_and_keeps_its_label(model, examples):
     assert after_one_window(model, examples).known
-    strict = after_one_window(dataclasses.replace(model, confidence_floor=STRICT), examples)
+    strict = after_one_window(with_decisions(model, confidence_floor=STRICT), examples)
     assert (strict.label, strict.known, strict.decided) == ('felt', False, False)
 
 
 def test_added_slides_end_the_limit_as_their_labels_make_others_less_probable(model, examples):
     added = AddedSlide('silk', 'silk-1', examples.values[examples.groups == 'felt/0'] + 9.0)
-    strict = dataclasses.replace(model, confidence_floor=STRICT).with_added_slides((added,))
-    assert strict.active_confidence_floor == ConfidenceFloor()
+    strict = with_decisions(model, confidence_floor=STRICT).with_added_slides((added,))
+    assert strict.active_decisions.confidence_floor == ConfidenceFloor()
 
 
 def test_training_fits_the_limit_that_a_recipe_asks_for(make_examples):
     recipe = load_recipe('default')
     asked = dataclasses.replace(recipe.training, false_rejection_rate=0.1, low_confidence_rejection_rate=0.2)
     many = make_examples(slides=12)
-    assert train(dataclasses.replace(recipe, training=asked), many).confidence_floor.log_odds
+    assert train(dataclasses.replace(recipe, training=asked), many).decisions.confidence_floor.log_odds
     none = dataclasses.replace(asked, low_confidence_rejection_rate=0.0)
-    assert train(dataclasses.replace(recipe, training=none), many).confidence_floor == ConfidenceFloor()
-
-
-def test_a_model_file_keeps_the_limit_and_a_card_without_the_entry_is_refused(model, tmp_path):
-    limited = dataclasses.replace(model, confidence_floor=ConfidenceFloor((1.0, 10.0), (0.5, 3.0)))
-    path = limited.save(tmp_path / 'model').with_suffix('.json')
-    assert load_model(path).confidence_floor == limited.confidence_floor
-    card = json.loads(path.read_text())
-    del card['confidence_floor']
-    path.write_text(json.dumps(card))
-    with pytest.raises(ModelMismatch, match=r"no entry 'confidence_floor'.*; train it again with 'texture train'"):
-        load_model(path)
-
-
-@pytest.mark.parametrize('entry', [{'log_odds': [1.0]}, {'other': [1.0]}, [1.0], {'log_odds': 3}])
-def test_a_card_with_a_damaged_limit_is_refused(model, tmp_path, entry):
-    path = model.save(tmp_path / 'model').with_suffix('.json')
-    path.write_text(json.dumps({**json.loads(path.read_text()), 'confidence_floor': entry}))
-    with pytest.raises(ModelMismatch, match="train it again with 'texture train'"):
-        load_model(path)
+    assert train(dataclasses.replace(recipe, training=none), many).decisions.confidence_floor == ConfidenceFloor()
 
 
 SET_WINDOWS = np.array([1.0, 2.0, 4.0])

@@ -110,15 +110,15 @@ def test_confidence_falls_where_days_differ(make_examples):
 def test_a_model_of_one_place_says_so_where_it_rejects(make_examples):
     examples = make_examples(slides=8)
     model = train(RECIPE, examples)
-    assert model.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
+    assert model.decisions.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
     strange = replace(examples, values=examples.values + 50.0)
     evidence = EvidenceAccumulator(model)
     final = [evidence.update(vector) for vector in strange.vectors('cork/0')][-1]
     assert not final.known
     assert ONE_PLACE in final.message
     of_two = train(RECIPE, of_days(examples))
-    assert of_two.domain.reach['cork'] == {'sessions': 2, 'places': 1, 'fingers': 1}
-    assert of_two.domain.reach_reason == ''
+    assert of_two.decisions.domain.reach['cork'] == {'sessions': 2, 'places': 1, 'fingers': 1}
+    assert of_two.decisions.domain.reach_reason == ''
 
 
 def test_the_load_is_no_part_of_the_discriminant_and_a_load_never_seen_is_outside(make_examples):
@@ -230,7 +230,7 @@ def test_held_out_slides_are_followed_as_the_classifier_follows_them():
         np.array([model.trust(row) for row in values]),
     )
     expected = np.exp(model.recipe.evidence.log_posterior(followed, effective[:, None], model.tempering_exponent))
-    bound = model.error_bound
+    bound = model.decisions.error_bound
     assert probabilities_after(model, forces) == pytest.approx([bound.limited(row)[0] for row in expected])
 
 
@@ -280,9 +280,9 @@ def test_one_track_is_cut_into_parts_that_are_held_out_as_places(make_examples):
 def test_a_training_over_one_track_stays_one_in_the_card(make_examples):
     examples = make_examples(slides=8, windows=12)
     parts = train(replace(RECIPE, training=replace(RECIPE.training, held_out_places=3)), examples)
-    assert parts.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
-    assert parts.domain.slides['cork'] == 8
-    assert parts.training['slides'] == parts.error_bound.slides == 32
+    assert parts.decisions.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
+    assert parts.decisions.domain.slides['cork'] == 8
+    assert parts.training['slides'] == parts.decisions.error_bound.slides == 32
     assert 'sessions held out in turn, 3 parts' in parts.training['calibration']
 
 

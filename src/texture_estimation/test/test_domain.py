@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-import json
 import math
 
 import pytest
 
-from texture_core.errors import InvalidData
 from texture_estimation.decisions import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
 from texture_features.examples import SignalLevel, SlideConditions
 
@@ -80,18 +78,6 @@ def test_to_and_fro_is_trained_if_both_directions_are():
     assert TRAINED.deviation(both) == 'outside what was trained: direction 3.14 rad, trained 0 rad'
 
 
-def test_a_domain_survives_the_card_and_a_card_without_one_compares_nothing():
-    assert Domain.from_card(json.loads(json.dumps(TRAINED.as_card()))) == TRAINED
-    assert Domain.from_card({}).deviation(conditions(9.0)) == ''
-
-
-@pytest.mark.parametrize('card', [{'speed_m_s': [0.2, 0.1]}, {'force_n': [0.0, math.inf]}, {'margins': {'speed': -1}},
-                                  {'directions_rad': [[0.0, 9.0]]}])  # fmt: skip
-def test_a_card_with_an_impossible_range_is_refused(card):
-    with pytest.raises(InvalidData):
-        Domain.from_card(card)
-
-
 def at_level(rms, channel='signal/pac', **known):
     return SlideConditions(levels=(SignalLevel(channel, rms, rms, rms),), **known)
 
@@ -102,7 +88,6 @@ def test_a_signal_far_stronger_or_weaker_than_any_trained_is_outside(rms, within
     sentence = f'outside what was trained: signal level {rms:.3g} of signal/pac, trained 4 to 8'
     assert domain.deviation(at_level(rms)) == ('' if within else sentence)
     assert domain.deviation(at_level(rms, 'signal/other')) == ''
-    assert Domain.from_card(json.loads(json.dumps(domain.as_card()))) == domain
 
 
 def test_added_slides_widen_the_domain():

@@ -149,12 +149,12 @@ def test_a_model_may_be_given_later_and_a_bad_one_changes_nothing(graph, case, t
     node = NodeUnderTest(graph, kind)
     assert 'no model is loaded' in node.ask(vectors)[-1].message
     assert node.report()[0] == 'WARN'
-    refused = node.set_model(tmp_path / 'none.skops')
+    refused = node.set_model(tmp_path / 'none.npz')
     assert not refused.successful
     assert 'cannot be read' in refused.reason
     assert node.set_model(path).successful
     assert recognised(node.ask(vectors)[-1])
-    assert not node.set_model(tmp_path / 'none.skops').successful
+    assert not node.set_model(tmp_path / 'none.npz').successful
     assert recognised(node.ask(vectors)[-1])
     assert node.report()[0] == 'OK'
 
@@ -190,7 +190,7 @@ def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_again(g
 
 def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
     with pytest.raises(ModelMismatch, match='cannot be read'):
-        NodeUnderTest(graph, case[0], tmp_path / 'none.skops')
+        NodeUnderTest(graph, case[0], tmp_path / 'none.npz')
 
 
 def test_the_classifier_says_what_the_same_vectors_give_offline(graph, model, cloth_slide, tmp_path):

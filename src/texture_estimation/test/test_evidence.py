@@ -34,7 +34,7 @@ def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
 
 def unlimited(model):
     """Return the model as if its few held-out slides showed any confidence."""
-    return dataclasses.replace(model, error_bound=ErrorBound(0, 1.0))
+    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, error_bound=ErrorBound(0, 1.0)))
 
 
 def predict(model, stream):
@@ -103,7 +103,7 @@ def under(stream, **conditions):
 
 def trained_at(model, speed_m_s):
     domain = Domain(motions=('linear_slide',), speed_m_s=(speed_m_s, speed_m_s))
-    return dataclasses.replace(model, domain=domain)
+    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, domain=domain))
 
 
 def test_outside_what_was_trained_nothing_is_known_or_decided_and_every_estimate_says_why(model, examples):

@@ -7,7 +7,7 @@ import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.types import FeatureVector
-from texture_estimation.decisions import Domain
+from texture_estimation.decisions import Domain, ErrorBound
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.model import load_model
@@ -158,20 +158,22 @@ def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tm
 
 def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_restart(model, silk, tmp_path):
     domain = Domain(motions=('linear_slide',), speed_m_s=(0.05, 0.05))
-    path = dataclasses.replace(model, domain=domain).save(tmp_path / 'surfaces')
+    path = dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, domain=domain)).save(
+        tmp_path / 'surfaces'
+    )
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     for row in silk:
         incremental_classifier.observe(
             FeatureVector(0, 'e1', 0.5, 0.1, model.names, row, 0.1, feature_set=model.feature_set)
         )
     fast = SlideConditions('linear_slide', speed_m_s=0.1)
-    assert incremental_classifier.model.active_domain.deviation(fast)
+    assert incremental_classifier.model.active_decisions.domain.deviation(fast)
     incremental_classifier.add('silk')
-    assert incremental_classifier.model.active_domain.deviation(fast) == ''
+    assert incremental_classifier.model.active_decisions.domain.deviation(fast) == ''
     again = IncrementalClassifier(load_model(path), path)
-    assert again.model.active_domain.deviation(fast) == ''
+    assert again.model.active_decisions.domain.deviation(fast) == ''
     again.remove_last()
-    assert again.model.active_domain == domain
+    assert again.model.active_decisions.domain == domain
 
 
 @pytest.fixture
@@ -253,8 +255,8 @@ def with_slides(model, values, count):
 
 @pytest.mark.parametrize('count', [1, 2, 5])
 def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(model, silk, count):
-    bound = dataclasses.replace(model.error_bound, slides=600, max_error_rate=0.02)
-    estimates = estimated(with_slides(dataclasses.replace(model, error_bound=bound), silk, count), silk + 0.1)
+    decisions = dataclasses.replace(model.decisions, error_bound=ErrorBound(600, 0.02))
+    estimates = estimated(with_slides(dataclasses.replace(model, decisions=decisions), silk, count), silk + 0.1)
     assert {estimate.label for estimate in estimates} == {'silk'}
     assert not any(estimate.decided for estimate in estimates)
     highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].probabilities))

@@ -50,8 +50,7 @@ def test_the_choice_depends_on_the_candidates_that_remain() -> None:
 
 
 def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
-    gaussians = ClassConditionalGaussian(np.array([[-1.0], [1.0]]))
-    training = NextTouchModel(('a', 'b'), np.eye(1), {ACROSS: gaussians})
+    training = NextTouchModel(('a', 'b'), np.eye(1), (ACROSS,), np.array([[[-1.0], [1.0]]]))
     odds = np.subtract(*training.update(training.uniform_log_prior, ACROSS, np.array([0.3]))[::-1])
     assert odds == pytest.approx(2.0 * 0.3)
 

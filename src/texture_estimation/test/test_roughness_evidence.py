@@ -203,4 +203,4 @@ def test_examples_unfit_for_training_get_a_sentence() -> None:
 
 def test_few_textures_make_a_model_whose_card_says_that_it_is_not_calibrated() -> None:
     model = train_grades(recipe(), *graded(n_textures=3))
-    assert 'not calibrated' in model.card['training']['calibration']
+    assert 'not calibrated' in model.training['calibration']

@@ -2,8 +2,11 @@
 import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
 
-from texture_estimation.learners.svm import PairCoupling, SvmRbf, export, fit_coupling, uncalibrated
+from texture_estimation.learners.svm import PairCoupling, SvmRbf, fit_coupling
 
 
 def max_wins(decisions, n_labels):
@@ -20,37 +23,25 @@ def test_the_array_form_decides_every_window_as_scikit_learn(make_examples, n_la
     labels = tuple(f'm{number:02d}' for number in range(n_labels))
     examples = make_examples(labels=labels, spread=2.0)
     codes = np.unique(examples.labels, return_inverse=True)[1]
-    scaler, svc = SvmRbf()._fit_svc(examples.values, codes)
-    svc.set_params(decision_function_shape='ovo')
-    svm = export(scaler, svc, uncalibrated(n_labels))
-    values = make_examples(seed=5, labels=labels, spread=3.0).values
-    expected = svc.decision_function(scaler.transform(values))
-    expected = -expected[:, None] if n_labels == 2 else expected
-    np.testing.assert_allclose(svm.decisions(values), expected, atol=1e-9)
-    np.testing.assert_array_equal(max_wins(svm.decisions(values), n_labels), svc.predict(scaler.transform(values)))
-
-
-@pytest.mark.parametrize('n_labels', [2, 10])
-def test_probabilities_of_the_array_form_are_those_of_scikit_learns_decisions(make_examples, n_labels):
-    examples = make_examples(labels=tuple(f'm{number:02d}' for number in range(n_labels)), spread=2.0)
-    codes = np.unique(examples.labels, return_inverse=True)[1]
     groups = np.unique(examples.groups, return_inverse=True)[1]
-    parameters = SvmRbf().fit(examples.values, codes, groups).parameters
-    svm = SvmRbf.predictor(parameters)
-    parameters['svc'].set_params(decision_function_shape='ovo')
-    decisions = parameters['svc'].decision_function(parameters['scaler'].transform(examples.values))
-    decisions = -decisions[:, None] if n_labels == 2 else decisions
-    np.testing.assert_allclose(svm(examples.values), svm.coupling(decisions), atol=1e-9)
+    machines = SvmRbf.predictor(SvmRbf().fit(examples.values, codes, groups).parameters).machines
+    # gamma='scale' is 1 / (n_features · variance), of features that are standardised
+    theirs = make_pipeline(StandardScaler(), SVC(C=10.0, gamma='scale', decision_function_shape='ovo'))
+    theirs.fit(examples.values, codes)
+    values = make_examples(seed=5, labels=labels, spread=3.0).values
+    expected = theirs.decision_function(values)
+    expected = -expected[:, None] if n_labels == 2 else expected
+    np.testing.assert_allclose(machines(values), expected, atol=1e-9)
+    np.testing.assert_array_equal(max_wins(machines(values), n_labels), theirs.predict(values))
 
 
 def test_with_a_common_scale_what_hardly_varies_stays_small():
     values = np.random.default_rng(0).normal(size=(40, 2)) * (1.0, 1e-3)
     codes = np.arange(40) % 2
-    scaler, _ = SvmRbf(common_scale=True)._fit_svc(values, codes)
-    deviations = scaler.transform(values).std(axis=0)
-    assert deviations[1] / deviations[0] == pytest.approx(values[:, 1].std() / values[:, 0].std())
-    assert np.mean(deviations**2) == pytest.approx(1.0)
-    assert SvmRbf(common_scale=True)._fit_svc(np.ones((4, 2)), np.arange(4) % 2)[0].scale_[0] == 1.0
+    scale = SvmRbf.predictor(SvmRbf(common_scale=True).fit(values, codes, codes).parameters).machines.scale
+    assert scale == pytest.approx(np.sqrt(values.var(axis=0).mean()))
+    constant = SvmRbf(common_scale=True).fit(np.ones((4, 2)), np.arange(4) % 2, np.arange(4))
+    assert SvmRbf.predictor(constant.parameters).machines.scale.tolist() == [1.0, 1.0]
 
 
 def sheared(seed, shear, slides=8, windows=6):

@@ -47,7 +47,7 @@ def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
 def test_few_examples_make_a_model_whose_card_says_how_it_is_calibrated(make_examples, slides, windows, note):
     examples = make_examples(slides=slides, windows=windows)
     model = train(RECIPE, examples)
-    assert note in model.card['training']['calibration']
+    assert note in model.training['calibration']
     assert np.isfinite(model.predict_log_proba(examples.values)).all()
 
 
@@ -99,9 +99,9 @@ def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
         dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=share))
         for share in (0.0, 0.1)
     )
-    assert train(trusting, examples).novelty_detector is None
+    assert train(trusting, examples).decisions.novelty_detector is None
     model = train(strict, examples)
-    assert model.novelty_detector is not None
+    assert model.decisions.novelty_detector is not None
     values = examples.values[examples.groups == examples.groups[0]]
     assert final_estimate(model, values).known
     assert not final_estimate(model, values + 50.0).known

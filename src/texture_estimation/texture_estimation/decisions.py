@@ -11,15 +11,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise, product
-from types import UnionType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import safe_repr
 from texture_core.errors import InvalidData
-from texture_core.types import AnyArray, Array
+from texture_core.types import Array
 from texture_estimation.learners.learner import Codes
 from texture_estimation.numerics import shrunk_covariance
 from texture_features.examples import Interval, RunningConditions, SlideConditions
@@ -165,29 +162,10 @@ class ClassDistance:
         order = np.argsort(every, kind='stable')
         return ClassDistance(self.projection, references[order], every[order], self.centre, self.weights)
 
-    def as_arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays for the model file.
-
-        Returns
-        -------
-        dict
-            Name of each field, and its array.
-        """
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, Any]) -> ClassDistance:
-        """Return what `as_arrays` gave."""
-        projection, references, centre, weights = (
-            np.asarray(arrays[name], dtype=np.float64) for name in ('projection', 'references', 'centre', 'weights')
-        )
-        return cls(projection, references, np.asarray(arrays['classes'], dtype=np.intp), centre, weights)
-
 
 # --------------------
 # The smallest confidence that a slide over a known surface has, by the length of its evidence.
 
-FLOOR_ENTRY = 'confidence_floor'  # of a model card
 # Lengths of evidence at which it is fitted, in windows that do not overlap. Up to the last one the confidence of known
 # slides grows, which tells them from disturbed slides that resemble two textures.
 FLOOR_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
@@ -232,22 +210,9 @@ class ConfidenceFloor:
         ascending = all(earlier < later for earlier, later in pairwise(counts))
         if len(counts) != len(self.log_odds) or not ascending or not all(map(math.isfinite, (*counts, *self.log_odds))):
             raise InvalidData(
-                f'{FLOOR_ENTRY} has {len(counts)} effective_window_counts and {len(self.log_odds)} log_odds; it needs '
-                'as many of both, finite, the counts ascending'
+                f'confidence_floor has {len(counts)} effective_window_counts and {len(self.log_odds)} log_odds; '
+                'as many of both are needed, finite, the counts ascending'
             )
-
-    @classmethod
-    def from_card(cls, card: Mapping[str, Any]) -> ConfidenceFloor:
-        """Return the limit that a model card holds.
-
-        Raises
-        ------
-        InvalidData
-            If the card has no entry of it. A model without a limit has one that is empty.
-        """
-        if FLOOR_ENTRY not in card:
-            raise InvalidData(f"its card has no entry '{FLOOR_ENTRY}', the smallest confidence of known surfaces")
-        return cls(**{name: tuple(map(float, values)) for name, values in card[FLOOR_ENTRY].items()})
 
     def reached_by(self, confidences: Array, effective_windows: Array) -> Mask:
         """Return what `reached` does for each window of a slide, (n_windows,)."""
@@ -366,9 +331,7 @@ class DomainMargins:
 
 LEVEL = 0.05  # the error rate exceeds its upper bound in so many of all trainings
 PERCENT = 100.0
-ERROR_BOUND_ENTRY = 'error_bound'  # of a model card
 MAX_SLIDES = 1_000_000
-ALLOWED = f'slides, a whole number from 0 to {MAX_SLIDES}, and max_error_rate, a number from 0 to 1'
 
 
 @dataclass(frozen=True)
@@ -391,7 +354,7 @@ class ErrorBound:
     Raises
     ------
     InvalidData
-        If a value has another type or is out of its range.
+        If a value is out of its range.
 
     Examples
     --------
@@ -404,29 +367,11 @@ class ErrorBound:
     max_error_rate: float
 
     def __post_init__(self) -> None:
-        if not (_is_within(self.slides, int, MAX_SLIDES) and _is_within(self.max_error_rate, int | float, 1.0)):
-            slides, rate = safe_repr(self.slides), safe_repr(self.max_error_rate)
+        if not (0 <= self.slides <= MAX_SLIDES and 0.0 <= self.max_error_rate <= 1.0):
             raise InvalidData(
-                f'{ERROR_BOUND_ENTRY} has slides {slides:.40} and max_error_rate {rate:.40}; it needs {ALLOWED}'
+                f'error_bound has slides {self.slides} and max_error_rate {self.max_error_rate}; it needs slides, '
+                f'0 to {MAX_SLIDES}, and max_error_rate, 0 to 1'
             )
-
-    @classmethod
-    def from_card(cls, card: Mapping[str, Any]) -> ErrorBound:
-        """Return the bound that a model card holds.
-
-        Raises
-        ------
-        InvalidData
-            If the card holds none, as cards of earlier versions, or if it has other keys or values.
-        """
-        if ERROR_BOUND_ENTRY not in card:
-            raise InvalidData(
-                f"its card is of an earlier version and has no entry '{ERROR_BOUND_ENTRY}'; it needs {ALLOWED}"
-            )
-        values = card[ERROR_BOUND_ENTRY]
-        if not isinstance(values, Mapping) or set(values) != {'slides', 'max_error_rate'}:
-            raise InvalidData(f'{ERROR_BOUND_ENTRY} is {safe_repr(values):.80}; it needs {ALLOWED}')
-        return cls(**values)
 
     @cached_property
     def highest_confidence(self) -> float:
@@ -478,12 +423,6 @@ class ErrorBound:
         kept = (limit - equal) / (highest - equal)
         mixed: Array = equal + kept * (probabilities - equal)
         return mixed
-
-
-def _is_within(value: Any, kind: type | UnionType, largest: float) -> bool:
-    """Return whether a value is a number of this type from 0 to the largest one; a truth value is no number."""
-    is_number = isinstance(value, kind) and not isinstance(value, bool)
-    return is_number and bool(0 <= value <= largest)
 
 
 # --------------------
@@ -691,36 +630,6 @@ class Domain:
         found = '; '.join(self._deviations(conditions))
         return f'{OUTSIDE}: {found}' if found else ''
 
-    def as_card(self) -> dict[str, Any]:
-        """Return what a model's card holds, in the form of JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_card(cls, card: Mapping[str, Any] | None) -> Domain:
-        """Return what `as_card` gave.
-
-        Raises
-        ------
-        InvalidData
-            If there is none, or a range is none. A model without a domain would be decided under any conditions.
-        """
-        if not isinstance(card, Mapping):
-            raise InvalidData("the model card has no entry 'domain', the conditions of the training")
-        intervals = {name: _pair(card[name]) for name in ('speed_m_s', 'force_n') if card.get(name) is not None}
-        return cls(
-            motions=tuple(map(str, card.get('motions', ()))),
-            sensors=tuple(map(str, card.get('sensors', ()))),
-            directions_rad=tuple(_pair(arc) for arc in card.get('directions_rad', ())),
-            levels={str(name): _pair(interval) for name, interval in card.get('levels', {}).items()},
-            slides={str(label): int(count) for label, count in card.get('slides', {}).items()},
-            margins=DomainMargins(**{name: float(value) for name, value in card.get('margins', {}).items()}),
-            reach={
-                str(label): {name: int(own.get(name, 1)) for name in REACH}
-                for label, own in card.get('reach', {}).items()
-            },
-            **intervals,
-        )
-
     def _deviations(self, conditions: SlideConditions | RunningConditions) -> Iterator[str]:
         speed, force = conditions.speed_m_s, conditions.force_n
         if is_beyond(speed, self.speed_m_s, self.margins.speed):
@@ -782,11 +691,6 @@ def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted({name for name in names if name}))
-
-
-def _pair(values: Sequence[Any]) -> Interval:
-    low, high = values
-    return float(low), float(high)
 
 
 def _range(interval: Interval | None) -> str:
@@ -985,42 +889,6 @@ class NoveltyDetector:
             for space, distance in self.distances.items()
         }
         return replace(self, distances=distances, distances_only=True)
-
-    def as_arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays for the model file.
-
-        Returns
-        -------
-        dict
-            Name of each field, and its array.
-        """
-        numbers = {name: getattr(self, name) for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')}
-        spaces = {
-            f'{space}/{name}': array
-            for space, distance in self.distances.items()
-            for name, array in distance.as_arrays().items()
-        }
-        return {**numbers, **spaces}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, Any]) -> NoveltyDetector:
-        """Return what `as_arrays` gave."""
-        distances = {
-            space: ClassDistance.from_arrays(
-                {
-                    name.removeprefix(f'{space}/'): array
-                    for name, array in arrays.items()
-                    if name.startswith(f'{space}/')
-                }
-            )
-            for space in SPACES
-            if f'{space}/projection' in arrays
-        }
-        medians, spreads, thresholds, distance_thresholds = (
-            np.asarray(arrays[name], dtype=np.float64)
-            for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')
-        )
-        return cls(distances, medians, spreads, thresholds, distance_thresholds)
 
 
 class SlideNovelty:
@@ -1506,3 +1374,83 @@ def _filled(rows: Sequence[Array | Mask], value: float) -> Array:
     for number, row in enumerate(rows):
         table[number, : len(row)] = row
     return table
+
+
+# --------------------
+# All of these together.
+
+
+@dataclass(frozen=True, eq=False)
+class Decisions:
+    """What a model decides of a slide, by what was fitted to the slides held out of its training.
+
+    Parameters
+    ----------
+    error_bound
+        What the held-out slides can show; it limits the confidence, and early stopping.
+    stopping_rule
+        Early stopping rule.
+    prediction_sets
+        Conformal prediction sets.
+    confidence_floor
+        Smallest confidence of known surfaces.
+    domain
+        Conditions under which the model was trained; outside them it decides nothing.
+    novelty_detector
+        Rejects unknown surfaces; with None no surface is rejected.
+    """
+
+    error_bound: ErrorBound
+    stopping_rule: StoppingRule = field(default_factory=StoppingRule)
+    prediction_sets: PredictionSets = field(default_factory=PredictionSets)
+    confidence_floor: ConfidenceFloor = field(default_factory=ConfidenceFloor)
+    domain: Domain = field(default_factory=Domain)
+    novelty_detector: NoveltyDetector | None = None
+
+    def decided(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
+        """Return whether a slide may end: by the stopping rule, if enough slides were held out to show its error rate.
+
+        Parameters
+        ----------
+        confidence
+            Probability of the best label, 0 to 1, as the evidence gives it.
+        effective_windows
+            Effective window count so far.
+        novelty_score
+            Novelty score so far.
+
+        Returns
+        -------
+        bool
+        """
+        return self.error_bound.shown and self.stopping_rule.decided(confidence, effective_windows, novelty_score)
+
+    def with_slides(
+        self,
+        means: Sequence[Mapping[str, Array]],
+        codes: Codes,
+        conditions: Sequence[SlideConditions],
+        labels: Iterable[str],
+    ) -> Decisions:
+        """Return the decisions of a model to which slides were added.
+
+        There is no smallest confidence then: new labels make all others less probable.
+
+        Parameters
+        ----------
+        means
+            Mean of each slide by space, as `space_means` returns it.
+        codes : (n_slides,)
+            Number of the label of each.
+        conditions
+            Of each, as far as they are known.
+        labels
+            Of each.
+        """
+        detector = self.novelty_detector
+        return replace(
+            self,
+            confidence_floor=ConfidenceFloor(),
+            domain=self.domain.widened(conditions, labels),
+            novelty_detector=detector.with_slides(means, codes) if detector else None,
+        )

@@ -138,7 +138,7 @@ class EvidenceAccumulator:
         )
         self._moments = SlideMoments(len(self.model.names)) if self.model and self.model.added_slides else None
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
-        detector = self.model.active_novelty_detector if self.model else None
+        detector = self.model.active_decisions.novelty_detector if self.model else None
         self._novelty = SlideNovelty(detector.distances, len(self.model.labels)) if self.model and detector else None
         self._conditions = RunningConditions()
         self._deviation = ''  # of these conditions from those of the training
@@ -164,7 +164,7 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.active_domain.deviation(self._conditions)
+        self._deviation = model.active_decisions.domain.deviation(self._conditions)
         scores, activations = model.predict_with_activations(vector.values)
         window_evidence = model.recipe.evidence.window_evidence(scores)
         self._windows += 1
@@ -213,7 +213,7 @@ class EvidenceAccumulator:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not familiar:
             rejection = Rejection.NOVEL
-        elif not single or not model.active_confidence_floor.reached(confidence, effective_windows):
+        elif not single or not model.active_decisions.confidence_floor.reached(confidence, effective_windows):
             rejection = Rejection.AMBIGUOUS
         else:
             rejection = Rejection.NONE
@@ -228,7 +228,7 @@ class EvidenceAccumulator:
             rejection=rejection,
             confidence=float(reported.max()),
             probabilities=tuple(reported.tolist()),
-            decided=known and bound.shown and model.decided(confidence, effective_windows, novelty_score),
+            decided=known and bound.shown and model.decisions.decided(confidence, effective_windows, novelty_score),
             prediction_set=self._candidates(model, probabilities, effective_windows) if final and within else (),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
@@ -246,17 +246,17 @@ class EvidenceAccumulator:
 
     def _explanation(self, model: TextureModel, bound: ErrorBound, final: bool, known: bool) -> str:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
-        missing = (model.prediction_sets.reason, bound.reason) if final and not self._deviation else ()
+        missing = (model.decisions.prediction_sets.reason, bound.reason) if final and not self._deviation else ()
         if final and not model.recipe.training.known:
             missing = (NEVER_KNOWN.format(model.recipe.name), *missing)
-        reach = model.domain.reach_reason if final and not known and not self._deviation else ''
+        reach = model.decisions.domain.reach_reason if final and not known and not self._deviation else ''
         return '; '.join(filter(None, (self._deviation, self._message, *missing, reach)))
 
     def _novelty_score(
         self, model: TextureModel, mean: Array, best: int, effective_windows: float
     ) -> tuple[float, bool]:
         """Return the novelty score of the slide, and whether it is that of a known surface."""
-        detector = model.active_novelty_detector
+        detector = model.active_decisions.novelty_detector
         if self._novelty is None or detector is None:
             return 0.0, True
         second, first = np.partition(mean, -2)[-2:].tolist()
@@ -266,4 +266,5 @@ class EvidenceAccumulator:
 
     @staticmethod
     def _candidates(model: TextureModel, probabilities: Array, effective_windows: float) -> tuple[str, ...]:
-        return tuple(model.labels[number] for number in model.prediction_sets.members(probabilities, effective_windows))
+        members = model.decisions.prediction_sets.members(probabilities, effective_windows)
+        return tuple(model.labels[number] for number in members)

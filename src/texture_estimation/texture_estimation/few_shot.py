@@ -77,8 +77,11 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
             training=replace(model.recipe.training, known=False),
         ),
         parameters={'weights': weights, 'offsets': offsets - centre @ weights},
-        error_bound=ErrorBound(0, model.error_bound.max_error_rate),
-        novelty_detector=None,
+        decisions=replace(
+            model.decisions,
+            error_bound=ErrorBound(0, model.decisions.error_bound.max_error_rate),
+            novelty_detector=None,
+        ),
         next_touch_model=None,
         examples=None,
         added_slides=(),

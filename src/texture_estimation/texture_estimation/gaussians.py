@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.types import AnyArray, Array
+from texture_core.types import Array
 from texture_estimation.decisions import window_count
 from texture_estimation.learners.learner import Codes
 from texture_estimation.numerics import group_means, log_softmax, shrunk_covariance
@@ -488,26 +487,6 @@ class TrainingExamples:
         """
         rows: Array = self.values[self.codes == code].astype(np.float64)
         return rows
-
-    def as_arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays for the model file.
-
-        Returns
-        -------
-        dict
-            'values' (n, n_features) float32, 'codes' and 'slides' (n,) int32.
-        """
-        return {
-            'values': self.values,
-            'codes': self.codes.astype(np.int32),
-            'slides': self.slides.astype(np.int32),
-        }
-
-    @classmethod
-    def from_arrays(cls, parameters: Mapping[str, Any]) -> TrainingExamples:
-        """Return what `as_arrays` gave."""
-        codes, slides = (np.asarray(parameters[name], dtype=np.intp) for name in ('codes', 'slides'))
-        return cls(np.asarray(parameters['values'], dtype=np.float32), codes, slides)
 
 
 def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A trained model and its files: NAME.skops, the card NAME.json, and the slides added since in the folder NAME.added.
+"""A trained model and its files: NAME.npz, the card NAME.json, and the slides added since in the folder NAME.added.
 
 Adding slides does not change the two files.
 """
@@ -7,7 +7,7 @@ Adding slides does not change the two files.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,35 +17,18 @@ import numpy as np
 from texture_core.errors import ModelMismatch
 from texture_core.types import Array
 from texture_estimation import model_files
-from texture_estimation.decisions import (
-    ConfidenceFloor,
-    Domain,
-    ErrorBound,
-    NoveltyDetector,
-    PredictionSets,
-    SlideNovelty,
-    StoppingRule,
-    space_means,
-)
+from texture_estimation.decisions import Decisions, ErrorBound, SlideNovelty, space_means
 from texture_estimation.gaussians import SlideGaussians, TrainingExamples
 from texture_estimation.learners.learner import Predictor, hidden_layer
 from texture_estimation.learners.mlp import MlpPredictor
-from texture_estimation.model_files import AddedSlide, read_added_slides
+from texture_estimation.model_files import AddedSlide, part_of, read_added_slides, tree_of
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.numerics import is_tied, log_softmax
 from texture_estimation.recipe import Recipe
 from texture_features.correction import CORRECTED, read_correction
 from texture_features.features import temporal as slide_onset
 
-# Names of their parts in the file.
-EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL = 'examples', 'novelty_detector', 'next_touch_model'
 LEAST_PROBABILITY = 1e-300  # so that its logarithm is finite
-# What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
-TRUSTED = (
-    'sklearn.naive_bayes.GaussianNB',
-    'sklearn.preprocessing._data.StandardScaler',
-    'sklearn.svm._classes.SVC',
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,18 +49,10 @@ class TextureModel:
         Fitted parameters of the learner, as the file stores them.
     tempering_exponent
         Exponent of the effective window count in the evidence, 0 to 1.
-    error_bound
-        What the held-out slides can show; it limits the confidence, and early stopping.
+    decisions
+        When a slide may end, and when its surface is known.
     training
         Facts about the training, for the card.
-    stopping_rule
-        Early stopping rule.
-    prediction_sets
-        Conformal prediction sets.
-    novelty_detector
-        Rejects unknown surfaces; with None no surface is rejected.
-    confidence_floor
-        Smallest confidence of known surfaces.
     next_touch_model
         Class-conditional Gaussians of each motion, to choose the next touch; None if all slides were alike.
     examples
@@ -86,8 +61,6 @@ class TextureModel:
         Slides added after the training.
     slide_gaussians
         Gaussians of whole slides that tell added textures; None until a slide is added.
-    domain
-        Conditions under which the model was trained; outside them it decides nothing.
 
     Examples
     --------
@@ -112,17 +85,12 @@ class TextureModel:
     recipe: Recipe
     parameters: Mapping[str, Any]
     tempering_exponent: float
-    error_bound: ErrorBound
+    decisions: Decisions
     training: Mapping[str, Any] = field(default_factory=dict)
-    stopping_rule: StoppingRule = field(default_factory=StoppingRule)
-    prediction_sets: PredictionSets = field(default_factory=PredictionSets)
-    novelty_detector: NoveltyDetector | None = None
-    confidence_floor: ConfidenceFloor = field(default_factory=ConfidenceFloor)
     next_touch_model: NextTouchModel | None = None
     examples: TrainingExamples | None = None
     added_slides: tuple[AddedSlide, ...] = ()
     slide_gaussians: SlideGaussians | None = None
-    domain: Domain = field(default_factory=Domain)
 
     @cached_property
     def predictor(self) -> Predictor:
@@ -145,28 +113,15 @@ class TextureModel:
         return len(self.labels) if self.learns_online else self.n_trained
 
     @cached_property
-    def active_novelty_detector(self) -> NoveltyDetector | None:
-        """Novelty detector that includes the added slides."""
-        if self.novelty_detector is None or not self.added_slides:
-            return self.novelty_detector
-        means = [
-            space_means(added.values, self.activations(added.values), self._overlap) for added in self.added_slides
-        ]
-        numbers = np.array([self.labels.index(added.label) for added in self.added_slides])
-        return self.novelty_detector.with_slides(means, numbers)
-
-    @cached_property
-    def active_confidence_floor(self) -> ConfidenceFloor:
-        """Smallest confidence of known surfaces; none with added slides, whose labels make all others less probable."""
-        return ConfidenceFloor() if self.added_slides else self.confidence_floor
-
-    @cached_property
-    def active_domain(self) -> Domain:
-        """Domain that includes the added slides."""
-        if not self.added_slides:
-            return self.domain
-        return self.domain.widened(
-            [added.conditions for added in self.added_slides], [added.label for added in self.added_slides]
+    def active_decisions(self) -> Decisions:
+        """Decisions that include the added slides."""
+        added = self.added_slides
+        if not added:
+            return self.decisions
+        means = [space_means(slide.values, self.activations(slide.values), self._overlap) for slide in added]
+        codes = np.array([self.labels.index(slide.label) for slide in added])
+        return self.decisions.with_slides(
+            means, codes, [slide.conditions for slide in added], [slide.label for slide in added]
         )
 
     @property
@@ -174,24 +129,6 @@ class TextureModel:
         """Distance of two windows of a slide over their length."""
         windows = self.recipe.feature_set.windows
         return min(windows.hop_s / windows.length_s, 1.0)
-
-    def decided(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
-        """Return whether a slide may end: by the stopping rule, if enough slides were held out to show its error rate.
-
-        Parameters
-        ----------
-        confidence
-            Probability of the best label, 0 to 1, as the evidence gives it.
-        effective_windows
-            Effective window count so far.
-        novelty_score
-            Novelty score so far.
-
-        Returns
-        -------
-        bool
-        """
-        return self.error_bound.shown and self.stopping_rule.decided(confidence, effective_windows, novelty_score)
 
     @cached_property
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
@@ -204,9 +141,9 @@ class TextureModel:
     def error_bound_of(self, number: int) -> ErrorBound:
         """Return what can be shown for the label of this number: few slides of an added texture show little."""
         if number < self.n_trained:
-            return self.error_bound
+            return self.decisions.error_bound
         slides = sum(added.label == self.labels[number] for added in self.added_slides)
-        return replace(self.error_bound, slides=slides)
+        return replace(self.decisions.error_bound, slides=slides)
 
     def predict_with_activations(self, X: Array) -> tuple[Array, Array | None]:
         """Return what `predictor` and `activations` give, with the hidden layer computed once where both have it.
@@ -330,13 +267,14 @@ class TextureModel:
         answer = self.predict_log_proba(nothing)
         if answer.shape != (len(self.labels),) or np.isnan(answer).any():
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
-        self.prediction_sets.members(np.exp(answer), 1.0)
-        self.stopping_rule.decided(0.5, 1.0)
-        self.confidence_floor.reached(0.5, 1.0)
-        if self.novelty_detector is not None:
-            novelty = SlideNovelty(self.novelty_detector.distances, len(self.labels))
+        decisions, detector = self.decisions, self.decisions.novelty_detector
+        decisions.prediction_sets.members(np.exp(answer), 1.0)
+        decisions.stopping_rule.decided(0.5, 1.0)
+        decisions.confidence_floor.reached(0.5, 1.0)
+        if detector is not None:
+            novelty = SlideNovelty(detector.distances, len(self.labels))
             novelty.add(nothing, self.activations(nothing), 0, 1.0)
-            self.novelty_detector.novelty_score(novelty.scores(0, 0.0), 1.0)
+            detector.novelty_score(novelty.scores(0, 0.0), 1.0)
         if self.slide_gaussians is not None:
             self.slide_gaussians.check(nothing)
         if self.next_touch_model is not None:
@@ -347,38 +285,23 @@ class TextureModel:
             raise ModelMismatch(f'the exponent of its evidence is {self.tempering_exponent}; allowed is 0 to 1')
 
     @property
-    def card(self) -> dict[str, Any]:
-        """What the card says, in the form of JSON."""
+    def tree(self) -> dict[str, Any]:
+        """What the two files hold: plain values, and arrays as leaves."""
         return {
-            'format': model_files.FORMAT,
-            'name': self.name,
+            **model_files.common_tree(self),
             'labels': list(self.trained_labels),
-            'feature_set': self.feature_set.partition(CORRECTED)[0],
-            'features': list(self.names),
             'tempering_exponent': self.tempering_exponent,
-            'stopping_rule': asdict(self.stopping_rule),
-            'error_bound': asdict(self.error_bound),
-            'prediction_sets': asdict(self.prediction_sets),
-            'confidence_floor': asdict(self.confidence_floor),
-            'domain': self.domain.as_card(),
-            'motions': [asdict(motion) for motion in self.next_touch_model.gaussians] if self.next_touch_model else [],
-            'training': dict(self.training),
-            'recipe': self.recipe.as_mapping(),
-            'recipe_name': self.recipe.name,
+            'decisions': tree_of(self.decisions),
+            'next_touch_model': tree_of(self.next_touch_model),
+            'examples': tree_of(self.examples),
         }
 
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
-        """Write NAME.skops and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.skops.
+        """Write NAME.npz and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.npz.
 
         Added slides are not written: they lie beside the model to which they were added.
         """
-        more = {
-            EXAMPLES: self.examples,
-            NOVELTY_DETECTOR: self.novelty_detector,
-            NEXT_TOUCH_MODEL: self.next_touch_model,
-        }
-        kept = {name: part.as_arrays() for name, part in more.items() if part}
-        return model_files.write(path, {**self.parameters, **kept}, {**self.card, **(facts or {})})
+        return model_files.write(path, {**self.tree, **(facts or {})})
 
 
 def load_model(path: str | Path) -> TextureModel:
@@ -395,37 +318,22 @@ def load_model(path: str | Path) -> TextureModel:
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
     target = model_files.model_stem(path)
-    card, content = model_files.read(path)
-    if 'regressor' in card.get('recipe', {}):
-        raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")
+    tree = model_files.read(path, of='learner')
     with model_files.usable(target):
-        recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
+        recipe = Recipe.from_mapping(tree['recipe'], str(tree['recipe_name']))
+        common = model_files.common_parts(tree)
         correction = read_correction(target)
-        feature_set = str(card['feature_set'])
         if correction is not None:
             recipe = replace(recipe, feature_set=replace(recipe.feature_set, correction=correction, _layouts={}))
-            feature_set += f'{CORRECTED}{correction.fingerprint}'
-        parameters = model_files.load_parameters(content, TRUSTED, estimators=recipe.learner_name == 'sklearn')
-        examples, novelty_detector, gaussians = (
-            parameters.pop(name, None) for name in (EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL)
-        )
+            common['feature_set'] += f'{CORRECTED}{correction.fingerprint}'
         model = TextureModel(
-            name=str(card['name']),
-            labels=tuple(map(str, card['labels'])),
-            names=tuple(map(str, card['features'])),
-            feature_set=feature_set,
+            **common,
             recipe=recipe,
-            parameters=parameters,
-            tempering_exponent=float(card['tempering_exponent']),
-            error_bound=ErrorBound.from_card(card),
-            training=dict(card['training']),
-            stopping_rule=StoppingRule(**card['stopping_rule']),
-            prediction_sets=PredictionSets(**{name: _tuples(value) for name, value in card['prediction_sets'].items()}),
-            novelty_detector=NoveltyDetector.from_arrays(novelty_detector) if novelty_detector else None,
-            confidence_floor=ConfidenceFloor.from_card(card),
-            next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
-            examples=TrainingExamples.from_arrays(examples) if examples else None,
-            domain=Domain.from_card(card.get('domain')),
+            labels=part_of(tuple[str, ...], tree.get('labels'), 'labels'),
+            tempering_exponent=part_of(float, tree.get('tempering_exponent'), 'tempering_exponent'),
+            decisions=part_of(Decisions, tree.get('decisions'), 'decisions'),
+            next_touch_model=part_of(NextTouchModel | None, tree.get('next_touch_model'), 'next_touch_model'),
+            examples=part_of(TrainingExamples | None, tree.get('examples'), 'examples'),
         )
         model.validate()
     added_slides = read_added_slides(target, model.feature_set, model.names)
@@ -437,7 +345,3 @@ def load_model(path: str | Path) -> TextureModel:
         return with_added
     except model_files.BROKEN as error:
         raise ModelMismatch(f"the added slides of model '{target}' cannot be used: {error}; move them away") from error
-
-
-def _tuples(value: Any) -> Any:
-    return tuple(map(float, value)) if isinstance(value, list) else float(value)

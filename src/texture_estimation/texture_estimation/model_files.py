@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files of a model, read without running code: NAME.skops, the card NAME.json, added slides in NAME.added."""
+"""The files of a model, read without running code: NAME.npz, the card NAME.json, added slides in NAME.added."""
 
 from __future__ import annotations
 
@@ -9,123 +9,91 @@ import json
 import os
 import struct
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
-from functools import lru_cache
-from importlib import import_module
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from texture_core.config import (
-    MAX_CARD_BYTES,
-    MB,
-    Archive,
-    FileRefused,
-    library,
-    load_json,
-    parse_json,
-    read_bounded,
-)
-from texture_core.errors import InvalidParameter, MissingLibrary, ModelMismatch, TextureError
-from texture_core.types import Array
+from texture_core.config import MAX_CARD_BYTES, MB, Arrays, FileRefused, load_json, read_bounded, safe_repr
+from texture_core.errors import InvalidData, MissingLibrary, ModelMismatch, TextureError
+from texture_core.types import AnyArray, Array
 from texture_features.correction import CORRECTED
 from texture_features.examples import SlideConditions
 
 # --------------------
-# Read a .skops file that holds nothing but dicts, lists, plain values and arrays, without the library that wrote it.
-#
-# That library knows every class of scikit-learn, and loads all of it first: seconds and 150 MB, of which a node that
-# classifies needs nothing. What is not as plain as said here is left to it.
-
-Node = Mapping[str, Any]
-SCHEMA = 'schema.json'
-PLAIN_SKOPS_MAX_SCHEMA_BYTES = 5_000_000
+# The parts of a model as a tree: mappings, lists, plain values, and arrays as leaves.
 
 
-class NotPlain(Exception):
-    """Something else than plain values and arrays.
+def tree_of(part: Any) -> Any:
+    """Return a part of a model as a tree: of a dataclass its fields by name."""
+    if is_dataclass(part) and not isinstance(part, type):
+        return {item.name: tree_of(getattr(part, item.name)) for item in fields(part)}
+    if isinstance(part, Mapping):
+        return {str(name): tree_of(value) for name, value in part.items()}
+    return [tree_of(value) for value in part] if isinstance(part, tuple | list) else part
 
-    Examples
-    --------
-    >>> try:
-    ...     raise NotPlain("it holds a function")
-    ... except NotPlain as error:
-    ...     print(error)
-    it holds a function
+
+def part_of(kind: Any, value: Any, where: str) -> Any:
+    """Return what `tree_of` made a tree of.
+
+    Parameters
+    ----------
+    kind
+        Its type: a dataclass, a tuple, a mapping by names, an array, or a plain one.
+    value
+        The tree.
+    where
+        What it is, for the sentence of an error.
+
+    Raises
+    ------
+    InvalidData
+        If something in it is missing, unknown or of another type.
     """
+    origin, given = get_origin(kind), get_args(kind)
+    found: Any = None
+    if is_dataclass(kind):
+        found = _dataclass_of(kind, value, where)
+    elif origin is UnionType:  # such a part or None
+        return None if value is None else part_of(given[0], value, where)
+    elif origin is tuple and isinstance(value, list) and (given[-1] is ... or len(given) == len(value)):
+        kinds = given[:1] * len(value) if given[-1] is ... else given
+        found = tuple(part_of(own, item, where) for own, item in zip(kinds, value, strict=True))
+    elif origin is Mapping and isinstance(value, Mapping):
+        found = {name: part_of(given[1], item, f'{where}, {name}') for name, item in value.items()}
+    elif origin is np.ndarray and isinstance(value, np.ndarray) and value.dtype == get_args(given[1])[0]:
+        found = value
+    elif kind is float and isinstance(value, int | float) and not isinstance(value, bool):
+        found = float(value)
+    elif kind is Any or (isinstance(kind, type) and type(value) is kind):
+        return value
+    if found is None:
+        raise InvalidData(f'{where} is {safe_repr(value):.80}; {kind} is needed')
+    return found
 
 
-def read_plain_skops(file: Archive) -> dict[str, Any] | None:
-    """Return what a file holds; None if that is not plain."""
-    try:
-        parameters = _build(parse_json(file.read(SCHEMA, PLAIN_SKOPS_MAX_SCHEMA_BYTES).decode()), file)
-    except (NotPlain, KeyError, TypeError, UnicodeDecodeError):
-        return None
-    return parameters if isinstance(parameters, dict) else None
-
-
-def _build(node: Node, file: Archive) -> Any:
-    kind = node['__loader__'], node['__module__']
-    if kind not in KINDS:
-        raise NotPlain(kind)
-    return KINDS[kind](node, file)
-
-
-def _dict(node: Node, file: Archive) -> dict[str, Any]:
-    if node['__class__'] != 'dict' or any(key['__class__'] != 'str' for key in node['key_types']['content']):
-        raise NotPlain(node['__class__'])
-    return {name: _build(value, file) for name, value in node['content'].items()}
-
-
-def _list(node: Node, file: Archive) -> list[Any]:
-    if node['__class__'] != 'list':
-        raise NotPlain(node['__class__'])
-    return [_build(value, file) for value in node['content']]
-
-
-def _value(node: Node, _file: Archive) -> Any:
-    value = parse_json(node['content'])
-    if not (value is None or isinstance(value, (bool, int, float, str))):
-        raise NotPlain(type(value))
-    return value
-
-
-def _array(node: Node, file: Archive) -> Any:
-    if node['type'] != 'numpy':
-        raise NotPlain(node['type'])
-    array = file.array(node['file'])
-    return array if node['__class__'] == 'ndarray' else array[()]
-
-
-# By loader and module, as the schema names them.
-KINDS: Mapping[tuple[str, str], Callable[[Node, Archive], Any]] = {
-    ('DictNode', 'builtins'): _dict,
-    ('ListNode', 'builtins'): _list,
-    ('JsonNode', 'builtins'): _value,
-    ('NdArrayNode', 'numpy'): _array,
-}
+def _dataclass_of(kind: Any, value: Any, where: str) -> Any:
+    types = get_type_hints(kind)
+    if not isinstance(value, Mapping):
+        raise InvalidData(f'{where} is {safe_repr(value):.80}; the entries {", ".join(types)} are needed')
+    different = set(types) ^ set(value)
+    if different:
+        raise InvalidData(f'{where} has the entries {", ".join(value)}; {", ".join(types)} are needed')
+    return kind(**{name: part_of(own, value[name], f'{where}, {name}') for name, own in types.items()})
 
 
 # --------------------
-# The two files that hold a model, whatever it classifies: NAME.skops with what was trained, and the card NAME.json.
+# The two files that hold a model, whatever it answers: the tree as the card NAME.json, the arrays in it as NAME.npz.
 
 FORMAT = 1
-SKOPS = ('skops.io', 'new models, and models with parts of scikit-learn,', 'models')
-ENDINGS = ('.skops', '.json')
-MAX_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
-MAX_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
-MAX_ESTIMATOR_SCHEMA_BYTES = 10 * MB  # a thousand trees
-NODES = ('DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode')
-# What an estimator of scikit-learn holds beside these; its trees are checked before they are used.
-ESTIMATOR_NODES = ('TreeNode', 'RandomStateNode')
-ESTIMATOR_PARTS = (
-    'sklearn.calibration._CalibratedClassifier',
-    'sklearn.neural_network._stochastic_optimizers.AdamOptimizer',
-    'sklearn.neural_network._stochastic_optimizers.SGDOptimizer',
-)
+ENDINGS = ('.npz', '.json')
+MAX_BYTES = 200 * MB  # of a file of arrays; ensembles of networks over many features come to 20 MB
+MAX_UNPACKED_BYTES = 300 * MB  # predictors hold copies of arrays: so a model takes less than 1 GB
+NUMBERS = ('float32', 'float64', 'int32', 'int64')  # smaller types would grow when they are computed with
 # What unpacking, and using what came out, raises at files that are damaged or made to do harm, found by trying.
 BROKEN = (
     TextureError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError,
@@ -159,14 +127,14 @@ def model_stem(path: str | Path) -> Path:
 
 
 def both_files(path: str | Path) -> tuple[Path, Path]:
-    """Return NAME.skops and NAME.json of a model that is named by either, or by both without the ending."""
+    """Return NAME.npz and NAME.json of a model that is named by either, or by both without the ending."""
     target = model_stem(path)
-    parameters, card = (target.with_name(target.name + ending) for ending in ENDINGS)
-    return parameters, card
+    arrays, card = (target.with_name(target.name + ending) for ending in ENDINGS)
+    return arrays, card
 
 
-def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, Any]) -> Path:
-    """Write NAME.skops and NAME.json, and return NAME.skops.
+def write(path: str | Path, tree: Mapping[str, Any]) -> Path:
+    """Write NAME.npz and NAME.json, and return NAME.npz.
 
     A reader never sees half a file: both are written beside their places and then moved.
 
@@ -174,142 +142,116 @@ def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, An
     ----------
     path
         Path of the model, with or without its ending.
-    parameters
-        What was trained: arrays, plain values and trusted types.
-    card
-        What people may read about it: plain values.
+    tree
+        What was trained, and what people may read about it.
 
     Returns
     -------
     Path
-        Of NAME.skops.
+        Of NAME.npz.
     """
-    skops = library(*SKOPS)  # takes a second, and only who saves needs it
-
-    parameters_path, card_path = both_files(path)
+    arrays_path, card_path = both_files(path)
     card_path.parent.mkdir(parents=True, exist_ok=True)
-    content = skops.dumps(dict(parameters), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
-    card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
-    replace_file(parameters_path, content)
+    arrays: dict[str, AnyArray] = {}
+    card = _without_arrays(tree, '', arrays)
+    packed = io.BytesIO()
+    np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
+    content = packed.getvalue()
+    card = {'format': FORMAT, **card, 'sha256': hashlib.sha256(content).hexdigest()}
+    replace_file(arrays_path, content)
     replace_file(card_path, (json.dumps(card, indent=1) + '\n').encode())
-    return parameters_path
+    return arrays_path
 
 
-def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
-    """Return the card, and the bytes that belong to it; `path` is that of either file, or of both without the ending.
+def _without_arrays(tree: Any, place: str, arrays: dict[str, AnyArray]) -> Any:
+    """Return a tree without its arrays, which are added to a mapping by their places, such as 'parameters/mean'."""
+    if isinstance(tree, np.ndarray):
+        arrays[place] = tree
+        return None
+    if isinstance(tree, np.generic):
+        return tree.item()
+    if isinstance(tree, Mapping):
+        kept = {name: _without_arrays(part, f'{place}/{name}'.lstrip('/'), arrays) for name, part in tree.items()}
+        return {name: part for name, part in kept.items() if part is not None or tree[name] is None}
+    if isinstance(tree, list):
+        return [_without_arrays(part, f'{place}/{number}', arrays) for number, part in enumerate(tree)]
+    return tree
 
-    Raises
-    ------
-    ModelMismatch
-        If a file is missing, damaged, or does not belong to the other.
-    """
-    parameters_path, card_path = both_files(path)
-    card = _read_card(card_path, path)
-    return card, _read_parameters(parameters_path, str(card.get('sha256')))
 
-
-def load_parameters(content: bytes, trusted: Sequence[str], *, estimators: bool = False) -> dict[str, Any]:
-    """Return what was trained; nothing is built of types that are not trusted, and no code of the file is run.
+def read(path: str | Path, *, of: str) -> dict[str, Any]:
+    """Return the tree that `write` was given; nothing in the files is run.
 
     Parameters
     ----------
-    content
-        Bytes of NAME.skops.
-    trusted
-        Types that it may hold beyond plain values and arrays.
-    estimators
-        Whether it may hold any estimator of scikit-learn and its decision trees, too.
-
-    Returns
-    -------
-    dict
-        What `write` was given.
+    path
+        Path of either file, or of both without the ending.
+    of
+        What its recipe names: 'learner' or 'regressor'.
 
     Raises
     ------
     ModelMismatch
-        If it holds something else.
+        If a file is missing, damaged, of the other kind, or does not belong to the other.
     """
-    with Archive(io.BytesIO(content)) as file:
-        plain = read_plain_skops(file)
-    if plain is not None:
-        return plain
-    with Archive(io.BytesIO(content)) as file:
-        trusted = _check_parts(file, trusted, estimators)
-    skops = library(*SKOPS)  # takes seconds, and few models need it
-
-    unexpected = sorted(set(skops.get_untrusted_types(data=content)) - set(trusted))
-    if unexpected:
-        raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
-    return dict(skops.loads(content, trusted=list(trusted)))
-
-
-def check_storable(parameters: Mapping[str, Any], name: str) -> None:
-    """Raise InvalidParameter if a model file could not hold an estimator of scikit-learn, or not be read again.
-
-    Raises
-    ------
-    InvalidParameter
-        If it could not.
-    """
-    skops = library(*SKOPS)
-
+    arrays_path, card_path = both_files(path)
+    tree = _read_card(card_path, path)
+    if of not in tree['recipe']:
+        answers, node = KINDS[of]
+        raise ModelMismatch(f"model '{model_stem(path)}' {answers}; load it in the {node}")
     try:
-        content = skops.dumps(dict(parameters))
-        with Archive(io.BytesIO(content)) as file:
-            _check_parts(file, (), estimators=True)
-    except BROKEN as error:
-        raise InvalidParameter(
-            f"'{name}' cannot be stored as a model: {error}; use another estimator or other parameters "
-            '(neighbours with algorithm: brute, fewer trees)'
+        content = read_bounded(arrays_path, MAX_BYTES)
+    except (OSError, FileRefused) as error:
+        raise ModelMismatch(
+            f"model file '{arrays_path}' cannot be read: {error}; it belongs beside its card"
         ) from error
+    if hashlib.sha256(content).hexdigest() != tree.get('sha256'):
+        raise ModelMismatch(
+            f"model file '{arrays_path}' is damaged or of another card; copy both files again or train again"
+        )
+    with usable(model_stem(path)):
+        arrays = Arrays(io.BytesIO(content), MAX_UNPACKED_BYTES)
+        for name in arrays.names:
+            *way, last = name.split('/')
+            place: Any = tree
+            for step in way:
+                place = place[int(step)] if isinstance(place, list) else place.setdefault(step, {})
+            place[last] = _numbers(arrays[name], name)
+    return tree
 
 
-def _check_parts(file: Archive, trusted: Sequence[str], estimators: bool) -> list[str]:
-    """Return the trusted types; raise ModelMismatch or FileRefused unless skops, which counts nothing, may read a file.
-
-    A member may be named by many nodes, each of which makes an array of its own; and some kinds of node would read
-    archives within the archive, or call functions.
-    """
-    schema = parse_json(file.read(SCHEMA, MAX_ESTIMATOR_SCHEMA_BYTES if estimators else MAX_SCHEMA_BYTES).decode())
-    kinds = (*NODES, *ESTIMATOR_NODES) if estimators else NODES
-    found = set(trusted)
-    for node in _nodes(schema):
-        kind, name = str(node['__loader__']), f'{node.get("__module__")}.{node.get("__class__")}'
-        known = name in found or (estimators and _is_estimator(name))
-        if kind not in kinds or (kind == 'ObjectNode' and not known):
-            raise ModelMismatch(f'it holds {name} ({kind}), which no model of this suite holds')
-        if kind in ('ObjectNode', 'TreeNode'):
-            found.add(name)
-        if kind == 'NdArrayNode' and node.get('type') == 'numpy':
-            file.array(str(node['file']))
-    return sorted(found)
+def common_tree(model: Any) -> dict[str, Any]:
+    """Return what the trees of models of textures and of roughness have in common."""
+    return {
+        'name': model.name,
+        'feature_set': model.feature_set.partition(CORRECTED)[0],
+        'features': list(model.names),
+        'training': tree_of(model.training),
+        'recipe': model.recipe.as_mapping(),
+        'recipe_name': model.recipe.name,
+        'parameters': tree_of(model.parameters),
+    }
 
 
-@lru_cache(maxsize=1000)
-def _is_estimator(name: str) -> bool:
-    """Return whether a name is that of an estimator of scikit-learn, or of a part of one that holds plain values."""
-    if name in ESTIMATOR_PARTS:
-        return True
-    module, _, cls_name = name.rpartition('.')
-    if not module.startswith('sklearn.'):
-        return False
-    from sklearn.base import BaseEstimator  # noqa: PLC0415  # takes a second
-
-    try:
-        cls = getattr(import_module(module), cls_name, None)
-    except ImportError:
-        return False
-    return isinstance(cls, type) and issubclass(cls, BaseEstimator)
+def common_parts(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Return fields of a model from what `common_tree` gave; InvalidData if they have other types."""
+    return {
+        'name': part_of(str, tree.get('name'), 'name'),
+        'feature_set': part_of(str, tree.get('feature_set'), 'feature_set'),
+        'names': part_of(tuple[str, ...], tree.get('features'), 'features'),
+        'training': part_of(Mapping[str, Any], tree.get('training'), 'training'),
+        'parameters': part_of(Mapping[str, Any], tree.get('parameters'), 'parameters'),
+    }
 
 
-def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:
-    """Yield the nodes of a schema."""
-    if isinstance(value, Mapping) and '__loader__' in value:
-        yield value
-    parameters = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    for part in parameters:
-        yield from _nodes(part)
+# What a model that does not name one of these in its recipe does, and where it belongs.
+KINDS = {'learner': ('estimates roughness', 'roughness_estimator'), 'regressor': ('classifies textures', 'classifier')}
+PACKED = 'packed'  # ends the name of an array of bytes, which a library unpacks
+
+
+def _numbers(array: AnyArray, name: str) -> AnyArray:
+    if array.dtype.name not in NUMBERS and not (name.endswith(PACKED) and array.dtype == np.uint8):
+        raise InvalidData(f"its array '{name}' holds {array.dtype}; {', '.join(NUMBERS)} are allowed")
+    return array
 
 
 def replace_file(path: Path, content: bytes) -> None:
@@ -332,16 +274,6 @@ def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
     if not isinstance(card, dict) or card.get('format') != FORMAT or not isinstance(card.get('recipe'), dict):
         raise ModelMismatch(f"'{path}' is not the card of a model of format {FORMAT}; give the path of a trained model")
     return card
-
-
-def _read_parameters(path: Path, digest: str) -> bytes:
-    try:
-        content = read_bounded(path, MAX_BYTES)
-    except (OSError, FileRefused) as error:
-        raise ModelMismatch(f"model file '{path}' cannot be read: {error}; it belongs beside its card") from error
-    if hashlib.sha256(content).hexdigest() != digest:
-        raise ModelMismatch(f"model file '{path}' is damaged or of another card; copy both files again or train again")
-    return content
 
 
 # --------------------

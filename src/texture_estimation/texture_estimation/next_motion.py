@@ -6,8 +6,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -119,8 +120,15 @@ class NextTouchModel:
     projection : (n_features, n_axes)
         From the mean features of a slide to axes along which textures differ, and on which what is uncertain about a
         slide of one texture under one motion has the covariance 1.
-    gaussians
-        Class-conditional Gaussians of each motion.
+    motions
+        Those that were trained.
+    means : (n_motions, n_textures, n_axes)
+        Of the textures under each motion, on the axes.
+
+    Raises
+    ------
+    InvalidData
+        If the shapes of the arrays contradict each other.
 
     Examples
     --------
@@ -137,7 +145,20 @@ class NextTouchModel:
 
     textures: tuple[str, ...]
     projection: Array
-    gaussians: Mapping[SlideMotion, ClassConditionalGaussian]
+    motions: tuple[SlideMotion, ...]
+    means: Array
+
+    def __post_init__(self) -> None:
+        if self.means.shape != (len(self.motions), len(self.textures), *self.projection.shape[1:]):
+            raise InvalidData(
+                f'means of shape {self.means.shape} do not fit {len(self.motions)} motions and {len(self.textures)} '
+                'textures'
+            )
+
+    @cached_property
+    def gaussians(self) -> Mapping[SlideMotion, ClassConditionalGaussian]:
+        """Class-conditional Gaussians of each motion."""
+        return {motion: ClassConditionalGaussian(own) for motion, own in zip(self.motions, self.means, strict=True)}
 
     @classmethod
     def fit(cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion]) -> NextTouchModel:
@@ -177,8 +198,7 @@ class NextTouchModel:
                 'one slide over each texture with each motion does not tell how much slides differ; add some'
             )
         fit, sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
-        gaussians = {motion: ClassConditionalGaussian(sure * own) for motion, own in zip(made, fit.means, strict=True)}
-        return cls(tuple(names.tolist()), sure * fit.projection, gaussians)
+        return cls(tuple(names.tolist()), sure * fit.projection, tuple(made), sure * fit.means)
 
     @classmethod
     def of_slides(
@@ -314,37 +334,6 @@ class NextTouchModel:
         for motion in self.gaussians:
             if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
                 raise InvalidData(f'what textures look like under {motion} is not finite')
-
-    def as_arrays(self) -> dict[str, Any]:
-        """Return plain values and arrays for the model file."""
-        return {
-            'textures': list(self.textures),
-            'projection': self.projection,
-            'motions': [asdict(motion) for motion in self.gaussians],
-            'means': np.stack([gaussians.means for gaussians in self.gaussians.values()]),
-        }
-
-    @classmethod
-    def from_arrays(cls, parameters: Mapping[str, Any]) -> NextTouchModel:
-        """Return what `as_arrays` gave.
-
-        Raises
-        ------
-        InvalidData
-            If the shapes of the arrays contradict each other.
-        """
-        projection, means = (np.asarray(parameters[name], dtype=np.float64) for name in ('projection', 'means'))
-        motions = [SlideMotion(**motion) for motion in parameters['motions']]
-        textures = tuple(map(str, parameters['textures']))
-        if means.shape != (len(motions), len(textures), *projection.shape[1:]):
-            raise InvalidData(
-                f'means of shape {means.shape} do not fit {len(motions)} motions and {len(textures)} textures'
-            )
-        return cls(
-            textures,
-            projection,
-            {motion: ClassConditionalGaussian(own) for motion, own in zip(motions, means, strict=True)},
-        )
 
     def _gaussian(self, motion: SlideMotion) -> ClassConditionalGaussian:
         if motion not in self.gaussians:

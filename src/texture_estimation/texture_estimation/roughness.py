@@ -24,6 +24,7 @@ from texture_core.types import NANOSECONDS, AnyArray, Array, FeatureVector, Roug
 from texture_estimation import model_files
 from texture_estimation.evidence import no_window
 from texture_estimation.learners.learner import Codes, standardisation
+from texture_estimation.model_files import part_of
 from texture_estimation.recipe import TrainingParams, fingerprint_difference
 from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet, choose, read_recipe
@@ -716,7 +717,7 @@ def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
 
 
 # --------------------
-# A trained roughness model: NAME.skops, which holds plain arrays only, and its card NAME.json.
+# A trained roughness model.
 
 NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
 
@@ -858,25 +859,19 @@ class RoughnessModel:
         return self.predictor(X.take(self._columns, axis=-1))
 
     @property
-    def card(self) -> dict[str, Any]:
-        """What the card says, in the form of JSON."""
+    def tree(self) -> dict[str, Any]:
+        """What the two files hold: plain values, and arrays as leaves."""
         return {
-            'format': model_files.FORMAT,
-            'name': self.name,
+            **model_files.common_tree(self),
             'target': 'roughness grade, 1 (smooth) to 5 (rough), as people give it: an opinion, not a depth',
-            'feature_set': self.feature_set,
-            'features': list(self.names),
             'grades': dict(self.grades),
             'calibration': asdict(self.calibration),
             'limits': dict(self.limits),
-            'training': dict(self.training),
-            'recipe': self.recipe.as_mapping(),
-            'recipe_name': self.recipe.name,
         }
 
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
-        """Write NAME.skops and NAME.json; `facts` are added to the card. Return NAME.skops."""
-        return model_files.write(path, self.parameters, {**self.card, **(facts or {})})
+        """Write NAME.npz and NAME.json; `facts` are added to the card. Return NAME.npz."""
+        return model_files.write(path, {**self.tree, **(facts or {})})
 
 
 def load_roughness_model(path: str | Path) -> RoughnessModel:
@@ -888,20 +883,14 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
     target = model_files.model_stem(path)
-    card, content = model_files.read(path)
-    if 'regressor' not in card.get('recipe', {}):
-        raise ModelMismatch(f"model '{target}' classifies textures; load it in the classifier")
+    tree = model_files.read(path, of='regressor')
     with model_files.usable(target):
         model = RoughnessModel(
-            name=str(card['name']),
-            names=tuple(map(str, card['features'])),
-            feature_set=str(card['feature_set']),
-            recipe=RoughnessRecipe.from_mapping(card['recipe'], str(card['recipe_name'])),
-            parameters=model_files.load_parameters(content, ()),
-            calibration=Calibration(**card['calibration']),
-            limits=dict(card['limits']),
-            grades=dict(card['grades']),
-            training=dict(card['training']),
+            **model_files.common_parts(tree),
+            recipe=RoughnessRecipe.from_mapping(tree['recipe'], str(tree['recipe_name'])),
+            calibration=part_of(Calibration, tree.get('calibration'), 'calibration'),
+            limits=part_of(Mapping[str, float], tree.get('limits'), 'limits'),
+            grades=part_of(Mapping[str, float], tree.get('grades'), 'grades'),
         )
         grade, std = model.grade(np.zeros(len(model.names)))
     if np.shape(grade) or np.shape(std):

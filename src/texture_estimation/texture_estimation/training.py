@@ -23,6 +23,7 @@ from texture_estimation.decisions import (
     SCORES,
     ClassDistance,
     ConfidenceFloor,
+    Decisions,
     Domain,
     ErrorBound,
     Mask,
@@ -751,10 +752,14 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         recipe=recipe,
         parameters=fitted.parameters,
         tempering_exponent=tempering_exponent,
-        stopping_rule=rule,
-        prediction_sets=fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
-        novelty_detector=novelty_detector,
-        confidence_floor=floor,
+        decisions=Decisions(
+            ErrorBound(min(len(slides_held_out), len(np.unique(made.groups))), decisions.max_error_rate),
+            rule,
+            fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
+            floor,
+            _domain(made, recipe.training),
+            novelty_detector,
+        ),
         next_touch_model=_fit_next_touch_model(made),
         training={
             'windows': len(codes),
@@ -765,8 +770,6 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'held_out_window_accuracy': _held_out_accuracy(fitted, codes),
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
-        domain=_domain(made, recipe.training),
-        error_bound=ErrorBound(min(len(slides_held_out), len(np.unique(made.groups))), decisions.max_error_rate),
     )
 
 

@@ -237,7 +237,7 @@ def test_the_table_has_a_row_for_each_fold_and_the_file_all_figures(tmp_path: Pa
     written = json.loads((tmp_path / 'figures.json').read_text())
     assert written == result.as_json()
     assert written['folds'][0]['slides']['cork/1'] == 'cork'
-    assert written['feature_set'] == result.folds[0].model.card['feature_set']
+    assert written['feature_set'] == result.folds[0].model.feature_set
     assert written['version'] == version('texture_evaluation')
     with pytest.raises(InvalidParameter, match='cannot be written'):
         write_json(result.as_json(), tmp_path / 'nowhere' / 'figures.json')

@@ -41,15 +41,16 @@ def model() -> TextureModel:
 
 
 def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: TextureModel) -> None:
-    lines = summary(model, Path('model.skops'))
+    lines = summary(model, Path('model.npz'))
     assert lines[0] == "recipe 'tiny' trained on 2 surfaces: cork, felt"
     assert 'too few slides for early stopping: at most 2 % wrong decisions need 149 slides or more' in lines[2]
     assert 'with 6 the confidence is 0.61 at most' in lines[2]
 
 
 def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:
-    enough = dataclasses.replace(model, error_bound=ErrorBound(149, 0.02))
-    assert not any('certain' in line for line in summary(enough, Path('model.skops')))
+    decisions = dataclasses.replace(model.decisions, error_bound=ErrorBound(149, 0.02))
+    enough = dataclasses.replace(model, decisions=decisions)
+    assert not any('certain' in line for line in summary(enough, Path('model.npz')))
 
 
 GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')
@@ -62,7 +63,7 @@ def table(folder, lines):
 
 
 def test_bags_and_grades_make_a_model_whose_card_says_from_what(simulated, tmp_path) -> None:
-    train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-4', tmp_path / 'rough.skops')
+    train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-4', tmp_path / 'rough.npz')
     model = load_roughness_model(tmp_path / 'rough')
     assert model.name == 'rough'
     assert model.grades == {'glass': 1.0, 'leather': 3.0, 'ridge_2mm_deep': 5.0}
@@ -73,7 +74,7 @@ def test_bags_and_grades_make_a_model_whose_card_says_from_what(simulated, tmp_p
 
 def test_both_files_of_a_model_report_the_extractor_how_to_describe(simulated, tmp_path) -> None:
     train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-2', tmp_path / 'rough')
-    by_card, by_model = (read_recipe(str(tmp_path / name))[1] for name in ('rough.json', 'rough.skops'))
+    by_card, by_model = (read_recipe(str(tmp_path / name))[1] for name in ('rough.json', 'rough.npz'))
     assert by_card == by_model
     assert 'inputs' in by_card
 
@@ -83,8 +84,8 @@ def test_a_surface_without_a_grade_is_named(simulated, tmp_path) -> None:
         train_grades_from_bags('roughness', [simulated], table(tmp_path, [GRADES[0], GRADES[1], GRADES[3]]))
 
 
-@pytest.mark.parametrize('model', ['m1', 'm1.skops', 'm1.json'])
-@pytest.mark.parametrize('output', ['m1.json', './m1.json', 'm1.skops', 'sub/../m1.json'])
+@pytest.mark.parametrize('model', ['m1', 'm1.npz', 'm1.json'])
+@pytest.mark.parametrize('output', ['m1.json', './m1.json', 'm1.npz', 'sub/../m1.json'])
 def test_the_files_of_a_model_that_is_read_are_not_overwritten(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, model: str, output: str
 ) -> None:
@@ -150,7 +151,7 @@ def test_a_model_is_saved_with_the_data_it_was_trained_on(simulated: Path, tmp_p
     assert load_model(tmp_path / 'mine').name == 'mine'
     card = json.loads((tmp_path / 'mine.json').read_text())
     assert card['data'] == {'bags': ['glass', 'leather', 'ridge_2mm_deep'], 'slides': '1-3'}
-    assert evaluate(load_model(tmp_path / 'mine.skops'), [simulated], '4').as_json()['window_accuracy'] > 0.9
+    assert evaluate(load_model(tmp_path / 'mine.npz'), [simulated], '4').as_json()['window_accuracy'] > 0.9
 
 
 def test_fast_channels_leave_the_slow_input_out(simulated: Path) -> None:

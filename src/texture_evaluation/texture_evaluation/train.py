@@ -39,7 +39,7 @@ def train_from_bags(
     slides
         Which slides of each surface, such as '1-30'; '' for all.
     out
-        Path of the model, with or without .skops; not saved if None.
+        Path of the model, with or without .npz; not saved if None.
     channels
         'fast' leaves all inputs of the recipe but `signal` out.
     namespace
@@ -82,7 +82,7 @@ def train_grades_from_bags(
     slides
         Which slides of each surface, such as '1-30'; '' for all.
     out
-        Path of the model, with or without .skops; not saved if None.
+        Path of the model, with or without .npz; not saved if None.
     namespace
         Of the finger, if bags hold several.
 
@@ -111,7 +111,7 @@ def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures
 
 def _name(out: str | Path | None, recipe: str) -> str:
     """Return the name of a model: that of its file, or else of its recipe."""
-    return Path(out).name.removesuffix('.skops') if out else recipe
+    return Path(out).name.removesuffix('.npz') if out else recipe
 
 
 def _save(

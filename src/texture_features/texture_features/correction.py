@@ -285,7 +285,7 @@ CORRECTED = ' corrected='  # before the fingerprint of a correction, in that of 
 def file_beside(model: str | Path, kind: str) -> Path:
     """Return the path NAME.reference.json or NAME.correction.json of a model, by the path of any of its files."""
     path = Path(model)
-    name = path.name.removesuffix('.skops').removesuffix('.json')
+    name = path.name.removesuffix('.npz').removesuffix('.json')
     return path.with_name(f'{name}.{kind}.json')
 
 

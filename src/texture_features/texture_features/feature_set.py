@@ -148,12 +148,12 @@ def read_recipe(
 ) -> tuple[str, Mapping[str, Any]]:
     """Return name and content of a recipe (YAML) that texture_estimation ships, or of any file.
 
-    A model's card (JSON) holds its recipe under `recipe`; a model (.skops) has the card beside it.
+    A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card beside it.
 
     Parameters
     ----------
     name_or_path
-        Name of a shipped recipe, or path of a recipe (.yaml), a card (.json) or a model (.skops).
+        Name of a shipped recipe, or path of a recipe (.yaml), a card (.json) or a model (.npz).
     subfolder
         Where texture_estimation keeps the shipped ones.
     kind
@@ -170,7 +170,7 @@ def read_recipe(
         If there is no such file or it holds no recipe; `kind` is the noun for the sentence.
     """
     path = find_file(name_or_path, 'texture_estimation', subfolder, kind)
-    if path.suffix == '.skops':
+    if path.suffix == '.npz':
         path = path.with_suffix('.json')
     content = load_card(path) if path.suffix == '.json' else load_yaml(path, kind)
     if not isinstance(content, Mapping):
@@ -280,7 +280,7 @@ class FeatureSet:
         """
         _, recipe = read_recipe(name_or_path)
         feature_set = cls.from_mapping(recipe, f"recipe '{name_or_path}'")
-        if not name_or_path.endswith(('.json', '.skops')):
+        if not name_or_path.endswith(('.json', '.npz')):
             return feature_set
         return dataclasses.replace(feature_set, correction=read_correction(name_or_path), _layouts={})
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,7 +13,7 @@ from texture_core.config import find, param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted
-from texture_estimation.learners.svm import SvmPredictor, export, uncalibrated
+from texture_estimation.learners.svm import RbfMachines
 from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch
 from texture_features.spectra import long_densities
@@ -74,7 +74,6 @@ class Spectrum:
         return find(SCALES, self.scale, 'scale of the spectrum')(density, self.floor)
 
 
-CACHE_MB = 500
 TINY = 1e-12
 
 
@@ -134,26 +133,19 @@ class SvmMaxWins:
         InvalidParameter
             If the features cannot be cut into the blocks.
         """
-        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415  # scikit-learn takes a second to import
-        from sklearn.svm import SVC  # noqa: PLC0415
-
         mean, components = self._components(X)
         projected = (X - mean) @ components
-        # The machine expects a scaler: one that changes the unit of all components alike, or not at all.
-        unit = float(projected.std()) or 1.0
-        scaler = StandardScaler().fit(projected)
-        scaler.mean_, scaler.scale_ = np.zeros(projected.shape[1]), np.full(projected.shape[1], unit)
-        gamma = self.gamma / projected.shape[1]
-        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, y)
-        parameters = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
-        return Fitted(parameters, None, f'not calibrated: pairs won; {components.shape[1]} principal components')
+        zero, count = np.zeros(projected.shape[1]), projected.shape[1]
+        unit = np.full(count, float(projected.std()) or 1.0)  # one for all components, or none
+        machines = RbfMachines.fit(projected, y, zero, unit, c=self.c, gamma=self.gamma / count)
+        parameters = {'mean': mean, 'components': components, 'machines': asdict(machines)}
+        return Fitted(parameters, None, f'not calibrated: pairs won; {count} principal components')
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> PcaSvmPredictor:
         """Return the predictor made from the stored parameters."""
-        n_labels = len(parameters['svc'].n_support_)
-        svm = export(parameters['scaler'], parameters['svc'], uncalibrated(n_labels))
-        return PcaSvmPredictor(parameters['mean'], parameters['components'], svm, PairVotes(n_labels))
+        machines = RbfMachines(**parameters['machines'])
+        return PcaSvmPredictor(parameters['mean'], parameters['components'], machines, PairVotes(machines.n_labels))
 
     def _components(self, values: Array) -> tuple[Array, Array]:
         """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components).
@@ -191,18 +183,18 @@ class PcaSvmPredictor:
     ----------
     mean : (n_features,)
     components : (n_features, n_components)
-    svm, votes
+    machines, votes
         What decides between pairs, and counts them.
     """
 
     mean: Array
     components: Array
-    svm: SvmPredictor
+    machines: RbfMachines
     votes: PairVotes
 
     def __call__(self, X: Array) -> Array:
         """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.won_clearly(self.svm.decisions((X - self.mean) @ self.components)))
+        return log_softmax(self.votes.won_clearly(self.machines((X - self.mean) @ self.components)))
 
 
 def principal_components(centred: Array, share: float) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texture_core.config import find, param
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
-from texture_estimation.learners.sklearn_learner import SklearnPredictor
+from texture_estimation.learners.sklearn_learner import SklearnPredictor, packed
 from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch
 from texture_features.spectra import amplitudes_of
@@ -367,7 +367,8 @@ class NaiveBayes:
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> SklearnPredictor | HistogramNaiveBayesPredictor:
         """Return the predictor made from the stored parameters."""
-        return HistogramNaiveBayesPredictor(**parameters) if 'edges' in parameters else SklearnPredictor(**parameters)
+        made = HistogramNaiveBayesPredictor if 'edges' in parameters else SklearnPredictor.of_packed
+        return made(**parameters)
 
     def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
         return self._counted(X, y, n_labels) if self.bins else self._normal(X, y, n_labels)
@@ -390,7 +391,8 @@ class NaiveBayes:
         mean, scale = standardisation(X)
         bayes = GaussianNB(var_smoothing=0.0).fit((X - mean) / scale, y)
         bayes.var_ += self.smoothing  # of variance 1; of constant features, too, where scikit-learn would add nothing
-        return {'estimator': bayes, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'floor': 0.0}
+        stored = packed(bayes, 'GaussianNB')
+        return {'packed': stored, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'floor': 0.0}
 
 
 @dataclass(frozen=True, eq=False)

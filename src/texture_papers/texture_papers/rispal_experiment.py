@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -546,7 +546,7 @@ def run(experiment: Experiment) -> ExperimentResult:
         'targets': TARGETS,
         'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ours'].items()},
         'regressors': {name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()},
-        'calibration': {name: model.card['calibration'] for name, model in models.items()},
+        'calibration': {name: asdict(model.calibration) for name, model in models.items()},
         'other_conditions_unseen': {
             name: _other_conditions(setup, models[name], recipe, test) for name, recipe in recipes.items()
         },

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
 from typing import Any, ClassVar
 
@@ -15,7 +15,7 @@ from texture_core.config import param, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, Learner, standardisation
-from texture_estimation.learners.svm import SvmPredictor, export, uncalibrated
+from texture_estimation.learners.svm import RbfMachines
 from texture_estimation.numerics import log_softmax
 from texture_estimation.search import of_machines, of_networks, of_transform
 from texture_features.feature import WindowBatch, first_difference, power
@@ -503,7 +503,6 @@ def _error(network: Network, values: Array, targets: Array) -> float:
 
 
 NOTE = 'not calibrated: the pairs won are counted'
-CACHE_MB = 500
 
 
 @dataclass(frozen=True)
@@ -546,23 +545,16 @@ class SvmPairs:
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
-        # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
-        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
-        from sklearn.svm import SVC  # noqa: PLC0415
-
-        scaler = StandardScaler().fit(X)
-        if not self.standardise:
-            scaler.mean_, scaler.scale_ = np.zeros(X.shape[1]), np.ones(X.shape[1])
-        svc = SVC(C=self.box_constraint, kernel='rbf', gamma=self.kernel_scale**-2, cache_size=CACHE_MB)
-        parameters = {'scaler': scaler, 'svc': svc.fit(scaler.transform(X), y), 'ties': self.ties}
-        return Fitted(parameters, None, NOTE)
+        none = np.zeros(X.shape[1]), np.ones(X.shape[1])
+        mean, scale = standardisation(X) if self.standardise else none
+        machines = RbfMachines.fit(X, y, mean, scale, c=self.box_constraint, gamma=self.kernel_scale**-2)
+        return Fitted({'machines': asdict(machines), 'ties': self.ties}, None, NOTE)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> SvmPairsPredictor:
         """Return the predictor made from the stored parameters."""
-        n_labels = len(parameters['svc'].n_support_)
-        svm = export(parameters['scaler'], parameters['svc'], uncalibrated(n_labels))
-        return SvmPairsPredictor(svm, PairVotes(n_labels), str(parameters['ties']))
+        machines = RbfMachines(**parameters['machines'])
+        return SvmPairsPredictor(machines, PairVotes(machines.n_labels), str(parameters['ties']))
 
     def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
         """Return what a window costs: each example has a weight in n_labels - 1 pairs."""
@@ -573,7 +565,7 @@ class SvmPairs:
 class SvmPairsPredictor:
     """The machines of all pairs, evaluated together."""
 
-    svm: SvmPredictor
+    machines: RbfMachines
     votes: PairVotes
     ties: str
 
@@ -583,7 +575,7 @@ class SvmPairsPredictor:
 
     def decisions(self, X: Array) -> Array:
         """Return the decision of each pair, (..., n_pairs); positive for its first label."""
-        return self.svm.decisions(X)
+        return self.machines(X)
 
 
 ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair

@@ -164,12 +164,12 @@ def test_a_model_card_has_the_facts_and_ranges_of_the_training(tmp_path) -> None
         'name': 'm', 'labels': ['cork', 'felt'], 'feature_set': 'ab12 signal=1000Hz*1',
         'recipe': {'description': 'Bands.'},
         'training': {'slides': 8, 'windows': 16, 'held_out_window_accuracy': 0.875},
-        'domain': {
+        'decisions': {'domain': {
             'sensors': ['tsf85/dynamic'], 'motions': ['linear_slide'], 'speed_m_s': [0.02, 0.1], 'force_n': [1.0, 2.0],
             'reach': {
                 'cork': {'sessions': 2, 'places': 3, 'fingers': 1}, 'felt': {'sessions': 1, 'places': 4, 'fingers': 1},
             },
-        },
+        }},
     }  # fmt: skip
     (tmp_path / 'm.json').write_text(json.dumps(card))
     (tmp_path / 'README.md').write_text(model_card(tmp_path / 'm.json', 'apache-2.0'))

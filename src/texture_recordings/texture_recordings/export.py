@@ -450,7 +450,8 @@ def model_card(path: str | Path, licence: str = 'other') -> str:
     """
     try:
         card = parse_json(read_bounded(Path(path), MAX_CARD_BYTES).decode())
-        labels, recipe, training, domain = (card[name] for name in ('labels', 'recipe', 'training', 'domain'))
+        labels, recipe, training = (card[name] for name in ('labels', 'recipe', 'training'))
+        domain = card['decisions']['domain']
         rows = [
             ('surfaces', ', '.join(labels)),
             ('features', card['feature_set']),
@@ -472,7 +473,7 @@ def model_card(path: str | Path, licence: str = 'other') -> str:
         f'Single windows right, in slides held out of the training: {100 * accuracy:.1f} %. These slides are of the '
         'same recordings; on another place, day or finger the figure is lower unless several of each were trained.',
         '',
-        'An estimate outside the ranges above is rejected. Use: `texture launch replay bag:=BAG model:=MODEL.skops`.',
+        'An estimate outside the ranges above is rejected. Use: `texture launch replay bag:=BAG model:=MODEL.npz`.',
     ]
     return _card(facts, f'Texture model {name}', lines)
 

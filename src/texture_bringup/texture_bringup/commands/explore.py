@@ -189,7 +189,7 @@ def _identify(options: argparse.Namespace) -> int:
         operator.wait_for_explorer(deadline_s=10.0)
         while number < options.slides and np.exp(belief.max()) < options.sure:
             number += 1
-            motion, information = known.best_motion(belief, list(known.gaussians))
+            motion, information = known.best_motion(belief, known.motions)
             print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
             with progress_line():
                 explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)

@@ -4,18 +4,120 @@
 from __future__ import annotations
 
 import importlib
+import io
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from texture_core.config import safe_repr, unknown_name
+from texture_core.config import BROKEN_CONTENT, MB, Archive, library, parse_json, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
 from texture_estimation.numerics import fit_temperature, log_softmax
+
+# --------------------
+# Estimators of scikit-learn as bytes in a model file, by skops: read without running code.
+
+SKOPS = ('skops.io', 'learners of scikit-learn', 'models')
+SCHEMA = 'schema.json'
+MAX_SCHEMA_BYTES = 10 * MB  # a thousand trees; each node in it becomes objects of 2 kB
+MAX_PACKED_BYTES = 300 * MB  # to which the bytes may unpack
+NODES = (
+    'DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode', 'TreeNode',
+    'RandomStateNode',
+)  # fmt: skip
+# What an estimator holds beside estimators, arrays and plain values; its trees are checked before they are used.
+ESTIMATOR_PARTS = (
+    'sklearn.calibration._CalibratedClassifier',
+    'sklearn.neural_network._stochastic_optimizers.AdamOptimizer',
+    'sklearn.neural_network._stochastic_optimizers.SGDOptimizer',
+)
+
+
+def packed(estimator: Any, name: str) -> NDArray[np.uint8]:
+    """Return an estimator as bytes, (n,), for a model file.
+
+    Raises
+    ------
+    InvalidParameter
+        If a model file could not hold it, or it could not be read again.
+    """
+    content = library(*SKOPS).dumps(estimator)
+    try:
+        _check_parts(content)
+    except (*BROKEN_CONTENT, ModelMismatch) as error:
+        raise InvalidParameter(
+            f"'{name}' cannot be stored as a model: {error}; use another estimator or other parameters "
+            '(neighbours with algorithm: brute, fewer trees)'
+        ) from error
+    return np.frombuffer(content, np.uint8)
+
+
+def unpacked(content: NDArray[np.uint8]) -> Any:
+    """Return what `packed` was given; nothing is built of types that no estimator holds, and no code is run.
+
+    Raises
+    ------
+    ModelMismatch
+        If it holds something else.
+    """
+    skops = library(*SKOPS)  # takes seconds, and few models need it
+    trusted = _check_parts(content.tobytes())
+    unexpected = sorted(set(skops.get_untrusted_types(data=content.tobytes())) - set(trusted))
+    if unexpected:
+        raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
+    return skops.loads(content.tobytes(), trusted=trusted)
+
+
+def _check_parts(content: bytes) -> list[str]:
+    """Return the types in it; raise ModelMismatch or FileRefused unless skops, which counts nothing, may read it.
+
+    A member may be named by many nodes, each of which makes an array of its own; and some kinds of node would read
+    archives within the archive, or call functions.
+    """
+    found = set()
+    with Archive(io.BytesIO(content), MAX_PACKED_BYTES) as file:
+        for node in _nodes(parse_json(file.read(SCHEMA, MAX_SCHEMA_BYTES).decode())):
+            kind, name = str(node['__loader__']), f'{node.get("__module__")}.{node.get("__class__")}'
+            if kind not in NODES or (kind == 'ObjectNode' and not _is_estimator(name)):
+                raise ModelMismatch(f'it holds {name} ({kind}), which no model of this suite holds')
+            if kind in ('ObjectNode', 'TreeNode'):
+                found.add(name)
+            if kind == 'NdArrayNode' and node.get('type') == 'numpy':
+                file.array(str(node['file']))
+    return sorted(found)
+
+
+@lru_cache(maxsize=1000)
+def _is_estimator(name: str) -> bool:
+    """Return whether a name is that of an estimator of scikit-learn, or of a part of one that holds plain values."""
+    if name in ESTIMATOR_PARTS:
+        return True
+    module, _, cls_name = name.rpartition('.')
+    if not module.startswith('sklearn.'):
+        return False
+    from sklearn.base import BaseEstimator  # noqa: PLC0415  # takes a second
+
+    try:
+        cls = getattr(importlib.import_module(module), cls_name, None)
+    except ImportError:
+        return False
+    return isinstance(cls, type) and issubclass(cls, BaseEstimator)
+
+
+def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:
+    """Yield the nodes of a schema."""
+    if isinstance(value, Mapping) and '__loader__' in value:
+        yield value
+    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    for part in parts:
+        yield from _nodes(part)
+
 
 # --------------------
 # Predict with a fitted estimator of scikit-learn.
@@ -57,6 +159,11 @@ class SklearnPredictor:
     n_labels: int
     temperature: float = 1.0
     floor: float = FLOOR
+
+    @classmethod
+    def of_packed(cls, packed: NDArray[np.uint8], **parameters: Any) -> SklearnPredictor:
+        """Return the predictor of an estimator as bytes, and of the other parameters as they are."""
+        return cls(unpacked(packed), **parameters)
 
     def __post_init__(self) -> None:
         for tree in _trees(self.estimator, 0):
@@ -216,21 +323,20 @@ class SklearnLearner:
         InvalidParameter
             If the estimator does not accept its parameters or the values, or holds what no model file may hold.
         """
-        from texture_estimation.model_files import check_storable  # noqa: PLC0415  # which imports nothing of learners
-
         n_labels = int(y.max()) + 1
-        parameters = self._fit(X, y, n_labels)
-        check_storable(parameters, self.estimator)
+        fitted = self._fit(X, y, n_labels)
+        parameters = {'packed': packed(fitted.estimator, self.estimator), 'mean': fitted.mean, 'scale': fitted.scale}
         split = assign_folds(y, groups, FOLDS)
         if split is None:
-            return Fitted(parameters, None, 'not calibrated, as a label has a single window')
+            note = 'not calibrated, as a label has a single window'
+            return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, note)
         held_out = np.empty((len(y), n_labels))
         for part in np.unique(split[0]):
             held = split[0] == part
-            held_out[held] = self.predictor(self._fit(X[~held], y[~held], n_labels))(X[held])
+            held_out[held] = self._fit(X[~held], y[~held], n_labels)(X[held])
         temperature = fit_temperature(held_out, y)
         return Fitted(
-            {**parameters, 'temperature': temperature},
+            {**parameters, 'n_labels': n_labels, 'temperature': temperature},
             log_softmax(held_out / temperature),
             f'temperature from {split[1]}',
         )
@@ -238,15 +344,15 @@ class SklearnLearner:
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> SklearnPredictor:
         """Return the predictor made from the stored parameters."""
-        return SklearnPredictor(**parameters)
+        return SklearnPredictor.of_packed(**parameters)
 
-    def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
+    def _fit(self, X: Array, y: Codes, n_labels: int) -> SklearnPredictor:
         mean, scale = standardisation(X)
         try:
             estimator = self.new_estimator().fit((X - mean) / scale, y)
         except (ValueError, TypeError) as error:
             raise InvalidParameter(f"'{self.estimator}' cannot be trained: {error}") from error
-        return {'estimator': estimator, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'temperature': 1.0}
+        return SklearnPredictor(estimator, mean, scale, n_labels)
 
 
 def _classifier(name: str) -> Any:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Support vector machines with coupled pairs: training by scikit-learn, plain-array predictor."""
+"""Support vector machines with coupled pairs: trained by scikit-learn, stored and evaluated as plain arrays."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any, ClassVar
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, assign_folds
+from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
 from texture_estimation.numerics import fit_temperature, group_means, log_softmax
 
 # --------------------
@@ -150,12 +150,14 @@ def _fit_sigmoid(decisions: Array, y: Codes, first: int, second: int) -> Array:
 
 
 # --------------------
-# A standardised RBF support vector machine, one against one, as plain arrays.
+# Standardised RBF support vector machines, one against one, as plain arrays.
+
+CACHE_MB = 500
 
 
 @dataclass(frozen=True, eq=False)
-class SvmPredictor:
-    """The decisions of scikit-learn's StandardScaler and SVC, without its overhead for single windows.
+class RbfMachines:
+    """The decisions of scikit-learn's SVC on standardised features, without its overhead for single windows.
 
     The support vectors of each label are padded to the same number, so that every sum of all pairs is one product of
     arrays: in pair (i, j), label i's vectors carry coefficient row j - 1 and label j's carry row i.
@@ -173,23 +175,16 @@ class SvmPredictor:
     intercepts : (n_pairs,)
     gamma
         Of the kernel exp(-gamma |x - s|²).
-    coupling
-        From decision values to probabilities.
     projection : (n_features, n_features) or None
         What features are multiplied with before the standardisation.
 
     Examples
     --------
-    >>> from sklearn.preprocessing import StandardScaler
     >>> from sklearn.svm import SVC
-    >>> from texture_estimation.learners.svm import uncalibrated
     >>> values, codes = np.random.default_rng(0).standard_normal((30, 2)), np.arange(30) % 3
-    >>> scaler = StandardScaler().fit(values)
-    >>> svc = SVC(gamma=0.5, decision_function_shape='ovo').fit(scaler.transform(values), codes)
-    >>> predictor = export(scaler, svc, uncalibrated(3))
-    >>> isinstance(predictor, SvmPredictor)
-    True
-    >>> np.allclose(predictor.decisions(values), svc.decision_function(scaler.transform(values)))
+    >>> machines = RbfMachines.fit(values, codes, np.zeros(2), np.ones(2), c=1.0, gamma=0.5)
+    >>> svc = SVC(gamma=0.5, decision_function_shape='ovo').fit(values, codes)
+    >>> np.allclose(machines(values), svc.decision_function(values))
     True
     """
 
@@ -200,31 +195,64 @@ class SvmPredictor:
     coefficients: Array
     intercepts: Array
     gamma: float
-    coupling: PairCoupling
     projection: Array | None = None
 
     def __post_init__(self) -> None:
-        n_labels = len(self.coefficients)
-        first, second = np.triu_indices(n_labels, k=1)
+        first, second = np.triu_indices(self.n_labels, k=1)
         # Where in the (n_labels, n_labels - 1) sums the two halves of each pair stand.
-        object.__setattr__(self, '_first', first * (n_labels - 1) + second - 1)
-        object.__setattr__(self, '_second', second * (n_labels - 1) + first)
+        object.__setattr__(self, '_first', first * (self.n_labels - 1) + second - 1)
+        object.__setattr__(self, '_second', second * (self.n_labels - 1) + first)
 
-    def __call__(self, X: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        return self.coupling(self.decisions(X))
-
-    def decisions(self, X: Array) -> Array:
-        """Return the decision value of each pair, (..., n_pairs); positive for its first label.
+    @classmethod
+    def fit(
+        cls, X: Array, y: Codes, mean: Array, scale: Array, *, c: float, gamma: float, projection: Array | None = None
+    ) -> RbfMachines:
+        """Return the machines of all pairs of labels, trained by scikit-learn.
 
         Parameters
         ----------
-        X : (..., n_features)
+        X : (n, n_features)
+            Features of windows, as they come.
+        y : (n,)
+            Number of the label of each, from 0, without gaps.
+        mean, scale : (n_features,)
+            Of the standardisation.
+        c
+            Box constraint.
+        gamma
+            Of the kernel.
+        projection : (n_features, n_features) or None
+            What features are multiplied with before the standardisation.
+        """
+        # Imported here: scikit-learn takes a second, and who only recognises does without it.
+        from sklearn.svm import SVC  # noqa: PLC0415
 
-        Returns
-        -------
-        (..., n_pairs)
-            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        standard = ((X if projection is None else X @ projection) - mean) / scale
+        svc = SVC(C=c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(standard, y)
+        counts = svc.n_support_
+        n_labels, width = len(counts), int(counts.max())
+        vectors = np.zeros((n_labels, width, X.shape[1]))
+        coefficients = np.zeros((n_labels, n_labels - 1, width))
+        # scikit-learn turns the sign round for two labels
+        sign = -1.0 if n_labels == 2 else 1.0
+        start = 0
+        for label, count in enumerate(counts):
+            vectors[label, :count] = svc.support_vectors_[start : start + count]
+            coefficients[label, :, :count] = sign * svc.dual_coef_[:, start : start + count]
+            start += count
+        flat = vectors.reshape(-1, X.shape[1])
+        squares, intercepts = gamma * (flat * flat).sum(axis=1), sign * np.asarray(svc.intercept_)
+        return cls(mean, scale, 2.0 * gamma * flat, squares, coefficients, intercepts, gamma, projection)
+
+    @property
+    def n_labels(self) -> int:
+        """Number of labels."""
+        return len(self.coefficients)
+
+    def __call__(self, X: Array) -> Array:
+        """Return the decision value of each pair, (..., n_pairs) of (..., n_features); positive for its first label.
+
+        Pairs come in the order (0, 1), (0, 2), …, (1, 2), ….
         """
         kernel = self._kernel(X)
         n_labels, rows, width = self.coefficients.shape
@@ -246,50 +274,16 @@ class SvmPredictor:
         return np.exp(exponents, out=exponents)
 
 
-def export(scaler: Any, svc: Any, coupling: PairCoupling, projection: Array | None = None) -> SvmPredictor:
-    """Return the exported predictor of a fitted StandardScaler and SVC(kernel='rbf').
+@dataclass(frozen=True, eq=False)
+class SvmPredictor:
+    """Machines of all pairs, and what makes probabilities of their decisions."""
 
-    Parameters
-    ----------
-    scaler
-        Fitted StandardScaler.
-    svc
-        Fitted SVC with an RBF kernel, one against one.
-    coupling
-        From decision values to probabilities.
-    projection : (n_features, n_features) or None
-        What the features were multiplied with before they were standardised.
+    machines: RbfMachines
+    coupling: PairCoupling
 
-    Returns
-    -------
-    SvmPredictor
-        With the decisions of scikit-learn up to rounding.
-    """
-    counts = svc.n_support_
-    n_labels, width = len(counts), int(counts.max())
-    n_features = svc.support_vectors_.shape[1]
-    vectors = np.zeros((n_labels, width, n_features))
-    coefficients = np.zeros((n_labels, n_labels - 1, width))
-    # scikit-learn turns the sign round for two labels
-    sign = -1.0 if n_labels == 2 else 1.0
-    start = 0
-    for label, count in enumerate(counts):
-        vectors[label, :count] = svc.support_vectors_[start : start + count]
-        coefficients[label, :, :count] = sign * svc.dual_coef_[:, start : start + count]
-        start += count
-    flat = vectors.reshape(-1, n_features)
-    gamma = float(svc.gamma)
-    return SvmPredictor(
-        mean=np.asarray(scaler.mean_),
-        scale=np.asarray(scaler.scale_),
-        vectors=2.0 * gamma * flat,
-        squares=gamma * (flat * flat).sum(axis=1),
-        coefficients=coefficients,
-        intercepts=sign * np.asarray(svc.intercept_),
-        gamma=gamma,
-        coupling=coupling,
-        projection=projection,
-    )
+    def __call__(self, X: Array) -> Array:
+        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
+        return self.coupling(self.machines(X))
 
 
 # --------------------
@@ -354,8 +348,6 @@ def _mean_square(deviations: Array) -> Array:
 
 # --------------------
 # RBF support vector machine, one against one, with calibrated probabilities.
-
-CACHE_MB = 500
 
 
 @dataclass(frozen=True)
@@ -429,70 +421,31 @@ class SvmRbf:
         Fitted
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
-        coupling, held_out, note = self._calibrate(X, y, groups, differences, parts)
-        projection = self._projection(X, y, groups, differences)
-        scaler, svc = self._fit_svc(_projected(X, projection), y)
-        parameters = {
-            **({} if projection is None else {'projection': projection}),
-            'scaler': scaler,
-            'svc': svc,
-            'slopes': coupling.slopes,
-            'offsets': coupling.offsets,
-            'temperature': coupling.temperature,
-        }
-        return Fitted(parameters, held_out, note)
+        n_labels = int(y.max()) + 1
+        split = assign_folds(y, groups, self.folds, parts)
+        machines = self._fit(X, y, groups, differences)
+        if split is None:
+            coupling, held_out, note = uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
+        else:
+            folds_of, note = split
+            decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
+            for part in np.unique(folds_of):
+                held = folds_of == part
+                decisions[held] = self._fit(X[~held], y[~held], groups[~held], differences)(X[held])
+            coupling = fit_coupling(decisions, y, n_labels)
+            held_out = coupling(decisions)
+        return Fitted({'machines': asdict(machines), 'coupling': asdict(coupling)}, held_out, note)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> SvmPredictor:
         """Return the predictor made from the stored parameters."""
-        coupling = PairCoupling(
-            len(parameters['svc'].n_support_),
-            parameters['slopes'],
-            parameters['offsets'],
-            float(parameters['temperature']),
-        )
-        return export(parameters['scaler'], parameters['svc'], coupling, parameters.get('projection'))
+        return SvmPredictor(RbfMachines(**parameters['machines']), PairCoupling(**parameters['coupling']))
 
-    def _calibrate(
-        self, X: Array, y: Codes, groups: Codes, differences: Array | None, parts: Codes | None
-    ) -> tuple[PairCoupling, Array | None, str]:
-        n_labels = int(y.max()) + 1
-        split = assign_folds(y, groups, self.folds, parts)
-        if split is None:
-            return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
-        folds_of, note = split
-        decisions = self._held_out_decisions(X, y, groups, differences, folds_of)
-        coupling = fit_coupling(decisions, y, n_labels)
-        return coupling, coupling(decisions), note
-
-    def _held_out_decisions(
-        self, X: Array, y: Codes, groups: Codes, differences: Array | None, folds_of: Codes
-    ) -> Array:
-        """Return the decision values of each window, (n, n_pairs), by a fit without the fold that it is in."""
-        n_labels = int(y.max()) + 1
-        decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
-        for part in np.unique(folds_of):
-            held = folds_of == part
-            projection = self._projection(X[~held], y[~held], groups[~held], differences)
-            fitted = self._fit_svc(_projected(X[~held], projection), y[~held])
-            decisions[held] = export(*fitted, uncalibrated(n_labels), projection).decisions(X[held])
-        return decisions
-
-    def _projection(self, X: Array, y: Codes, groups: Codes, differences: Array | None) -> Array | None:
-        return within_class_whitening(X, y, groups, self.whitening, differences) if self.whitening else None
-
-    def _fit_svc(self, X: Array, y: Codes) -> tuple[Any, Any]:
-        # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
-        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
-        from sklearn.svm import SVC  # noqa: PLC0415
-
-        scaler = StandardScaler().fit(X)
+    def _fit(self, X: Array, y: Codes, groups: Codes, differences: Array | None) -> RbfMachines:
+        projection = within_class_whitening(X, y, groups, self.whitening, differences) if self.whitening else None
+        projected = X if projection is None else X @ projection
+        mean, scale = standardisation(projected)
         if self.common_scale:
-            scaler.scale_ = np.full(X.shape[1], float(np.sqrt(scaler.var_.mean())) or 1.0)
-        gamma = self.gamma or 1.0 / (X.shape[1] * max(float(scaler.transform(X).var()), 1e-12))
-        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(X), y)
-        return scaler, svc
-
-
-def _projected(X: Array, projection: Array | None) -> Array:
-    return X if projection is None else X @ projection
+            scale = np.full(X.shape[1], float(np.sqrt(projected.var(axis=0).mean())) or 1.0)
+        gamma = self.gamma or 1.0 / (X.shape[1] * max(float(((projected - mean) / scale).var()), 1e-12))
+        return RbfMachines.fit(X, y, mean, scale, c=self.c, gamma=gamma, projection=projection)

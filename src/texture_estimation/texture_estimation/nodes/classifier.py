@@ -24,7 +24,7 @@ class ClassifierParams:
     """Parameters of the classifier."""
 
     model: str = param(
-        '', "Path of a trained model (NAME.skops or NAME.json); '': no model. It can be changed at any time."
+        '', "Path of a trained model (NAME.npz or NAME.json); '': no model. It can be changed at any time."
     )
 
 

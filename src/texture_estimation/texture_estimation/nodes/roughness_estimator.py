@@ -19,7 +19,7 @@ class RoughnessParams:
     """Parameters of the roughness estimator."""
 
     model: str = param(
-        '', "Path of a roughness model (NAME.skops or NAME.json); '': no model. Can be changed at any time."
+        '', "Path of a roughness model (NAME.npz or NAME.json); '': no model. Can be changed at any time."
     )
 
 

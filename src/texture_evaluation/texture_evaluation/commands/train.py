@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--grades', metavar='FILE', help='CSV file texture,grade: learn to grade roughness, by a roughness recipe'
     )
-    parser.add_argument('-o', '--out', required=True, metavar='MODEL', help='makes MODEL.skops and MODEL.json')
+    parser.add_argument('-o', '--out', required=True, metavar='MODEL', help='makes MODEL.npz and MODEL.json')
     add_slides(parser)
     add_channels(parser)
     add_seed(parser)
@@ -50,12 +50,12 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     held_out = (
         'nothing could be held out' if accuracy is None else f'{100 * accuracy:.1f} % of the held-out windows right'
     )
-    kinds = len(model.next_touch_model.gaussians) if model.next_touch_model else 0
+    kinds = len(model.next_touch_model.motions) if model.next_touch_model else 0
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *training.get('tare', []),
-        *filter(None, [model.error_bound.reason, model.domain.reach_reason]),
+        *filter(None, [model.decisions.error_bound.reason, model.decisions.domain.reach_reason]),
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]
@@ -74,4 +74,4 @@ def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
 
 
 def _saved_as(out: Path) -> str:
-    return f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it'
+    return f'saved as {out.with_name(out.name.removesuffix(".npz"))}.npz, with its card beside it'
