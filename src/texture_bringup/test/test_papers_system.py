@@ -2,7 +2,7 @@
 """Each paper as a user repeats it on the emulator: its sensor, motion and recipes, from exploring to a live answer."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -83,6 +83,7 @@ class Paper:
     robot: str = 'emulator'
     scene: str = 'twelve_textures'
     surfaces: tuple[str, str] = (SMOOTH, ROUGH)
+    launch: Mapping[str, str] = field(default_factory=dict)  # further arguments
 
 
 PAPERS = {
@@ -128,7 +129,8 @@ PAPERS = {
             'jamali-wavelets',
             'jamali-symbols',
         ),
-        slides=1,
+        slides=5,  # the variances of naive Bayes
+        live=3,
     ),
     'Kaboli et al. 2015, two fingers': Paper(
         'biotac_hand', 'kaboli', 'kaboli-svm-two-fingers', ('kaboli-pa-two-fingers', 'kaboli-em-two-fingers')
@@ -222,6 +224,7 @@ class Rig:
             'recipe': recipe_file(paper.recipe),
             'scene': paper.scene,
             'surface': paper.surfaces[0],
+            **paper.launch,
             'watch_signal': False,
             'explorer_params': parameters,
             **place.get(paper.robot, {'robot': out / paper.robot}),
@@ -314,6 +317,22 @@ def test_recipes_of_a_paper_train_from_its_motion_and_name_the_surface_live(pape
         right = paper.surfaces if recipe in EITHER else paper.surfaces[-1:]
         assert np.mean([estimate.label in right for estimate in estimates]) > 0.5, (recipe, estimates)
         assert estimates[0].evidence_s >= load_recipe(recipe).feature_set.windows.length_s
+
+
+def test_a_model_of_two_fingers_of_the_emulated_hand_names_a_surface_by_two_others(tmp_path: Path) -> None:
+    thumb, index, middle = 'finger0', 'finger1', 'finger2'  # places of the board
+    learning = {'finger_set': 'kaboli-train', 'first_finger': index, 'second_finger': middle}
+    testing = {'finger_set': 'kaboli-test', 'first_finger': thumb, 'second_finger': index}
+    paper = replace(PAPERS['Kaboli et al. 2015, two fingers of the emulated hand'], slides=3)
+    for folder in ('learning', 'testing'):
+        (tmp_path / folder).mkdir()
+    with running(replace(paper, launch=learning), tmp_path / 'learning') as rig:
+        model = train(load_recipe(paper.recipe), rig.examples(), 'model').save(tmp_path / 'model')
+    with running(replace(paper, launch=testing), tmp_path / 'testing') as rig:
+        rig.operator.set_parameters('classifier', {'model': str(model)})
+        for surface in paper.surfaces:
+            rig.operator.set_parameters('emulator', {'surface': surface})
+            assert [rig.named()[paper.recipe].label for _ in range(2)] == [surface] * 2
 
 
 def test_recipes_of_rispal_et_al_train_from_their_motion_and_grade_the_surface_live(tmp_path: Path) -> None:

@@ -169,18 +169,17 @@ def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
     assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.75 s, and then 0.25 s of samples
 
 
-def test_two_fingers_of_a_board_sense_other_places_of_one_surface_and_its_third_place_nothing(tmp_path: Path) -> None:
+def test_the_fingers_of_a_board_sense_other_places_of_one_surface(tmp_path: Path) -> None:
     scene = load_scene('twelve_textures')
     surface, rng = scene.surface('ridge_2mm_deep'), np.random.default_rng(0)
     live = LIVE_SENSORS['biotac_hand'](scene, surface, tmp_path / 'biotac', rng)
     slide = straight((0.0, 0.0, FORCE_N), (0.1, 0.0, FORCE_N), 4400)
     counts = live.model.advance(slide).astype(float)  # type: ignore[attr-defined]
     assert counts.shape == (100, 44, 3)
-    assert (counts[..., 2] == 0).all()
     pac = counts[50:, 1::2].reshape(-1, 3)  # every second slot
     rough = pac.std(axis=0)
-    assert rough[0] == pytest.approx(rough[1], rel=0.3)
-    assert np.abs(pac[:, 0] - pac[:, 1]).max() > rough[0]
+    np.testing.assert_allclose(rough, rough.mean(), rtol=0.3)
+    assert all(np.abs(pac[:, 0] - pac[:, other]).max() > rough[0] for other in (1, 2))
     live.model.touch.surface = scene.surface('glass')
     smooth = live.model.advance(slide).astype(float)[50:, 1::2].reshape(-1, 3).std(axis=0)  # type: ignore[attr-defined]
-    assert (smooth[:2] < 0.3 * rough[:2]).all()
+    assert (smooth < 0.3 * rough).all()

@@ -214,7 +214,7 @@ def live_tsf85(
 def live_biotac(
     scene: Scene, surface: Surface, link: Path, rng: np.random.Generator, *, hand: bool = False
 ) -> LiveSensor:
-    """Return a BioTac alone on its board, or a board with BioTacs on two fingers: all are served with each frame."""
+    """Return a BioTac alone on its board, or a board with BioTacs on three fingers: all are served with each frame."""
     layout = BIOTACS['biotac']
     pace = layout.frame_rate_hz, points_per_frame(layout)
     if hand:

@@ -878,8 +878,8 @@ SENSORS: Mapping[str, SensorKind] = {
 # Two fingers of a TSF-85 that slide together.
 
 
-class TwoContacts:
-    """The contacts of two fingers that touch one surface, as one."""
+class JoinedContacts:
+    """The contacts of fingers that touch one surface, as one."""
 
     def __init__(self, contacts: Sequence[SkinContact]) -> None:
         self._contacts = contacts
@@ -905,7 +905,7 @@ class Tsf85Pair:
 
     def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
         self._models = [Tsf85Model(scene.of_finger(finger), surface, rng, finger=finger) for finger in (0, 1)]
-        self.touch = TwoContacts([model.touch for model in self._models])
+        self.touch = JoinedContacts([model.touch for model in self._models])
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
         """Return what both measure along the next piece of path: (n_samples, 2) and (n_images, 2, n_taxels) counts."""
@@ -914,24 +914,21 @@ class Tsf85Pair:
 
 
 # --------------------
-# Two BioTacs on one board that slide together; the third place of the board is empty.
+# Three BioTacs on one board that slide together.
 
-SERIALS = ('BT-0', 'BT-1', '')  # by place; '' where there is no finger
+SERIALS = ('BT-0', 'BT-1', 'BT-2')  # by place
 
 
 class BioTacHand:
-    """Two BioTacs that move as one, each an individual that touches a place of its own."""
+    """BioTacs that move as one, each an individual that touches a place of its own."""
 
     def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> None:
         self._models = [
             BioTacModel(scene.of_finger(place), surface, rng, layout=layout, finger=place)
-            for place, serial in enumerate(SERIALS)
-            if serial
+            for place in range(len(SERIALS))
         ]
-        self.touch = TwoContacts([model.touch for model in self._models])
+        self.touch = JoinedContacts([model.touch for model in self._models])
 
     def advance(self, path: Trajectory) -> NDArray[np.uint16]:
         """Return what all places measure along the next piece of path, (n_frames, n_slots, n_places) counts."""
-        measured = [model.advance(path) for model in self._models]
-        empty = [np.zeros_like(measured[0])] * (len(SERIALS) - len(measured))
-        return np.stack([*measured, *empty], axis=-1)
+        return np.stack([model.advance(path) for model in self._models], axis=-1)
