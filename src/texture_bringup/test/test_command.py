@@ -21,6 +21,7 @@ def test_without_a_sub_command_the_help_is_printed(capsys) -> None:
     assert main([]) == 0
     shown = capsys.readouterr().out
     assert all(f'  {name} ' in shown and summary(command) in shown for name, command in installed().items())
+    assert 'Further:' not in shown  # each of ours has its group
 
 
 def test_the_help_imports_no_sub_command() -> None:
@@ -97,7 +98,7 @@ def test_every_sub_command_explains_itself(name, capsys) -> None:
         (['scene', 'ets_lnear'], "no scene 'ets_lnear'; did you mean 'ets_linear'?"),
         (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),
         (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
-        (['identify', 'm', '--slides', '0'], '--slides is 0'),
+        (['identify', 'm', '--most', '0'], '--most is 0'),
         (['identify', '/nowhere'], "model card '/nowhere.json' cannot be read"),
         (['identify', '/nowhere.npz'], "'/nowhere.npz' was given"),
     ],

@@ -27,7 +27,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_recipe_is_cross_validated_from_the_command_line(bags: Path, tmp_path: Path, capsys) -> None:
     figures = tmp_path / 'figures.json'
-    arguments = ['evaluate', '--cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json', str(figures)]
+    arguments = ['cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json', str(figures)]
     assert main(arguments) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "recipe 'peaks-naive-bayes', split stratified:2: 2 surfaces"
@@ -48,7 +48,7 @@ def test_a_recipe_is_cross_validated_from_the_command_line(bags: Path, tmp_path:
     ],
 )
 def test_a_split_that_cannot_be_made_gets_one_sentence(split: str, sentence: str, bags: Path, capsys) -> None:
-    assert main(['evaluate', '--cross-validate', split, 'default', str(bags)]) != 0
+    assert main(['cross-validate', split, 'default', str(bags)]) != 0
     assert sentence in capsys.readouterr().err
 
 
@@ -90,8 +90,8 @@ def test_a_cluster_that_lacks_the_suite_or_workers_is_refused_at_once_with_what_
         (tmp_path / str(workers)).mkdir()
         with cluster(tmp_path / str(workers), workers, with_suite=False) as address:
             begin_s = time.monotonic()
-            options = ['--cross-validate', 'stratified:2', '--dask', address]
-            assert main(['evaluate', *options, 'peaks-naive-bayes', str(bags)]) == 2
+            given = ['stratified:2', 'peaks-naive-bayes', str(bags), '--dask', address]
+            assert main(['cross-validate', *given]) == 2
             assert time.monotonic() - begin_s < 10.0
         said = capsys.readouterr().err
         assert sentence in said
@@ -101,7 +101,7 @@ def test_a_cluster_that_lacks_the_suite_or_workers_is_refused_at_once_with_what_
 @pytest.mark.realtime
 def test_two_workers_that_read_the_bags_themselves_give_the_figures_of_one_process(bags: Path, tmp_path: Path) -> None:
     files = [tmp_path / name for name in ('one.json', 'cluster.json')]
-    arguments = ['evaluate', '--cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json']
+    arguments = ['cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json']
     assert main([*arguments, str(files[0])]) == 0
     with cluster(tmp_path, 2, with_suite=True) as address:
         assert main([*arguments, str(files[1]), '--dask', address]) == 0
@@ -114,7 +114,7 @@ def test_a_local_cluster_of_two_workers_cross_validates_and_searches_as_one_core
 ) -> None:
     files = [tmp_path / name for name in ('one.json', 'cluster.json')]
     for file, where in zip(files, ([], ['--dask', 'local:2']), strict=True):
-        split = ['evaluate', '--cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags)]
+        split = ['cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags)]
         assert main([*split, '--json', str(file), *where]) == 0
     assert files[0].read_text() == files[1].read_text()
     recipes = [tmp_path / name for name in ('one.yaml', 'cluster.yaml')]

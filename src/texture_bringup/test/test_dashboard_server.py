@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 import asyncio
 import json
+import re
 from pathlib import Path
 from socket import gethostname
 
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
 
-from texture_bringup.dashboard import MAX_BODY_BYTES, VIEWERS, Access, Serving, make_app
+from texture_bringup.dashboard import BUTTONS, MAX_BODY_BYTES, VIEWERS, Access, Serving, make_app
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
 
 PAGE = Path(__file__).parents[1] / 'config' / 'dashboard'
@@ -28,7 +29,7 @@ class Nodes:
         self.asked.append(asked)
         return {'success': True, 'message': 'nothing is moving'}
 
-    add = record = stop
+    add = record = tare = recover = check = collect = stop
 
     async def offered(self):
         return {'linear_slide': []}
@@ -64,6 +65,12 @@ def test_the_page_is_served_and_may_load_nothing_from_elsewhere(path, kind) -> N
         assert answer.headers['Content-Security-Policy'].startswith("default-src 'none'")
 
     with_client(story)
+
+
+def test_the_page_asks_for_what_the_server_offers_and_for_all_of_it() -> None:
+    asked = re.findall(r"ask\('(\w+)'", (PAGE / 'dashboard.js').read_text())
+    asked += re.findall(r'data-ask="(\w+)"', (PAGE / 'index.html').read_text())
+    assert set(asked) == set(BUTTONS)
 
 
 @pytest.mark.parametrize(

@@ -61,9 +61,9 @@ def bench(tmp_path, monkeypatch):
 
 
 def test_the_slide_that_reports_the_textures_apart_is_made_and_recognises_them(model, bench, capsys) -> None:
-    assert main(['identify', model, '--slides', '4', '--sure', '0.99']) == 0
+    assert main(['identify', model, '--most', '4', '--sure', '0.99']) == 0
     said = capsys.readouterr().out
-    assert 'slide 1: linear_slide, direction 0 rad, 0.1 m/s, 2 N' in said
+    assert 'slide 1: linear_slide, direction 0°, 0.1 m/s, 2 N' in said
     assert 'texture: ridges_x, probability' in said
 
 

@@ -22,7 +22,7 @@ def data(tmp_path_factory):
     write_simulated(folder, PLAN, np.random.default_rng(0), surfaces=('glass', 'leather'))
     bags = [str(folder / 'glass'), str(folder / 'leather')]
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
-    assert main(['train', 'default', *bags, '-o', str(folder / 'all'), '--channels', 'all']) == 0
+    assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
     return folder
 
 
@@ -79,7 +79,6 @@ def test_a_model_refuses_signals_of_another_rate(data, capsys, tmp_path) -> None
 def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, capsys, tmp_path) -> None:
     changed(data / 'glass', tmp_path / 'bag', lambda topic, value: None if topic == 'signal_static' else value)
     assert 'signal_static' in refused(['evaluate', data / 'all', tmp_path / 'bag'], capsys)
-    assert 'signal_static' in refused(['evaluate', data / 'all', data / 'glass', '--channels', 'fast'], capsys)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +89,9 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('evaluate fast glass --slides 7-9', '1 to 3'),
         ('train defualt glass -o x', "did you mean 'default'?"),
         ('train default glass -o x', 'at least two surfaces'),
+        ('train default glass leather -o x --channels all', "recipe 'default' uses the vibration alone"),
         ('import biotac . .', 'biotac20'),
+        ('import table map.yaml . out --slides 1', 'of table the mapping file says what is read'),
     ],
 )
 def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, monkeypatch) -> None:

@@ -22,8 +22,8 @@ from texture_core import config as resources
 
 DEADLINE_S = 60.0
 SURFACE = 'ridge_2mm_deep'
-LINEAR = ['linear_slide', '--speed', '0.05', '--distance', '0.05', '--direction', '0', '3.14']
-CIRCULAR = ['circular', '--speed', '0.05', '--radius', '0.02', '--turns', '0.5', '--direction', '0.8']
+LINEAR = ['linear_slide', '--speed', '0.05', '--distance', '0.05', '--direction', '0', '180']
+CIRCULAR = ['circular', '--speed', '0.05', '--radius', '0.02', '--turns', '0.5', '--direction', '45']
 IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 
 # A label other than the true one would tell that the signal is not that of the way the finger went. The model knows

@@ -9,7 +9,11 @@ texture demo
 texture launch emulator surface:=leather      # or: ros2 launch texture_bringup emulator.launch.xml surface:=leather
 texture explore linear_slide --speed 0.05 --distance 0.06
 texture dashboard
+eval "$(register-python-argcomplete texture)" # in ~/.bashrc: completes commands and options (python3-argcomplete)
 ```
+
+Directions are in degrees in commands and on the dashboard, all else in SI units. A task that takes longer than 3 s says
+how far it is.
 
 Limits: `respawn` never restarts a node that moves a robot. Other packages add commands through the entry point group
 `texture.commands`.

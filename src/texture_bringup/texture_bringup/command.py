@@ -20,10 +20,19 @@ from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points, version
 from typing import cast
 
-from texture_core.cli import Command, run_program
+from texture_core.cli import Command, run_program, show_progress
 from texture_core.config import find
 
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
+# In what order the help shows the commands; those of other packages come last.
+HELP: Mapping[str, Sequence[str]] = {
+    'Start': ('demo', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
+    'Explore with the running robot': ('explore', 'identify', 'stop', 'lift', 'recover', 'reboot'),
+    'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
+    'Record': ('collect', 'record', 'replay', 'import', 'segment', 'export'),
+    'Learn': ('train', 'add', 'remove', 'optimise'),
+    'Measure': ('evaluate', 'cross-validate', 'panel', 'scene', 'experiment', 'benchmark', 'endurance'),
+}
 
 
 @cache
@@ -82,6 +91,7 @@ def _dispatch(given: Sequence[str]) -> int:
     module = cast(Command, command.load())
     parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
     module.configure(parser)
+    show_progress()
     return module.run(parser.parse_args(rest))
 
 
@@ -101,9 +111,14 @@ def _complete() -> None:
 
 def overview() -> str:
     """Return the help of the command itself."""
-    lines = [f'  {name:<16}{summary(command)}' for name, command in installed().items()]
-    head = 'usage: texture COMMAND [...]\n\nRecognise surfaces by sliding a tactile finger over them.\n'
-    return '\n'.join([head, *lines, '\nMore of each: texture COMMAND --help'])
+    known = installed()
+    others = [name for name in known if not any(name in names for names in HELP.values())]
+    lines = ['usage: texture COMMAND [...]', '', 'Recognise surfaces by sliding a tactile finger over them.']
+    for title, names in {**HELP, 'Further': others}.items():
+        rows = [f'  {name:<16}{summary(known[name])}' for name in names if name in known]
+        lines += ['', f'{title}:', *rows] if rows else []
+    more = 'More of each: texture COMMAND --help. Completion in bash: eval "$(register-python-argcomplete texture)"'
+    return '\n'.join([*lines, '', more])
 
 
 if __name__ == '__main__':

@@ -452,6 +452,7 @@ def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
 # --------------------
 # The web server of the dashboard: static page, a WebSocket of frames, a few commands. Knows no ROS.
 
+BUTTONS = ('explore', 'stop', 'add', 'record', 'tare', 'recover', 'check', 'collect')
 MAX_BODY_BYTES = 4096
 MAX_MESSAGE_BYTES = 1024
 MAX_VIEWERS = 16
@@ -524,8 +525,8 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     Parameters
     ----------
     commands
-        Carries out what the page asks for, as `nodes.dashboard.DashboardNode` does: coroutines `explore`, `stop`, `add`
-        and `record` of what is asked, a coroutine `offered`, and `replay`. A TextureError is shown to the user.
+        Carries out what the page asks for, as `nodes.dashboard.DashboardNode` does: a coroutine of what is asked for
+        each of `BUTTONS`, a coroutine `offered`, and `replay`. A TextureError is shown to the user.
     access
         Who may ask for what.
     page
@@ -555,7 +556,7 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     app.router.add_get('/ws', viewers.watch)
     app.router.add_get('/api/motions', motions)
     app.router.add_get('/api/past/{id}', past)
-    for name in ('explore', 'stop', 'add', 'record'):
+    for name in BUTTONS:
         app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
     for path in PAGE:
         app.router.add_get(path, static)
@@ -767,6 +768,7 @@ class Feed:
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
         self.recording = ''  # folder that is being recorded to
+        self.working = ''  # what a sub-command that the page has started said last
 
     def on_signal(self, signal: TactileSignal) -> None:
         """Take a batch of the fast stream."""
@@ -823,7 +825,12 @@ class Feed:
         text = json.dumps(frame, allow_nan=False)
         if self.exploring:
             self.history.add(self._state.exploration_id, {}, text)
-        rest = {'lights': self.node_statuses.shown(time_s), 'past': self.history.listed(), 'recording': self.recording}
+        rest = {
+            'lights': self.node_statuses.shown(time_s),
+            'past': self.history.listed(),
+            'recording': self.recording,
+            'working': self.working,
+        }
         return f'{text[:-1]}, {json.dumps(rest)[1:]}'
 
     def _signal(self) -> dict[str, Any]:

@@ -6,10 +6,17 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
+from texture_core.config import from_mapping, parameters_of
 from texture_core.errors import TextureError
+
+T = TypeVar('T')
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,7 @@ class Command:
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
     """Add `--namespace`."""
-    parser.add_argument('--namespace', default='', help='namespace of the nodes')
+    parser.add_argument('--namespace', default='', metavar='NS', help='namespace of the nodes')
 
 
 def add_slides(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +59,7 @@ def add_slides(parser: argparse.ArgumentParser) -> None:
         '--slides',
         default='',
         metavar='N-M',
-        help='which slides of each surface, as recorded; all if not given',
+        help='which slides of each surface, counted as recorded, such as 1-30 or 1,3,5-7; all if not given',
     )
 
 
@@ -61,7 +68,7 @@ def add_channels(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--channels',
         choices=('fast', 'all'),
-        help='fast: the vibration alone; all: the slow channels beside it, too; default: as recorded or trained',
+        help='fast: the vibration alone; all: the slow channels, too; default: all that there are',
     )
 
 
@@ -75,6 +82,97 @@ def add_dask(parser: argparse.ArgumentParser) -> None:
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """Add `--seed`."""
     parser.add_argument('--seed', type=int, default=0, help='seed of whatever is random')
+
+
+def add_parameters(parser: argparse.ArgumentParser, cls: type) -> None:
+    """Add an option for each parameter of a dataclass: `--speed-low-m-s` for `speed_low_m_s`."""
+    for one in parameters_of(cls):
+        about = one.description.rstrip('.').replace('%', '%%') + (f', {one.unit}' if one.unit else '')
+        shape = {'choices': one.choices} if one.choices else {'metavar': 'X'}
+        option = f'--{one.name.replace("_", "-")}'
+        parser.add_argument(option, type=one.type, default=one.default, help=f'{about} (default: %(default)s)', **shape)
+
+
+def parameters_from(options: argparse.Namespace, cls: type[T]) -> T:
+    """Return the dataclass that the options of `add_parameters` stand for; InvalidParameter if one is out of range."""
+    return from_mapping(cls, {one.name: getattr(options, one.name) for one in parameters_of(cls)})
+
+
+# --------------------
+# How far a long task is. Libraries report it anywhere; it is shown where a program has asked for it.
+
+QUIET_S = 3.0  # what is over sooner says nothing
+TERMINAL_PERIOD_S, LOG_PERIOD_S = 0.5, 10.0
+
+
+class _Shown:
+    """Whether progress is shown, and whether a task that shows its own is going on."""
+
+    wanted = False
+    busy = False
+
+
+def show_progress() -> None:
+    """Show the progress of this process from now on, on the error stream."""
+    _Shown.wanted = True
+
+
+@contextmanager
+def task(what: str, total: int = 0) -> Iterator[Callable[[], None]]:
+    """Say, while a `with` block takes longer than 3 s, what it does, how far it is and how long it has taken.
+
+    On a terminal one line changes in place and goes at the end; elsewhere a line is written every 10 s. Of nested tasks
+    the outermost is shown.
+
+    Parameters
+    ----------
+    what
+        What is done, such as 'read bags'.
+    total
+        Number of steps; 0 if unknown.
+
+    Yields
+    ------
+    Callable
+        To be called after each step.
+    """
+    if not _Shown.wanted or _Shown.busy:
+        yield lambda: None
+        return
+    _Shown.busy = True
+    began_s, done, over = time.monotonic(), 0, threading.Event()
+    terminal = sys.stderr.isatty()
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+
+    def tell() -> None:
+        waited_s = QUIET_S
+        while not over.wait(waited_s):
+            waited_s = TERMINAL_PERIOD_S if terminal else LOG_PERIOD_S
+            count = f' {done} of {total}' if total else f' {done}' if done else ''
+            line = f'{what}{count}, {time.monotonic() - began_s:.0f} s'
+            print(f'\r\x1b[2K{line}' if terminal else line, end='' if terminal else '\n', file=sys.stderr, flush=True)
+
+    teller = threading.Thread(target=tell, name='progress', daemon=True)
+    teller.start()
+    try:
+        yield step
+    finally:
+        over.set()
+        teller.join()
+        _Shown.busy = False
+        if terminal and time.monotonic() - began_s > QUIET_S:
+            print('\r\x1b[2K', end='', file=sys.stderr, flush=True)
+
+
+def progress(items: Iterable[T], what: str, total: int = 0) -> Iterator[T]:
+    """Yield items as a `task` of as many steps."""
+    with task(what, total) as step:
+        for item in items:
+            yield item
+            step()
 
 
 # --------------------

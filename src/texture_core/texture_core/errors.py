@@ -4,15 +4,19 @@
 from __future__ import annotations
 
 import enum
+import re
 
 MAX_CHARACTERS = 1000
+# What Python puts around the words of the operating system: a number, and the path, which sentences name themselves.
+ERRNO = re.compile(r"\[Errno -?\d+\] ([^:'\"]*)(: '[^']*')?")
 
 
 class TextureError(Exception):
     """Base of all errors that a user can cause or meet; its text, always one line, is shown to the user as it is."""
 
     def __init__(self, sentence: str = '') -> None:
-        line = ' '.join(sentence.split())  # what came, and what others said about it, may be many lines or long ones
+        # What came, and what others said about it, may be many lines or long ones.
+        line = ' '.join(ERRNO.sub(r'\1', sentence).split())
         super().__init__(line if len(line) <= MAX_CHARACTERS else f'{line[: MAX_CHARACTERS - 1]}…')
 
 

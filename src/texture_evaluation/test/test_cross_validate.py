@@ -318,10 +318,10 @@ def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
         (tmp_path / f'{name}.yaml').write_text(SMALL % feature)
         names.append(str(tmp_path / f'{name}.yaml'))
     parser = argparse.ArgumentParser()
-    evaluate.configure(parser)
-    evaluate.run(
+    evaluate.cross_validate_.configure(parser)
+    evaluate.cross_validate_.run(
         parser.parse_args([
-            '--cross-validate', 'leave-one-out:session', *names, str(tmp_path / 'bags'),
+            'leave-one-out:session', *names, str(tmp_path / 'bags'),
             '--json', str(tmp_path / 'figures.json'), '--chart', str(tmp_path / 'figures.png'),
         ])
     )  # fmt: skip

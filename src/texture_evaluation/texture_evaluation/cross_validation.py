@@ -457,7 +457,7 @@ def _draw_shares(axes: Any, results: Sequence[CrossValidation]) -> None:
 
 
 # --------------------
-# What `--cross-validate` names: a splitter, and what must not be on both sides of a split.
+# What `texture cross-validate` names: a splitter, and what must not be on both sides of a split.
 
 TEST_SIZE = 0.25  # of a random split
 

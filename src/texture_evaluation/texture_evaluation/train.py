@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from texture_core.cli import task
 from texture_core.config import writing
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe, with_channels
@@ -52,7 +53,8 @@ def train_from_bags(
     plan = with_channels(load_recipe(recipe), channels)
     dataset = SlideDataset.from_bags(bags, slides, namespace, plan.feature_set.topics)
     examples = training_examples(plan, dataset)
-    model = train(plan, examples, _name(out, plan.name))
+    with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
+        model = train(plan, examples, _name(out, plan.name))
     faults = dataset.tare_faults(plan.feature_set)
     model = replace(model, training={**model.training, **({'tare': faults} if faults else {})})
     if out is not None:
@@ -93,7 +95,8 @@ def train_grades_from_bags(
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
     examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
-    model = train_grades(plan, examples, table, _name(out, plan.name))
+    with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
+        model = train_grades(plan, examples, table, _name(out, plan.name))
     if out is not None:
         _save(model, out, bags, slides, grades=str(grades))
     return model

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_core.cli import progress
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import (
     NANOSECONDS,
@@ -337,7 +338,7 @@ def find_slides(
     wanted = parse_selection(slides)
     paths = find_bags(bags)
     labelled = []
-    for path in paths:
+    for path in progress(paths, 'read bags', len(paths)):
         own = _slides_of(path, namespace, topics)
         if not own and len(paths) > 1:
             logging.getLogger(__name__).warning("the bag '%s' has no labelled slide, so nothing is taken from it", path)
@@ -752,7 +753,7 @@ class SlideDataset:
         ModelMismatch
             If a slide has nothing of an input.
         """
-        for slide in self.slides:
+        for slide in progress(self.slides, 'compute features of slides', len(self)):
             yield slide, cut_slide(slide, feature_set)
 
     def vectors(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[FeatureVector]]]:

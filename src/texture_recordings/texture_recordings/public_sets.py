@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from texture_core.cli import progress
 from texture_core.config import Arrays, open_regular, unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal
@@ -156,7 +157,11 @@ def import_biotac20(
         if name not in files:
             raise unknown_name(name, files, 'material')
     wanted = parse_selection(slides)
-    return [_import_material(files[name], Path(out) / name, wanted, channels) for name in (materials or list(files))]
+    names = materials or list(files)
+    return [
+        _import_material(files[name], Path(out) / name, wanted, channels)
+        for name in progress(names, 'import materials', len(names))
+    ]
 
 
 def _import_material(file: Path, out: Path, wanted: frozenset[int] | None, channels: str) -> Path:
@@ -484,11 +489,12 @@ class SlideFile:
         for name in surfaces or sorted(found):
             for condition, key in _chosen(name, found[name], wanted):
                 sessions[self.session(name, condition)].append((key, name, condition))
+        ordered = sorted(sessions.items(), key=lambda item: item[0][1])
         return [
             write_steady_slides(
                 Path(out) / bag, self.stream, (self._slide(*slide, content[slide[0]]) for slide in slides), start_ns
             )
-            for (bag, start_ns), slides in sorted(sessions.items(), key=lambda item: item[0][1])
+            for (bag, start_ns), slides in progress(ordered, 'import bags', len(ordered))
         ]
 
     def _slide(self, key: str, surface: str, condition: Any, values: AnyArray) -> SteadySlide:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from texture_core.cli import progress
 from texture_core.errors import InvalidData
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, segment_recording
@@ -50,9 +51,10 @@ def segment_bags(
     InvalidData
         If a bag cannot be read, has no vibration, or a copy exists already.
     """
+    paths = find_bags(bags)
     return {
         Path(out) / path.name: _segment(path, Path(out) / path.name, params, surface, namespace)
-        for path in find_bags(bags)
+        for path in progress(paths, 'segment bags', len(paths))
     }
 
 

@@ -33,6 +33,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_core.cli import progress
 from texture_core.config import (
     MB,
     FileRefused,
@@ -1695,7 +1696,7 @@ def import_tables(
     """
     report = ImportReport()
     with SlideBags(mapping, out) as bags, TableFiles() as files:
-        for path, place, fields in _files(mapping, Path(source), kinds, report):
+        for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for table in files.tables(_kind(path), path, place, mapping, fields):
                 for session, slide in _TableSlides(mapping, table, report).slides():
                     bags.write(session, slide)

@@ -17,6 +17,7 @@ from texture_simulation.devices.ur import (
     EmulatedController,
     EmulatedRobot,
     ForceMode,
+    InputClaims,
     LinearMove,
     RtdeMessage,
     RtdeSession,
@@ -244,7 +245,7 @@ def served():
 
 @pytest.fixture
 def session(served):
-    return RtdeSession(served, {})
+    return RtdeSession(served, InputClaims())
 
 
 def message(kind, payload=b''):
@@ -270,7 +271,7 @@ def test_data_come_at_the_wanted_rate(session, served):
 
 
 def test_an_input_belongs_to_one_client_until_it_leaves(served):
-    claims = {}
+    claims = InputClaims()
     first, second = RtdeSession(served, claims), RtdeSession(served, claims)
     setup = message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3,')
     assert first.receive(setup)[4:] == b'INT32,DOUBLE'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture benchmark_options`: run a benchmark; writes figures and a chart."""
+"""`texture benchmark`: run a benchmark; writes figures and a chart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all, run_benchmark
 from texture_benchmarks.study import BenchmarkOptions, importing_once
-from texture_core.cli import add_seed
+from texture_core.cli import add_seed, task
 from texture_core.errors import InvalidData
 
 ALL = 'all'
@@ -63,6 +63,7 @@ def _run_to_exit_code(name: str, benchmark_options: BenchmarkOptions) -> int:
 
 def _run_one(name: str, benchmark_options: BenchmarkOptions) -> None:
     began_s = time.monotonic()
-    result, path = run_benchmark(name, benchmark_options)
+    with task(name):
+        result, path = run_benchmark(name, benchmark_options)
     took = f'{name}, {time.monotonic() - began_s:.0f} s: {(result.measured or name).splitlines()[0]}'
     print('\n  '.join([took, *map(str, (path, *result.charts))]), flush=True)

@@ -3,13 +3,15 @@
 const RETRY_MS = 1000;
 const SILENT_MS = 3000;
 const FRAME_MS = 100;
-const BARS = 8;
+const BARS = 6;
+const CURVES = ['--accent', '--second', '--third'];
 const AXIS = { left: 48, bottom: 18, top: 14 };
 const ENDED = ['idle', 'done', 'aborted'];
 const at = (id) => document.getElementById(id);
 let replaying = null;
 let last = 0;
 let connected = false;
+let curve = { id: '', points: [] };
 
 const shown = (value, digits, unit) => (value === null || value === undefined ? '–' : `${value.toFixed(digits)} ${unit}`);
 const say = (text, bad = false) => {
@@ -165,13 +167,60 @@ function showState(state) {
   at('motion-now').textContent = state.motion || '–';
 }
 
+// The probabilities of the exploration that is shown, by the sliding time that they rest on.
+function noteCurve(texture) {
+  const newest = curve.points.length ? curve.points[curve.points.length - 1].seconds : 0;
+  if (texture.exploration_id !== curve.id || texture.evidence_s < newest) curve = { id: texture.exploration_id, points: [] };
+  if (!texture.labels.length || (curve.points.length && texture.evidence_s === newest)) return;
+  const probabilities = Object.fromEntries(texture.labels.map((label, k) => [label, texture.probabilities[k]]));
+  curve.points.push({ seconds: texture.evidence_s, probabilities, decided: texture.decided });
+}
+
+function drawCurve() {
+  const plot = drawing('curve');
+  const { pen, width, height } = plot;
+  const { points } = curve;
+  const base = height - AXIS.bottom;
+  const longest = Math.max(1, points.length ? points[points.length - 1].seconds : 0);
+  const x = (seconds) => AXIS.left + (seconds / longest) * (width - AXIS.left - 4);
+  const y = (probability) => base - probability * (base - AXIS.top);
+  drawAxes(plot, { x, y, xTicks: ticks(0, longest), yTicks: [0, 0.25, 0.5, 0.75, 1], xUnit: 's', yUnit: '' });
+  if (!points.length) return;
+  const last = points[points.length - 1].probabilities;
+  const leading = Object.keys(last).sort((one, other) => last[other] - last[one]).slice(0, CURVES.length);
+  leading.forEach((label, k) => {
+    pen.strokeStyle = pen.fillStyle = colour(CURVES[k]);
+    pen.lineWidth = k ? 1.5 : 2.5;
+    pen.beginPath();
+    points.forEach((point, n) => pen[n ? 'lineTo' : 'moveTo'](x(point.seconds), y(point.probabilities[label] ?? 0)));
+    pen.stroke();
+    pen.fillText(label, AXIS.left + 8, y(0.5) + 16 * (k - 1));  // where lines are least often
+  });
+  const decided = points.find((point) => point.decided);
+  if (!decided) return;
+  pen.fillStyle = colour('--ink');
+  pen.beginPath();
+  pen.arc(x(decided.seconds), y(decided.probabilities[leading[0]] ?? 0), 5, 0, 2 * Math.PI);
+  pen.fill();
+  const right = x(decided.seconds) > width - 70;
+  pen.textAlign = right ? 'right' : 'left';
+  pen.fillText('decided', x(decided.seconds) + (right ? -9 : 9), y(decided.probabilities[leading[0]] ?? 0) + 16);
+}
+
 function showTexture(texture) {
+  noteCurve(texture);
+  drawCurve();
   at('label').textContent = texture.label ? (texture.known ? texture.label : `${texture.label}?`) : '–';
   at('label').dataset.final = texture.final;
   const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
   const sure = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
   const strange = texture.label && !texture.known ? `rejected: ${texture.rejection}` : '';
-  at('estimate-note').textContent = [sure, seen, strange, texture.message, texture.missing].filter(Boolean).join(' · ');
+  const missing = texture.label ? '' : texture.missing || texture.message;
+  at('estimate-note').textContent = [sure, seen, strange, missing].filter(Boolean).join(' · ');
+  const advice = texture.label ? texture.message : '';
+  at('advice').hidden = !advice;
+  at('advice').querySelector('summary').textContent = texture.known ? 'Advice' : 'Why';
+  at('advice').querySelector('p').textContent = advice;
   const bars = texture.labels.slice(0, BARS).map((label, k) => [label, texture.probabilities[k]]);
   fill(at('evidence'), bars, ([label, probability]) => {
     const bar = element('div', '', 'bar');
@@ -183,10 +232,11 @@ function showTexture(texture) {
 }
 
 function showRoughness(roughness) {
+  if (roughness.model) at('roughness').hidden = false;
   const share = roughness.valid ? Math.min(1, Math.max(0, (roughness.grade - 1) / 4)) : 0;
   at('gauge-arc').style.strokeDasharray = `${100 * share} 100`;
   at('grade').textContent = roughness.valid ? roughness.grade.toFixed(1) : '–';
-  at('roughness-note').textContent = roughness.valid ? `± ${roughness.grade_std === null ? '?' : roughness.grade_std.toFixed(1)}` : roughness.message || 'no roughness model loaded';
+  at('roughness-note').textContent = roughness.valid ? `± ${roughness.grade_std === null ? '?' : roughness.grade_std.toFixed(1)}` : roughness.message;
 }
 
 function showFrame(frame) {
@@ -203,6 +253,7 @@ function showRest(frame) {
   at('record').textContent = frame.recording ? 'End recording' : 'Record';
   at('record').dataset.on = frame.recording ? 'yes' : '';
   at('recording').textContent = frame.recording;
+  at('working').textContent = frame.working;
   const past = frame.past.map(({ id, motion, phase, label, grade, surface }) => ({ id, motion, phase, label, grade, surface }));
   fill(at('past'), past, (item) => {
     const row = element('li', '');
@@ -297,16 +348,21 @@ at('explore').addEventListener('submit', (event) => {
   replaying = null;
   say('exploring');
   ask('explore', {
-    motion: at('motion').value, ...Object.fromEntries(numbers), direction_rad: Number(at('direction').value),
+    motion: at('motion').value, ...Object.fromEntries(numbers), direction_rad: Number(at('direction').value) * Math.PI / 180,
     surface: at('surface').value.trim(), early_stopping: at('early').checked,
   });
 });
 at('learn').addEventListener('submit', (event) => {
   event.preventDefault();
-  ask('learn', { label: at('texture').value.trim() });
+  ask('add', { label: at('texture').value.trim() });
 });
 at('stop').addEventListener('click', () => ask('stop', {}));
-at('undo').addEventListener('click', () => ask('learn', { undo: true }));
+at('undo').addEventListener('click', () => ask('add', { undo: true }));
+at('collect').addEventListener('submit', (event) => {
+  event.preventDefault();
+  ask('collect', { surface: at('collected').value.trim() });
+});
+document.querySelectorAll('[data-ask]').forEach((button) => button.addEventListener('click', () => ask(button.dataset.ask, {})));
 at('record').addEventListener('click', () => ask('record', { on: !at('record').dataset.on }));
 window.setInterval(() => {
   if (!connected || Date.now() - last > SILENT_MS) say('nothing comes from the dashboard; is it still running?', true);

@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that slide the finger: `explore` once, `identify` until the label is decided."""
+"""The sub-commands of `texture` that slide the finger: `explore`, `identify`, `collect` and `check`."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from texture_bringup.nodes.collector import collect_surface, recorder
 from texture_bringup.operator import ExplorationResult, Operator
-from texture_core.cli import Command, add_namespace
+from texture_core.cli import Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
-from texture_core.errors import InvalidParameter, MotionRefused
+from texture_core.errors import CollectionError, InvalidParameter, MotionAborted, MotionRefused
 from texture_core.types import (
     Array,
     ExplorationRequest,
@@ -25,7 +29,10 @@ from texture_core.types import (
 )
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.next_motion import NextTouchModel, slide_values
+from texture_evaluation.check import adapt_to_today, check_finger
+from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
+from texture_recordings.dataset import SlideDataset
 
 # Option, field of the request, unit or '', meaning.
 NUMBERS = (
@@ -51,8 +58,9 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
         type=float,
         nargs='+',
         default=[0.0],
-        help='direction of travel, from +x towards +y; of a circular motion, the angle at which the slide begins, rad; '
-        'several: one exploration after the other',
+        metavar='DEG',
+        help='direction of travel, degrees from +x towards +y; of a circular motion, the angle at which the slide '
+        'begins; several: one exploration after the other',
     )
     parser.add_argument(
         '--start',
@@ -128,7 +136,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
         timeout_s=options.timeout,
         **numbers,
     )
-    return [replace(request, direction_rad=direction) for direction in options.direction]
+    return [replace(request, direction_rad=math.radians(direction)) for direction in options.direction]
 
 
 def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
@@ -171,23 +179,23 @@ SHOWN = 3  # textures, of those that are possible
 def _configure_identify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='trained on slides of several kinds over every texture')
     parser.add_argument('--sure', type=float, default=0.95, metavar='P', help='end at this probability; default: 0.95')
-    parser.add_argument('--slides', type=int, default=6, metavar='N', help='at most so many; default: 6')
+    parser.add_argument('--most', type=int, default=6, metavar='N', help='most slides that are made; default: 6')
     parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
     add_namespace(parser)
 
 
 def _identify(options: argparse.Namespace) -> int:
     """Slide until the label is decided; return 1 as soon as a slide was ended early by a fault or a stop."""
-    if options.slides < 1 or not 0.0 < options.sure <= 1.0:
+    if options.most < 1 or not 0.0 < options.sure <= 1.0:
         raise InvalidParameter(
-            f'--slides is {options.slides} and --sure {options.sure:g}; 1 or more and a probability are needed'
+            f'--most is {options.most} and --sure {options.sure:g}; 1 or more and a probability are needed'
         )
     model = load_model(options.model)
     known = next_touch_model_of(model)
     belief, number = known.uniform_log_prior, 0
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(deadline_s=10.0)
-        while number < options.slides and np.exp(belief.max()) < options.sure:
+        while number < options.most and np.exp(belief.max()) < options.sure:
             number += 1
             motion, information = known.best_motion(belief, known.motions)
             print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
@@ -227,8 +235,8 @@ def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
 def motion_text(motion: SlideMotion) -> str:
     """Return a motion in words."""
     return (
-        f'{motion.motion}, direction {motion.direction_rad:g} rad, {motion.speed_m_s:g} m/s, {motion.force_n:g} N, '
-        f'{motion.duration_s:g} s'
+        f'{motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, {motion.speed_m_s:g} m/s, '
+        f'{motion.force_n:g} N, {motion.duration_s:g} s'
     )
 
 
@@ -238,7 +246,90 @@ def belief_text(known: NextTouchModel, belief: Array) -> str:
     return ', '.join(f'{known.textures[k]} {np.exp(belief[k]):.2f}' for k in first)
 
 
+# --------------------
+# Collect slides of a surface; check the finger on the reference plate.
+
+PLATE = 'reference plate'
+
+
+def _configure_collect(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('surface', help='label of the surface under the finger')
+    parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
+    add_parameters(parser, CollectionParams)
+    add_namespace(parser)
+
+
+def _collect(options: argparse.Namespace) -> int:
+    """Collect, say after a few places how well left-out ones are told; return 0 if the bound is met, else 1."""
+    params = parameters_from(options, CollectionParams)
+    with Operator(options.namespace) as operator:
+        operator.wait_for_explorer(10.0)
+        end, bag = collect_surface(
+            operator,
+            options.surface,
+            options.folder,
+            params,
+            lambda sentence, slides: print(f'{slides} slides: {sentence}', flush=True),
+            namespace=options.namespace,
+        )
+    print(f"{end.message}; {end.slides} slides in '{bag}'", file=sys.stderr if end.error else sys.stdout)
+    if end.error is CollectionError.CANCELLED:
+        raise KeyboardInterrupt
+    return 0 if end.error is CollectionError.NONE else 1
+
+
+def _configure_check(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('model', help='path of the model, beside which reference and correction lie')
+    parser.add_argument('--store', action='store_true', help='store this slide as that of the finger of the training')
+    parser.add_argument('--correct', action='store_true', help='write the correction of gain and response, if needed')
+    parser.add_argument('--bag', help='take the last labelled slide of a bag instead of sliding now')
+    parser.add_argument('--speed', type=float, default=0.05, help='speed of the slide, m/s (default: %(default)g)')
+    parser.add_argument('--force', type=float, default=0.0, help='normal force, N; 0: the default of the motion')
+    parser.add_argument('--distance', type=float, default=0.15, help='length of the slide, m (default: %(default)g)')
+    parser.add_argument(
+        '--today', nargs='+', metavar='BAG', help='bags of today with a labelled slide of each surface; needs --trained'
+    )
+    parser.add_argument('--trained', nargs='+', metavar='BAG', help='bags of several days on which it was trained')
+    add_namespace(parser)
+
+
+def _check(options: argparse.Namespace) -> int:
+    """Check, store or adapt; return 1 if the finger is not as trained and was not corrected."""
+    if options.today or options.trained:
+        print(adapt_to_today(options.model, options.trained or (), options.today or ())[1])
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        bag = Path(options.bag) if options.bag else Path(folder) / 'plate'
+        if not options.bag:
+            request = ExplorationRequest(
+                'linear_slide',
+                speed_m_s=options.speed,
+                force_n=options.force,
+                distance_m=options.distance,
+                surface=PLATE,
+            )
+            slide_over_plate(bag, request, options.namespace)
+        slide = SlideDataset.from_bags([bag])[-1]
+    as_trained, sentence = check_finger(options.model, slide, store=options.store, correct=options.correct)
+    print(sentence)
+    return 0 if as_trained or options.correct else 1
+
+
+def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str) -> None:
+    """Slide over the reference plate, and record that into a bag; MotionAborted if the slide fails."""
+    with Operator(namespace) as operator:
+        operator.wait_for_explorer(10.0)
+        with recorder(operator, bag, namespace):
+            explored = operator.explore(request)
+        if not explored.success:
+            raise MotionAborted(f'the slide over the plate failed: {explored.message}')
+
+
 explore = Command('slide the finger over the surface and print what it is', _configure_explore, _explore)
 identify = Command(
     'repeat the slide with the largest information gain until the label is decided', _configure_identify, _identify
 )
+collect = Command(
+    'touch a surface at many places of the taught patch, and record labelled slides', _configure_collect, _collect
+)
+check = Command('slide over the reference plate, and say whether the finger is as trained', _configure_check, _check)

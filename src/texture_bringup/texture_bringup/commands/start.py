@@ -17,7 +17,7 @@ from texture_bringup.launcher import (
     given_arguments,
     read,
 )
-from texture_core.cli import Command, add_channels, add_namespace, add_seed
+from texture_core.cli import Command, add_namespace, add_seed
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 
@@ -94,19 +94,17 @@ def _dashboard(options: argparse.Namespace) -> int:
 
 def _configure_demo(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--out', type=Path, default=Path('texture-demo'), metavar='DIR', help='folder for the results')
-    add_channels(parser)
+    parser.add_argument('--recipe', default='default', metavar='NAME', help='recipe that is trained (default: default)')
     add_seed(parser)
 
 
 def _demo(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if a slide was mistaken."""
     from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate  # noqa: PLC0415 – see above
-    from texture_evaluation.commands.train import WITH_SLOW_CHANNELS  # noqa: PLC0415
 
-    recipe = WITH_SLOW_CHANNELS['default'] if options.channels == 'all' else 'default'
     with ProgressLog() as progress:
         progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-        all_right = demonstrate(options.out, recipe, options.seed, DemoPlan(), progress)
+        all_right = demonstrate(options.out, options.recipe, options.seed, DemoPlan(), progress)
         if not all_right:
             progress.line('Not every slide was recognised.')
     return 0 if all_right else 1

@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import signal
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -37,7 +40,7 @@ from texture_core.ros import (
     run,
     to_msg,
 )
-from texture_core.types import ExplorationRequest
+from texture_core.types import ExplorationRequest, checked_label
 from texture_exploration.safety import SafetyLimits
 
 ANSWER_DEADLINE_S = 30.0
@@ -64,7 +67,9 @@ class DashboardNode(Node):
         params = declare(self, DashboardParams)
         self._feed = Feed()
         self._bad = 0
-        self._recorder = Recorder(Path(params.recordings).expanduser(), self.get_namespace())
+        self._recordings = Path(params.recordings).expanduser()
+        self._command: asyncio.subprocess.Process | None = None
+        self._recorder = Recorder(self._recordings, self.get_namespace())
         self._make_clients()
         access = Access.to_this_machine(params.host)
         self._serving = Serving(
@@ -77,7 +82,10 @@ class DashboardNode(Node):
         print(f'dashboard: {access.url(self._serving.port)}', flush=True)
 
     def shutdown(self) -> None:
-        """Complete a recording, and close the page."""
+        """Complete a recording, stop a sub-command, and close the page."""
+        if self._command is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._command.send_signal(signal.SIGINT)
         self._recorder.end()  # first: the recorder ends with the thread of the server that started it
         self._serving.close()
 
@@ -114,6 +122,42 @@ class DashboardNode(Node):
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves."""
         return await self._ask(self._stop, Trigger.Request(), 'explorer')
+
+    async def tare(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Take the present level of the sensor as that without load."""
+        return await self._ask(self._tare, Trigger.Request(), 'sensor')
+
+    async def recover(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Free the arm from a fault."""
+        return await self._ask(self._recover, Trigger.Request(), 'explorer')
+
+    async def check(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Slide over the reference plate, and compare it with that of the training of the classifier's model.
+
+        Raises
+        ------
+        InvalidParameter
+            If the classifier has no model.
+        """
+        await ready(self._model.services_are_ready, 'classifier')
+        answer = await answer_of(self._model.get_parameters(['model']), ANSWER_DEADLINE_S)
+        path = answer.values[0].string_value
+        if not path:
+            raise InvalidParameter('the classifier has no model whose reference could be compared; start it with one')
+        return await self._run('check', path)
+
+    async def collect(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Record labelled slides at many places of the taught patch, into the folder `surfaces` of the recordings.
+
+        Raises
+        ------
+        InvalidParameter
+            If the surface has no name.
+        """
+        surface = checked_label(_short(str(asked.get('surface', ''))))
+        if not surface or surface.startswith('-'):
+            raise InvalidParameter('the surface to collect has no name; give one')
+        return await self._run('collect', surface, str(self._recordings / 'surfaces'))
 
     async def add(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Add an exploration, the last one if it has no id, or remove the last added slide.
@@ -161,7 +205,10 @@ class DashboardNode(Node):
         self._stop = self.create_client(Trigger, 'explorer/stop')
         self._learn = self.create_client(srv.AddTexture, 'classifier/add_texture')
         self._undo = self.create_client(Trigger, 'classifier/remove_last_added')
+        self._tare = self.create_client(Trigger, 'sensor/tare')
+        self._recover = self.create_client(Trigger, 'explorer/recover')
         self._limits = AsyncParameterClient(self, 'explorer')
+        self._model = AsyncParameterClient(self, 'classifier')
 
     def _subscribe(self) -> None:
         feed = self._feed
@@ -200,6 +247,28 @@ class DashboardNode(Node):
     def _report(self) -> DiagnosticReport:
         fault = self._recorder.fault
         return 'WARN' if fault or self._bad else 'OK', fault or 'the page is served', {'bad_messages': self._bad}
+
+    async def _run(self, name: str, *arguments: str) -> Mapping[str, Any]:
+        """Run a sub-command of `texture`, one at a time; the page shows each line of it, the last at its end."""
+        if self._feed.working:
+            raise InvalidParameter(
+                f'the page has started this already: {self._feed.working}; wait for it, or press Stop'
+            )
+        self._feed.working = f'{name}: starting'
+        command = [sys.executable, '-m', 'texture_bringup.command', name, *arguments]
+        namespace = self.get_namespace().strip('/')
+        line = ''
+        try:
+            self._command = await asyncio.create_subprocess_exec(
+                *command, '--namespace', namespace, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+            )
+            assert self._command.stdout is not None
+            async for said in self._command.stdout:
+                line = said.decode(errors='replace').strip().removeprefix('texture: ') or line
+                self._feed.working = f'{name}: {line}'
+            return {'success': await self._command.wait() == 0, 'message': line}
+        finally:
+            self._command, self._feed.working = None, ''
 
     async def _ask(self, client: Any, request: Any, node: str) -> Mapping[str, Any]:
         await ready(client.service_is_ready, node)

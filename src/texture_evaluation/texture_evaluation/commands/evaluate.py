@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture evaluate`: say how good a model is on labelled bags, or cross-validate a recipe on them."""
+"""The sub-commands of `texture` that measure: `evaluate` a model on labelled bags, `cross-validate` recipes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from texture_core.cli import add_channels, add_dask, add_seed, add_slides
+from texture_core.cli import Command, add_channels, add_dask, add_seed, add_slides, task
 from texture_core.config import refuse_inputs, shipped, write_json
-from texture_core.errors import InvalidParameter, ModelMismatch
-from texture_estimation.model import TextureModel, load_model
+from texture_core.errors import InvalidParameter
+from texture_estimation.model import load_model
 from texture_estimation.model_files import both_files
-from texture_estimation.recipe import FAST_TOPIC, load_recipe, with_channels
+from texture_estimation.recipe import load_recipe, with_channels
 from texture_estimation.search import dask_backend
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
@@ -31,37 +31,17 @@ from texture_evaluation.evaluate import evaluate, sentence, summary, table
 from texture_recordings.dataset import SlideDataset
 
 
-def configure(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the sub-command."""
-    parser.add_argument('model', help='a trained model; with --cross-validate the name or path of a recipe')
-    parser.add_argument(
-        'bags', nargs='+', help='labelled bags, or folders of bags; with --cross-validate more recipes may come first'
-    )
+def _configure_evaluate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('model', help='a trained model')
+    parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
     parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
-    parser.add_argument(
-        '--chart', metavar='FILE', help='with --cross-validate: draw the recipes there; .png, .svg or .pdf'
-    )
-    parser.add_argument(
-        '--cross-validate',
-        metavar='SPLIT',
-        help='train and test a recipe on splits of the slides: stratified:5, leave-one-out:speed, '
-        'leave-one-out:place:4 (quarters of the path), chronological:0.75 or random:20',
-    )
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='folds computed at once; -1: one per core')
-    add_dask(parser)
     add_slides(parser)
-    add_channels(parser)
-    add_seed(parser)
 
 
-def run(options: argparse.Namespace) -> int:
+def _evaluate(options: argparse.Namespace) -> int:
     """Evaluate, print the figures, and write them if asked to."""
-    if options.cross_validate:
-        return run_cross_validation(options)
     refuse_inputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
-    if options.channels == 'fast':
-        _refuse_slow_channels(model)
     report = evaluate(model, options.bags, options.slides)
     for line in summary(report):
         print(line)
@@ -70,10 +50,27 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def run_cross_validation(options: argparse.Namespace) -> int:
+def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        'split',
+        help='how slides are divided: stratified:5, leave-one-out:speed, leave-one-out:place:4 (quarters of the path), '
+        'chronological:0.75 or random:20',
+    )
+    parser.add_argument('recipe', help='name of a shipped recipe, or path of your own; more may follow')
+    parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
+    parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
+    parser.add_argument('--chart', metavar='FILE', help='draw the recipes there; .png, .svg or .pdf')
+    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='folds computed at once; -1: one per core')
+    add_dask(parser)
+    add_slides(parser)
+    add_channels(parser)
+    add_seed(parser)
+
+
+def _cross_validate(options: argparse.Namespace) -> int:
     """Cross-validate one recipe or several, print tables and comparisons, and write and draw them if asked to."""
-    split = parse_split(options.cross_validate, options.seed)
-    names, bags = recipes_and_bags([options.model, *options.bags])
+    split = parse_split(options.split, options.seed)
+    names, bags = recipes_and_bags([options.recipe, *options.bags])
     _check_outputs(options, [*names, *bags])
     recipes = [with_channels(load_recipe(name), options.channels or 'all') for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
@@ -82,10 +79,10 @@ def run_cross_validation(options: argparse.Namespace) -> int:
     with dask_backend(options.dask) if options.dask else nullcontext():
         # The workers of a cluster read the bags themselves, which all its computers find at the same paths.
         jobs, there = (None, source) if options.dask else (options.jobs, None)
-        results = [
-            cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups, source=there)
-            for recipe in recipes
-        ]
+        results = []
+        for recipe in recipes:
+            with task(f"cross-validate '{recipe.name}'"):
+                results.append(cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups, source=there))
     for line in (line for result in results for line in table(result, split.name)):
         print(line)
     compared = compare_all(results)
@@ -142,10 +139,7 @@ def _is_bags(text: str, recipes: set[str]) -> bool:
     return path.is_dir() or path.suffix == '.mcap' or (text not in recipes and path.suffix != '.yaml')
 
 
-def _refuse_slow_channels(model: TextureModel) -> None:
-    slow = [topic for topic in model.recipe.feature_set.topics if topic != FAST_TOPIC]
-    if slow:
-        raise ModelMismatch(
-            f"model '{model.name}' needs {', '.join(slow)}, which '--channels fast' leaves out; "
-            "train one with '--channels fast', or evaluate it with all channels"
-        )
+evaluate_ = Command('say how good a model is on labelled bags', _configure_evaluate, _evaluate)
+cross_validate_ = Command(
+    'train and test recipes on splits of labelled bags', _configure_cross_validate, _cross_validate
+)

@@ -6,8 +6,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_core.cli import Command, add_channels, add_seed, add_slides
-from texture_core.config import find, from_mapping, parameters_of, writing
+from texture_core.cli import Command, add_channels, add_parameters, add_slides, parameters_from, task
+from texture_core.config import find, writing
 from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.dataset import SlideDataset
@@ -25,10 +25,11 @@ def _configure_import(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'places', nargs='+', metavar='PLACE', help='the mapping file, if there is one; the source; the folder for bags'
     )
-    parser.add_argument('--materials', nargs='+', default=(), metavar='NAME', help='only these; all if not given')
+    parser.add_argument(
+        '--materials', nargs='+', default=(), metavar='NAME', help='only these surfaces; all if not given'
+    )
     add_slides(parser)
     add_channels(parser)
-    add_seed(parser)
 
 
 def _import(options: argparse.Namespace) -> int:
@@ -36,6 +37,11 @@ def _import(options: argparse.Namespace) -> int:
     mapped = options.data_set in MAPPED
     if len(options.places) != 2 + mapped:
         raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
+    if mapped and (options.slides or options.materials or options.channels):
+        raise InvalidParameter(
+            f'--slides, --materials and --channels choose from a known data set; of {options.data_set} the mapping '
+            'file says what is read'
+        )
     for bag in _import_mapped(options) if mapped else _import_known(options):
         print(bag)
     return 0
@@ -72,16 +78,12 @@ def _configure_segment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the copies with the states found')
     parser.add_argument('--surface', default='', metavar='NAME', help='label of all slides; else as the bag says')
     parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
-    for item in parameters_of(SegmentationParams):
-        option = f'--{item.name.replace("_", "-")}'
-        known = {'choices': item.choices} if item.choices else {'metavar': 'X'}
-        parser.add_argument(option, type=item.type, default=item.default, help=item.description, **known)
+    add_parameters(parser, SegmentationParams)
 
 
 def _segment(options: argparse.Namespace) -> int:
     """Write the copies, and name them with the number of their slides."""
-    values = {item.name: getattr(options, item.name) for item in parameters_of(SegmentationParams)}
-    params = from_mapping(SegmentationParams, values)
+    params = parameters_from(options, SegmentationParams)
     for path, slides in segment_bags(options.bags, options.out, params, options.surface, options.namespace).items():
         print(f'{path}: {slides} slides')
     return 0
@@ -105,8 +107,9 @@ def _export(options: argparse.Namespace) -> int:
         print(options.out)
         return 0
     dataset = SlideDataset.from_bags(options.sources, options.slides, options.namespace)
-    for line in export_slides(dataset, options.out, options.kind, options.license):
-        print(line)
+    with task(f"write '{options.out}'"):
+        lines = export_slides(dataset, options.out, options.kind, options.license)
+    print('\n'.join(lines))
     return 0
 
 

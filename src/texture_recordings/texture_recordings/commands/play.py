@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 
-from texture_core.cli import Command, add_namespace
+from texture_core.cli import Command, add_namespace, add_slides
 from texture_core.config import check_option
 from texture_core.ros import run_node
 from texture_recordings.nodes.record import RecordNode
@@ -26,7 +26,7 @@ def _record(options: argparse.Namespace) -> int:
 def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', help='the bag, or a folder of bags')
     parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded')
-    parser.add_argument('--slides', default='', help="which slides of each surface, such as '1-30'; all if not given")
+    add_slides(parser)
     parser.add_argument('--clock', action='store_true', help='publish the time of the recording on /clock')
     add_namespace(parser)
 

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+import time
+
+from texture_core import cli
+from texture_core.errors import InvalidData
+
+
+def test_a_long_task_says_how_far_it_is_and_a_nested_or_short_one_nothing(monkeypatch, capsys) -> None:
+    monkeypatch.setattr(cli, 'LOG_PERIOD_S', 0.2)
+    cli.show_progress()
+    assert list(cli.progress('ab', 'count letters', 2)) == ['a', 'b']
+    assert capsys.readouterr().err == ''
+    monkeypatch.setattr(cli, 'QUIET_S', 0.1)
+    for letter in cli.progress('ab', 'count letters', 2):
+        with cli.task('spell'):
+            time.sleep(0.25 if letter == 'b' else 0.0)
+    assert capsys.readouterr().err == 'count letters 1 of 2, 0 s\n'
+
+
+def test_a_sentence_on_a_file_has_no_number_of_the_operating_system() -> None:
+    error = FileNotFoundError(2, 'No such file or directory', '/nowhere')
+    sentence = str(InvalidData(f"'x' cannot be read: {error}; give another"))
+    assert sentence == "'x' cannot be read: No such file or directory; give another"
