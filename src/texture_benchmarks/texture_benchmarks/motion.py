@@ -32,7 +32,7 @@ from texture_exploration.arms.ros_controllers import RosControllersArm, RosContr
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import PERIOD_S, Exploration, ExplorationOutcome, Explorer
-from texture_exploration.force_control import ForceController, ForceLoopParams, stability_chart, stability_limit_gain
+from texture_exploration.force_control import ForceLoopParams, stability_chart, stability_limit_gain
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import TouchParams
@@ -542,11 +542,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     }
     lags = hazard_trials('none', fine, lags_s)
     hazards = {name: hazard_trials(name, hazard.stiffnesses_n_m[:most], lags_s) for name, hazard in HAZARDS.items()}
-    border = stability_chart(
-        BORDER_STIFFNESSES_N_M,
-        QUICK_DELAYS_S if options.quick else DELAYS_S,
-        lambda loop: ForceController(loop.gain_m_s_n, loop.integral_s),
-    )
+    border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S)
     robots = {
         name: {
             f'{k:.0f} N/m': {

@@ -27,7 +27,7 @@ REQUESTS = {
     '/classifier/add_texture': srv.AddTexture,
     '/classifier/remove_texture': srv.RemoveTexture,
 }
-SERVICE = re.compile(r"create_service\([\w.]+, '([\w~/]+)'")
+SERVICE = re.compile(r"(?:create_service\([\w.]+, |_offer\()'([\w~/]+)'")
 SHOWN = {f'/views/{name}': kind for name, kind in VIEW_TYPES.items()}
 TYPES = {'/' + topic.name.lstrip('/'): topic.type for topic in TOPICS.values()} | SHOWN
 # What a panel must have besides its paths, by the configuration types of Lichtblick 1.28 and Foxglove.

@@ -40,7 +40,7 @@ from texture_core.types import (
     TextureEstimate,
 )
 from texture_exploration import motions
-from texture_exploration.safety import RANGES, SafetyLimits
+from texture_exploration.safety import SafetyLimits
 
 # --------------------
 # Who may use the page: requests of this page alone, and beyond loopback only with the token.
@@ -218,10 +218,9 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
 
 def offered(limits: SafetyLimits) -> dict[str, list[dict[str, Any]]]:
     """Return the numbers of each motion: name, default, lowest, highest and unit."""
-    ranges = {name: (getattr(limits, low), getattr(limits, high), unit) for name, (low, high, unit) in RANGES.items()}
     return {
         motion: [
-            {'name': name, 'default': value, **dict(zip(('low', 'high', 'unit'), ranges[name], strict=True))}
+            {'name': name, 'default': value, **dict(zip(('low', 'high', 'unit'), limits.range(name), strict=True))}
             for name, value in defaults.items()
         ]
         for motion, defaults in DEFAULTS.items()

@@ -495,7 +495,7 @@ def test_a_tilted_surface_is_found_by_four_touches_and_the_last_shows_the_residu
     depth_m = press_at(robot, 0.04, 0.03)
     assert 'residual 0.00 mm rms, largest 0.00 mm' in explorer.touch_surface()
     patch = explorer.patch  # the rectangle around the touches, about their middle
-    assert patch.taught and patch.patch_x_high_m - patch.patch_x_low_m == pytest.approx(0.05, abs=0.002)
+    assert patch.patch_x_high_m - patch.patch_x_low_m == pytest.approx(0.05, abs=0.002)
     explorer.connect()
     for place in ((0.01, -0.03), (-0.04, 0.02)):
         press_at(robot, *place, share=0.0)

@@ -49,7 +49,7 @@ def test_every_line_fits_its_type(name, kind, values):
 
 def test_the_page_names_every_service_of_the_explorer():
     source = Path(explorer.__file__).read_text()
-    offered = {name.replace('~', '/explorer') for name in re.findall(r"create_service\([\w.]+, '(~/\w+)'", source)}
+    offered = {name.replace('~', '/explorer') for name in re.findall(r"_offer\('(~/\w+)'", source)}
     assert offered
     assert offered <= {name for name, _, _ in LINES}
 

@@ -6,8 +6,8 @@ import pytest
 
 from texture_core.errors import DeviceError
 from texture_core.types import FingerState
-from texture_exploration.arms.arm import HOLDS_S, ArmCommand, DelayedVelocity
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.simulated import HOLDS_S, DelayedVelocity, SimulatedArm, SimulatedArmParams
 
 
 class Clock:

@@ -18,10 +18,6 @@ STIFFNESSES = [100.0, 1e3, 1e4, 1e5]
 DELAYS = [0.0, 0.003, 0.008, 0.0133, 0.02]
 
 
-def controller(loop):
-    return ForceController(loop.gain_m_s_n, loop.integral_s)
-
-
 def test_a_sampled_integrator_without_delay_bears_two_over_stiffness_and_period():
     assert stability_limit_gain(LoopModel(1000.0, 0.0, 0.0, 0.004)) == pytest.approx(2.0 / (1000.0 * 0.004))
 
@@ -41,7 +37,7 @@ def test_a_delay_of_one_period_bears_the_golden_limit():
 @pytest.mark.parametrize('delay', DELAYS)
 def test_the_matrix_predicts_the_running_controller_step_by_step(delay):
     loop = LoopModel(2000.0, 0.01, delay, 0.004, 0.5)
-    matrix, running = loop_matrix(loop), controller(loop)
+    matrix, running = loop_matrix(loop), ForceController(loop.gain_m_s_n, loop.integral_s)
     state = np.zeros(len(matrix))
     state[:2] = 1.0, loop.period_s
     asked, error, predicted, measured = [0.0] * 10, 1.0, [], []
@@ -57,7 +53,7 @@ def test_the_matrix_predicts_the_running_controller_step_by_step(delay):
 
 
 def test_predicted_and_simulated_limits_agree_within_a_tenth():
-    chart = stability_chart(STIFFNESSES, DELAYS, controller)
+    chart = stability_chart(STIFFNESSES, DELAYS)
     assert chart['predicted'].shape == (4, 5)
     np.testing.assert_allclose(chart['simulated'], chart['predicted'], rtol=0.1)
 
@@ -65,9 +61,7 @@ def test_predicted_and_simulated_limits_agree_within_a_tenth():
 def test_the_integral_part_costs_stability():
     plain, integral = LoopModel(1000.0, 0.0, 0.01, 0.004), LoopModel(1000.0, 0.0, 0.01, 0.004, 0.05)
     assert stability_limit_gain(integral) < stability_limit_gain(plain)
-    assert simulated_stability_limit_gain(integral, controller) == pytest.approx(
-        stability_limit_gain(integral), rel=0.1
-    )
+    assert simulated_stability_limit_gain(integral) == pytest.approx(stability_limit_gain(integral), rel=0.1)
 
 
 def test_at_half_the_limit_a_disturbance_dies_out_quickly():

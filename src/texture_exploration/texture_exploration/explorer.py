@@ -151,6 +151,35 @@ class ExplorationOutcome:
         """Whether it was done as requested."""
         return self.error is ExplorationError.NONE
 
+    @property
+    def severity(self) -> Literal['info', 'warning', 'error']:
+        """Level of the log: an abort is a warning, a finger that was not lifted is an error."""
+        if self.success:
+            return 'info'
+        return 'warning' if self.lifted else 'error'
+
+    def sentence(self, exploration_id: str) -> str:
+        """Return what the log says."""
+        lifted = '' if self.success or not self.lifted else '; the finger was lifted'
+        return f'{exploration_id}: {self.message}{lifted}'
+
+
+STILL_MOVING = ExplorationOutcome(
+    ExplorationError.INTERNAL,
+    'the explorer ended before the finger was lifted; look at the robot',
+    slid=False,
+    lifted=False,
+)
+
+
+def new_id(time_ns: int, number: int, rng: np.random.Generator) -> str:
+    """Return a readable unique id such as '20261120T235959-001-ab12': UTC since 1970, a running number, a random end.
+
+    The random end keeps two nodes apart that begin in the same second.
+    """
+    begin = datetime.fromtimestamp(time_ns // 1_000_000_000, tz=timezone.utc)
+    return f'{begin:%Y%m%dT%H%M%S}-{number:03d}-{rng.integers(0x10000):04x}'
+
 
 def refusal(error: TextureError) -> ExplorationError:
     """Return the code of what `Explorer.begin` raises, or of a request that cannot be read."""
@@ -407,67 +436,6 @@ def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Liste
     if age_s > limits.state_timeout_s:
         return f'the arm has not answered for {age_s * 1e3:.0f} ms'
     return ''
-
-
-# --------------------
-# How the end of an exploration is reported to the operator.
-
-STILL_MOVING = ExplorationOutcome(
-    ExplorationError.INTERNAL,
-    'the explorer ended before the finger was lifted; look at the robot',
-    slid=False,
-    lifted=False,
-)
-
-
-@dataclass(frozen=True)
-class ExplorationEnd:
-    """The end of an exploration.
-
-    Attributes
-    ----------
-    exploration_id
-        Id of the exploration.
-    outcome
-        How it ended.
-    """
-
-    exploration_id: str
-    outcome: ExplorationOutcome
-
-    @property
-    def severity(self) -> Literal['info', 'warning', 'error']:
-        """Level of the log: an abort is a warning, a finger that was not lifted is an error."""
-        if self.outcome.success:
-            return 'info'
-        return 'warning' if self.outcome.lifted else 'error'
-
-    @property
-    def sentence(self) -> str:
-        """What the log says."""
-        lifted = '' if self.outcome.success or not self.outcome.lifted else '; the finger was lifted'
-        return f'{self.exploration_id}: {self.outcome.message}{lifted}'
-
-
-# --------------------
-# Ids of explorations.
-
-
-class ExplorationIds:
-    """Make readable unique ids such as '20261120T235959-001-ab12': UTC, a running number, a random end.
-
-    The random end keeps two nodes apart that begin in the same second.
-    """
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        self._rng = rng
-        self._number = 0
-
-    def next(self, time_ns: int) -> str:
-        """Return the name of an exploration that begins at `time_ns` since 1970."""
-        self._number += 1
-        begin = datetime.fromtimestamp(time_ns // 1_000_000_000, tz=timezone.utc)
-        return f'{begin:%Y%m%dT%H%M%S}-{self._number:03d}-{self._rng.integers(0x10000):04x}'
 
 
 # --------------------

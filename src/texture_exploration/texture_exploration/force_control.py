@@ -20,7 +20,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
@@ -296,13 +295,6 @@ class LoopModel:
     integral_s: float = math.inf
 
 
-class NormalVelocityController(Protocol):
-    """What is simulated; see `texture_exploration.force_control.ForceController`."""
-
-    def update(self, error_n: float, dt_s: float) -> float:
-        """Return the normal velocity, positive away from the surface."""
-
-
 def loop_matrix(loop: LoopModel) -> Array:
     """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities.
 
@@ -341,16 +333,14 @@ def stability_limit_gain(loop: LoopModel) -> float:
     return _bisect(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
 
 
-def simulated_stability_limit_gain(
-    loop: LoopModel, controller: Callable[[LoopModel], NormalVelocityController]
-) -> float:
-    """Return the gain from which the running controller makes a disturbance grow, m/s/N."""
-    return _bisect(loop, lambda gain: disturbance_decays(replace(loop, gain_m_s_n=gain), controller), bisections=12)
+def simulated_stability_limit_gain(loop: LoopModel) -> float:
+    """Return the gain from which a running `ForceController` makes a disturbance grow, m/s/N."""
+    return _bisect(loop, lambda gain: _disturbance_decays(replace(loop, gain_m_s_n=gain)), bisections=12)
 
 
-def disturbance_decays(loop: LoopModel, controller: Callable[[LoopModel], NormalVelocityController]) -> bool:
-    """Run a controller on a spring, finely integrated, after a jolt of 1 N; return whether the swinging shrinks."""
-    running = controller(loop)
+def _disturbance_decays(loop: LoopModel) -> bool:
+    """Run the controller on a spring, finely integrated, after a jolt of 1 N; return whether the swinging shrinks."""
+    running = ForceController(loop.gain_m_s_n, loop.integral_s)
     fine_s = loop.period_s / FINE
     late = round(loop.delay_s / fine_s)
     periods = math.ceil(CYCLES * (loop.delay_s + loop.period_s) / loop.period_s)
@@ -371,7 +361,6 @@ def disturbance_decays(loop: LoopModel, controller: Callable[[LoopModel], Normal
 def stability_chart(
     stiffness_n_m: Sequence[float],
     delay_s: Sequence[float],
-    controller: Callable[[LoopModel], NormalVelocityController],
     period_s: float = 0.004,
     integral_s: float = 0.5,
 ) -> dict[str, Array]:
@@ -383,8 +372,6 @@ def stability_chart(
         Stiffnesses of the contact, N/m, s of them.
     delay_s
         Delays of the loop, d of them.
-    controller
-        Makes the controller of a loop.
     period_s
         Time between two commands.
     integral_s
@@ -400,7 +387,7 @@ def stability_chart(
         'stiffness_n_m': np.array(stiffness_n_m, dtype=float),
         'delay_s': np.array(delay_s, dtype=float),
         'predicted': np.array([[stability_limit_gain(loop) for loop in row] for row in loops]),
-        'simulated': np.array([[simulated_stability_limit_gain(loop, controller) for loop in row] for row in loops]),
+        'simulated': np.array([[simulated_stability_limit_gain(loop) for loop in row] for row in loops]),
     }
 
 
@@ -555,13 +542,6 @@ class ForceLoopParams:
         high=5.0,
     )
 
-    press_impact_share: float = param(
-        1.0,
-        'Largest impact on the stiffest base under a soft layer, while pressing at rest, as a '
-        'fraction of the wanted force; a larger fraction presses faster.',
-        low=0.05,
-        high=100.0,
-    )
     touching_n: float = param(
         TOUCHING_N,
         'Force above which the force control takes the finger for touching; it must exceed the noise of the '
@@ -854,7 +834,7 @@ class ForceLoop:
 
     def _pressing_m_s(self, wanted_n: float) -> float:
         """Return how fast the finger may be pressed on: what is soft now may have a hard base."""
-        depth_m = self._params.press_impact_share * wanted_n / self._declared.max_stiffness_n_m
+        depth_m = wanted_n / self._declared.max_stiffness_n_m  # the impact on it is at most the wanted force
         return depth_m * self._patience / self._reaction_s(self._params)
 
     def approach_m_s(self, height_m: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from texture_core.errors import MotionRefused
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms.arm import ArmState, Vector
-from texture_exploration.safety import SafetyLimits, stated
+from texture_exploration.safety import MAX_DISTANCE_M, SafetyLimits, stated
 from texture_exploration.stages import (
     STEADY_S,
     AccelerateStage,
@@ -397,14 +397,14 @@ def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, 
 def _check_linear_free_distance(
     request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits
 ) -> None:
-    """Refuse a slide that leaves the workspace, with the smaller limit of the workspace and of `max_distance_m`."""
-    given, limited = request.distance_m, replace(request, distance_m=min(request.distance_m, limits.max_distance_m))
+    """Refuse a slide that leaves the workspace, with the smaller of what the workspace and `MAX_DISTANCE_M` allow."""
+    given, limited = request.distance_m, replace(request, distance_m=min(request.distance_m, MAX_DISTANCE_M))
     request = limits.complete(limited, LINEAR_SLIDE_DEFAULTS)
     distance_m = given or request.distance_m
     ramps = ramps_m(request.speed_m_s, touch.ramp_s(request.speed_m_s))
     allowed = max(0.0, limits.free_distance_m(home, request.direction_rad) - ramps)
     if distance_m > allowed:
-        allowed = min(allowed, limits.max_distance_m)
+        allowed = min(allowed, MAX_DISTANCE_M)
         raise MotionRefused(
             f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m to gain and lose '
             f'speed leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m'

@@ -70,17 +70,29 @@ class Listening:
 WITHOUT_GAPS = Listening()
 
 
+MAX_DISTANCE_M = 1.0
+# What can be asked for: lowest, highest and unit. A number is the same for every robot; a name is a limit to be chosen.
+RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
+    'speed_m_s': (0.002, 'max_speed_m_s', 'm/s'),
+    'force_n': ('min_force_n', 'max_force_n', 'N'),
+    'distance_m': (0.002, MAX_DISTANCE_M, 'm'),
+    'radius_m': (0.005, 0.1, 'm'),
+    'turns': (0.1, 100.0, 'turns'),
+    'duration_s': (0.1, 60.0, 's'),
+}
 # Several turns are a direction, too; an angle beyond this one is a mistake, and loses its meaning by rounding.
 MAX_DIRECTION_RAD = 100.0
+
+
+def stated(given: float, value: float) -> str:
+    """Return a number of a request in words; a `given` of 0 stands for the default of the motion."""
+    return f'{value:g}' if given else f'{value:g} (the default of the motion)'
 
 
 @dataclass(frozen=True)
 class SafetyLimits:
     """Limits of what is asked, of what is measured, and of how long each phase may take."""
 
-    min_speed_m_s: float = param(
-        0.002, 'Lowest speed that may be requested; slower requests are refused.', unit='m/s', low=1e-4
-    )
     max_speed_m_s: float = param(
         0.25,
         'Highest speed that may be requested; faster requests are refused.',
@@ -127,14 +139,6 @@ class SafetyLimits:
         low=0.02,
         high=5.0,
     )
-    frozen_travel_m: float = param(
-        0.00005,
-        'Travel along the normal, in contact, after which the measured force must have changed; a '
-        'longer travel notices a frozen force later.',
-        unit='m',
-        low=1e-6,
-        high=0.01,
-    )
     force_drift_share: float = param(
         0.3,
         'Largest change of the force in free air over an exploration, as a fraction of the wanted '
@@ -142,32 +146,12 @@ class SafetyLimits:
         low=0.01,
         high=10.0,
     )
-    min_distance_m: float = param(
-        0.002, 'Shortest slide that may be requested; shorter requests are refused.', unit='m', low=1e-4
-    )
-    max_distance_m: float = param(
-        1.0, 'Longest slide that may be requested; longer requests are refused.', unit='m', low=1e-3
-    )
-    min_radius_m: float = param(
-        0.005, 'Smallest circle radius that may be requested; smaller circles are refused.', unit='m', low=1e-3
-    )
-    max_radius_m: float = param(
-        0.1, 'Largest circle radius that may be requested; larger circles are refused.', unit='m', low=1e-3
-    )
-    min_turns: float = param(0.1, 'Smallest number of turns that may be requested; fewer turns are refused.', low=0.01)
-    max_turns: float = param(100.0, 'Largest number of turns that may be requested; more turns are refused.', low=0.01)
     max_turning_m_s2: float = param(
         5.0,
         'Highest centripetal acceleration on a circle; larger values allow faster and smaller circles.',
         unit='m/s²',
         low=0.05,
         high=20.0,
-    )
-    min_duration_s: float = param(
-        0.1, 'Shortest in-hand slide that may be requested; shorter requests are refused.', unit='s', low=0.01
-    )
-    max_duration_s: float = param(
-        60.0, 'Longest in-hand slide that may be requested; longer requests are refused.', unit='s', low=0.01
     )
     x_low_m: float = param(
         -0.2,
@@ -252,6 +236,12 @@ class SafetyLimits:
             'z': (self.z_low_m, self.z_high_m),
         }
 
+    def range(self, name: str) -> tuple[float, float, str]:
+        """Return lowest and highest allowed value, and unit, of a number of a request."""
+        low, high, unit = RANGES[name]
+        low, high = (getattr(self, limit) if isinstance(limit, str) else limit for limit in (low, high))
+        return low, high, unit
+
     def complete(self, request: ExplorationRequest, defaults: Mapping[str, float]) -> ExplorationRequest:
         """Return a request with the motion's defaults for those of its numbers that are 0.
 
@@ -263,8 +253,7 @@ class SafetyLimits:
         numbers: dict[str, Any] = {name: getattr(request, name) or value for name, value in defaults.items()}
         given, request = request, replace(request, **numbers)
         for name in defaults:
-            low_name, high_name, unit = RANGES[name]
-            value, low, high = getattr(request, name), getattr(self, low_name), getattr(self, high_name)
+            value, (low, high, unit) = getattr(request, name), self.range(name)
             if not low <= value <= high:
                 shown = stated(getattr(given, name), value)
                 raise MotionRefused(f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}')
@@ -337,22 +326,6 @@ class SafetyLimits:
         return ''
 
 
-# What can be asked for: its limits in SafetyLimits and its unit.
-def stated(given: float, value: float) -> str:
-    """Return a number of a request in words; a `given` of 0 stands for the default of the motion."""
-    return f'{value:g}' if given else f'{value:g} (the default of the motion)'
-
-
-RANGES = {
-    'speed_m_s': ('min_speed_m_s', 'max_speed_m_s', 'm/s'),
-    'force_n': ('min_force_n', 'max_force_n', 'N'),
-    'distance_m': ('min_distance_m', 'max_distance_m', 'm'),
-    'radius_m': ('min_radius_m', 'max_radius_m', 'm'),
-    'turns': ('min_turns', 'max_turns', 'turns'),
-    'duration_s': ('min_duration_s', 'max_duration_s', 's'),
-}
-
-
 # --------------------
 # The part of the surface on which an exploration may be told to begin.
 
@@ -382,11 +355,6 @@ class SurfacePatch:
         high=2.0,
     )
 
-    @property
-    def taught(self) -> bool:
-        """Whether there is one."""
-        return self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m
-
     def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
         """Return where an exploration begins: at `home`, or above its start at the same height.
 
@@ -397,7 +365,7 @@ class SurfacePatch:
         """
         if not request.use_start:
             return home
-        if not self.taught:
+        if not (self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m):
             raise MotionRefused(
                 f'{request.motion}: no surface is taught, so a start means nothing; touch the corners of the surface '
                 "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'"
@@ -431,6 +399,7 @@ class SurfacePatch:
 # does.
 
 MIN_REPEATS = 3  # of one reading, before it can count as frozen
+FROZEN_TRAVEL_M = 0.00005  # along the normal, in contact, after which a force must have changed
 CONTACT_N = 0.1  # above the force in free air, which may stay the same for long
 HELD_SHARE = 0.1  # a force this close to the wanted one is being held
 ZEROING_S = 0.1  # an arm may zero its force sensor while it stands, or as it moves off
@@ -555,7 +524,7 @@ class ForceWatch:
         return sorted(self._before)[int(LOW_SHARE * len(self._before))] if self._before else 0.0
 
     def _implausible(self, force_n: float, moved_m: float) -> bool:
-        return force_n - self._free_air_n >= CONTACT_N and moved_m >= self._limits.frozen_travel_m
+        return force_n - self._free_air_n >= CONTACT_N and moved_m >= FROZEN_TRAVEL_M
 
     def _holds(self, force_n: float, command: ArmCommand) -> bool:
         """Return whether the arm keeps the force the same by itself."""

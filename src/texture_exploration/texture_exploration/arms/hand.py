@@ -157,21 +157,6 @@ class Hand(Protocol):
 # A profile: motors, control table, scales and fingers of a Dynamixel hand, from one YAML file (config/hands).
 
 ROLES = ('press', 'across', 'along')
-REGISTERS = (
-    'operating_mode',
-    'current_limit',
-    'torque_enable',
-    'hardware_error',
-    'position_d',
-    'position_i',
-    'position_p',
-    'bus_watchdog',
-    'goal_current',
-    'goal_position',
-    'present_current',
-    'present_velocity',
-    'present_position',
-)
 WATCHDOG_UNIT_S, MAX_WATCHDOG = 0.02, 127  # the register counts by these
 # Lowest and highest of every number: what motors of this kind have, with room. A number beyond is a slip of the pen,
 # and the motors would press with it.
@@ -287,7 +272,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
         If a register is missing, or a finger, role or number does not fit.
     """
     where = f"hand profile '{name}'"
-    missing = [register for register in REGISTERS if register not in content['table']]
+    missing = [register for register in X_SERIES if register not in content['table']]
     if missing:
         raise InvalidParameter(f'{where}: the table lacks {", ".join(missing)}')
     fingers = {finger: _joints(roles, f'{where}, {finger}') for finger, roles in content['fingers'].items()}

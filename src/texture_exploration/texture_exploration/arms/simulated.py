@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,10 +19,10 @@ from texture_exploration.arms.arm import (
     Arm,
     ArmCommand,
     ArmState,
+    CommandedVelocity,
     CommandLimits,
     ForceReading,
     Vector,
-    VelocityForceControl,
 )
 from texture_exploration.force_control import ForceLoopParams
 
@@ -29,6 +30,8 @@ from texture_exploration.force_control import ForceLoopParams
 # What lies under the simulated finger: an elastic surface with a tilt, a bump, a step, an edge or a soft layer.
 
 STICK_M = 0.002  # way from slip to slip
+BUMP_FROM_M, BUMP_LENGTH_M = 0.02, 0.04
+BASE_STIFFNESS_N_M = 20000.0  # below a soft layer, and of a wall: as of wood under rubber
 
 
 @dataclass(frozen=True)
@@ -45,38 +48,17 @@ class SimulatedSurfaceParams:
     bump_m: float = param(
         0.0, 'Height of a round bump on the path along x; 0 removes the bump.', unit='m', low=-0.01, high=0.01
     )
-    bump_from_m: float = param(0.02, 'X coordinate at which the bump begins.', unit='m', low=-2.0, high=2.0)
-    bump_length_m: float = param(
-        0.04, 'Length of the bump along x; a longer bump is flatter.', unit='m', low=0.005, high=1.0
-    )
     step_m: float = param(
         0.0, 'Height of a step of the surface along x; 0 removes the step.', unit='m', low=-0.1, high=0.01
     )
     step_from_m: float = param(0.03, 'X coordinate of the step.', unit='m', low=-2.0, high=2.0)
     edge_m: float = param(2.0, 'X coordinate at which the surface ends.', unit='m', low=-2.0, high=2.0)
-    ridge_m: float = param(
-        0.0, 'Height of regular ridges along x; 0 removes the ridges.', unit='m', low=0.0, high=0.005
-    )
-    ridge_length_m: float = param(
-        0.002,
-        'Distance between the ridges; a larger distance lowers their frequency.',
-        unit='m',
-        low=0.0002,
-        high=0.1,
-    )
     layer_m: float = param(
         0.0, 'Thickness of a soft layer on the surface; 0 removes the layer.', unit='m', low=0.0, high=0.02
     )
-    base_stiffness_n_m: float = param(
-        20000.0,
-        'Stiffness below the soft layer; larger values give harder impacts there.',
-        unit='N/m',
-        low=10.0,
-        high=200000.0,
-    )
     wall_m: float = param(
         2.0,
-        'X coordinate of a wall of `base_stiffness_n_m` across the way of the finger.',
+        'X coordinate of a wall of 20 kN/m across the way of the finger.',
         unit='m',
         low=-2.0,
         high=2.0,
@@ -108,11 +90,10 @@ class SimulatedSurface:
     def height_m(self, x_m: float) -> float:
         """Return the height of the untouched surface at x."""
         params = self._params
-        share = (x_m - params.bump_from_m) / params.bump_length_m
+        share = (x_m - BUMP_FROM_M) / BUMP_LENGTH_M
         bump = 0.5 - 0.5 * math.cos(2 * math.pi * share) if 0 < share < 1 else 0.0
         step = params.step_m if x_m >= params.step_from_m else 0.0
-        ridge = params.ridge_m * (0.5 + 0.5 * math.cos(2 * math.pi * x_m / params.ridge_length_m))
-        return x_m * math.tan(params.tilt_rad) + params.bump_m * bump + step + ridge
+        return x_m * math.tan(params.tilt_rad) + params.bump_m * bump + step
 
     def force_n(self, x_m: float, z_m: float) -> float:
         """Return the force of a finger at (x, z), positive when pressing: a spring that may stick."""
@@ -129,14 +110,49 @@ class SimulatedSurface:
 
     def wall_n(self, x_m: float) -> float:
         """Return the force with which a wall pushes the finger back along x."""
-        return -self._params.base_stiffness_n_m * max(0.0, x_m - self._params.wall_m)
+        return -BASE_STIFFNESS_N_M * max(0.0, x_m - self._params.wall_m)
 
     def _press_n(self, depth_m: float) -> float:
         """Return the force of the spring, or of the soft layer and what is below it."""
         layer_m = self._params.layer_m
         if not layer_m or depth_m <= layer_m:
             return self._stiffness_n_m * depth_m
-        return self._stiffness_n_m * layer_m + self._params.base_stiffness_n_m * (depth_m - layer_m)
+        return self._stiffness_n_m * layer_m + BASE_STIFFNESS_N_M * (depth_m - layer_m)
+
+
+# --------------------
+# The arm: ideal, or with velocities that come into effect late.
+
+HOLDS_S = 0.02  # so long an arm keeps a velocity when nobody asks for another
+
+
+class DelayedVelocity:
+    """A velocity that comes into effect late, and holds for a short time only."""
+
+    def __init__(self, delay_s: float, now_ns: int) -> None:
+        self._delay_ns = round(delay_s * 1e9)
+        self._coming: deque[tuple[int, Vector]] = deque()
+        self._now: Vector = (0.0, 0.0, 0.0)
+        self._since_ns = self._done_ns = now_ns
+
+    def ask(self, now_ns: int, velocity: Vector) -> None:
+        """Ask for a velocity, m/s."""
+        self._coming.append((now_ns + self._delay_ns, velocity))
+
+    def moved_m(self, until_ns: int) -> Vector:
+        """Return how far it goes from the last time asked until now."""
+        travelled: Vector = (0.0, 0.0, 0.0)
+        while self._coming and self._coming[0][0] <= until_ns:
+            begin_ns, velocity = self._coming.popleft()
+            travelled = self._go(travelled, begin_ns)
+            self._now, self._since_ns = velocity, begin_ns
+        return self._go(travelled, until_ns)
+
+    def _go(self, travelled: Vector, until_ns: int) -> Vector:
+        held_s = max(0, min(until_ns, self._since_ns + round(HOLDS_S * 1e9)) - self._done_ns) * 1e-9
+        self._done_ns = max(self._done_ns, until_ns)
+        x, y, z = (at + speed * held_s for at, speed in zip(travelled, self._now, strict=True))
+        return x, y, z
 
 
 RATE_HZ = 250.0
@@ -245,11 +261,9 @@ class SimulatedArm(Arm):
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_port)
         self._surface = SimulatedSurface(params, params.stiffness_n_m)
-        self._velocity_control = (
-            None
-            if params.force_mode
-            else VelocityForceControl(params, 1 / RATE_HZ, clock(), params.loop_delay_s + params.undeclared_lag_s)
-        )
+        # The force control is told `loop_delay_s` alone; the rest it has to find out.
+        self._velocity = None if params.force_mode else CommandedVelocity(params, 1 / RATE_HZ)
+        self._delayed = DelayedVelocity(params.loop_delay_s + params.undeclared_lag_s, clock())
 
     def connect(self) -> None:
         """Start to move in time; clears what was injected."""
@@ -299,7 +313,7 @@ class SimulatedArm(Arm):
 
     def doubt(self) -> str:
         """Return in a sentence that the force comes too late to press by it, '' if not."""
-        return self._velocity_control.doubt() if self._velocity_control else ''
+        return self._velocity.doubt() if self._velocity else ''
 
     def freeze(self) -> None:
         """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
@@ -345,7 +359,9 @@ class SimulatedArm(Arm):
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
-        moved = self._velocity_control.moved_m(now_ns) if self._velocity_control else self._moved_m(command, moving_s)
+        moved = self._delayed.moved_m(now_ns) if self._velocity else self._moved_m(command, moving_s)
+        if self._velocity:
+            self._velocity.travelled(math.hypot(*moved[:2]))
         moved = (0.0, 0.0, moved[2]) if self._jammed else moved
         x, y, z = (at + step_m for at, step_m in zip(self._state.position, moved, strict=True))
         velocity = _speed(moved, moving_s)
@@ -356,8 +372,8 @@ class SimulatedArm(Arm):
         self._true_n = self._surface.force_n(x, z) + self._push_n
         along_n = (self._surface.wall_n(x), 0.0)
         self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault, along_n=along_n)
-        if self._velocity_control:
-            self._velocity_control.ask(command, self._state, dt_s)
+        if self._velocity:
+            self._delayed.ask(now_ns, self._velocity.choose(command, self._state, min(dt_s, HOLDS_S)))
         self._emulator.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))
 
     @property

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -46,10 +47,10 @@ from texture_exploration.explorer import (
     STILL_MOVING,
     EarlyStoppingParams,
     Exploration,
-    ExplorationEnd,
     ExplorationEstimates,
-    ExplorationIds,
+    ExplorationOutcome,
     Explorer,
+    new_id,
     no_signal_watch,
     refusal,
 )
@@ -204,9 +205,9 @@ class ExplorerNode(PatientLifecycleNode):
         self._frames = FrameBroadcaster(self, declare(self, FrameParams))
         self._broadcast_surface()
         self._follow_parameters()
-        self._ids = ExplorationIds(np.random.default_rng())
+        self._rng, self._numbers = np.random.default_rng(), itertools.count(1)
         self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
-        self._last_end: ExplorationEnd | None = None
+        self._last_end, self._not_lifted = 'none', ''  # in sentences
         self._publishing = threading.Lock()
         self._closing = False
         self._states = self.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
@@ -214,14 +215,14 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
-        self.create_service(Trigger, '~/stop', self._on_stop, callback_group=group)
-        self.create_service(Trigger, '~/recover', self._on_recover, callback_group=group)
-        self.create_service(Trigger, '~/lift', self._on_lift, callback_group=group)
+        self._offer('~/stop', self._stop, group)
+        self._offer('~/recover', self._recover, group)
+        self._offer('~/lift', self._lift, group)
         if self._explorer.arm.reboots:
-            self.create_service(Trigger, '~/reboot', self._on_reboot, callback_group=group)
+            self._offer('~/reboot', self._explorer.reboot, group)
         if self._explorer.arm.base_frame_id:
-            self.create_service(Trigger, '~/touch_surface', self._on_touch_surface, callback_group=group)
-            self.create_service(Trigger, '~/forget_touches', self._on_forget_touches, callback_group=group)
+            self._offer('~/touch_surface', self._touch_surface, group)
+            self._offer('~/forget_touches', self._forget_touches, group)
         ActionServer(
             self,
             action.Explore,
@@ -306,7 +307,7 @@ class ExplorerNode(PatientLifecycleNode):
         self._explorer.close()
         if current is not None:  # said here, while this node can still log
             outcome = current.outcome if current.ended.is_set() else STILL_MOVING
-            self._log_end(ExplorationEnd(current.exploration_id, outcome))
+            self._log_end(current.exploration_id, outcome)
 
     def _make_explorer(self) -> Explorer:
         arm_class = find(ARMS, declare(self, ArmParams).arm, 'arm')
@@ -356,7 +357,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Begin, attend to it until the finger is lifted, and return the result for the service or the action."""
         result = msg.ExplorationResult()
         try:
-            exploration_id = self._ids.next(self.get_clock().now().nanoseconds)
+            exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
             exploration = self._explorer.begin(exploration_id, from_msg(request))
         except (MotionRefused, UnknownName, InvalidData) as error:
             result.error_code, result.message = int(refusal(error)), str(error)
@@ -375,13 +376,14 @@ class ExplorerNode(PatientLifecycleNode):
         result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
-        self._last_end = ExplorationEnd(exploration.exploration_id, outcome)
+        self._last_end = outcome.sentence(exploration.exploration_id)
+        self._not_lifted = '' if outcome.lifted else self._last_end
         if not self._closing:
-            self._log_end(self._last_end)
+            self._log_end(exploration.exploration_id, outcome)
         return result
 
-    def _log_end(self, end: ExplorationEnd) -> None:
-        LOGGED[end.severity](self.get_logger(), end.sentence)
+    def _log_end(self, exploration_id: str, outcome: ExplorationOutcome) -> None:
+        LOGGED[outcome.severity](self.get_logger(), outcome.sentence(exploration_id))
 
     def _give_feedback(self, goal: Any, exploration: Exploration) -> None:
         """Publish feedback to the client; stop when it cancels."""
@@ -397,59 +399,41 @@ class ExplorerNode(PatientLifecycleNode):
             kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
             estimates.wait_until_final(kinds, self._early_stopping.estimate_timeout_s)
 
-    def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
+        """Offer a service without numbers; `work` returns what was done, or raises why not."""
+
+        def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                response.message, response.success = work(), True
+            except (DeviceError, MotionRefused) as error:
+                response.message = str(error)
+            self.get_logger().info(f'{name[2:]}: {response.message}')
+            return response
+
+        self.create_service(Trigger, name, answer, callback_group=group)
+
+    def _stop(self) -> str:
         stopped = self._explorer.stop('stopped on request')
-        response.success = True
-        response.message = 'stopping; the finger is being lifted' if stopped else 'nothing is moving'
-        return response
+        return 'stopping; the finger is being lifted' if stopped else 'nothing is moving'
 
-    def _on_recover(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            self._explorer.recover()
-        except (DeviceError, MotionRefused) as error:
-            response.message = str(error)
-        else:
-            response.success, response.message = True, 'the arm can move'
-        self.get_logger().info(f'recover: {response.message}')
-        return response
+    def _recover(self) -> str:
+        self._explorer.recover()
+        return 'the arm can move'
 
-    def _on_lift(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            risen_m = self._explorer.lift()
-        except (DeviceError, MotionRefused) as error:
-            response.message = str(error)
-        else:
-            response.success = True
-            response.message = f'the finger rose by {1e3 * risen_m:.1f} mm, and nothing touches it'
-        self.get_logger().info(f'lift: {response.message}')
-        return response
+    def _lift(self) -> str:
+        return f'the finger rose by {1e3 * self._explorer.lift():.1f} mm, and nothing touches it'
 
-    def _on_reboot(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            response.message, response.success = self._explorer.reboot(), True
-        except (DeviceError, MotionRefused) as error:
-            response.message = str(error)
-        self.get_logger().info(f'reboot: {response.message}')
-        return response
+    def _touch_surface(self) -> str:
+        told = self._explorer.touch_surface()
+        self._broadcast_surface()
+        self.set_parameters([Parameter(name, value=value) for name, value in asdict(self._explorer.patch).items()])
+        return told
 
-    def _on_touch_surface(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            response.message, response.success = self._explorer.touch_surface(), True
-        except (DeviceError, MotionRefused) as error:
-            response.message = str(error)
-        else:
-            self._broadcast_surface()
-            patch = asdict(self._explorer.patch)
-            self.set_parameters([Parameter(name, value=value) for name, value in patch.items()])
-        self.get_logger().info(f'touch_surface: {response.message}')
-        return response
-
-    def _on_forget_touches(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _forget_touches(self) -> str:
         count = self._explorer.forget_touches()
         touches = 'the touch is' if count == 1 else f'{count} touches are'
         forgotten = f'{touches} forgotten' if count else 'no touch was taken, so none is forgotten'
-        response.success, response.message = True, f'{forgotten}; the surface stays as it is'
-        return response
+        return f'{forgotten}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
         estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
@@ -496,17 +480,12 @@ class ExplorerNode(PatientLifecycleNode):
         stamp_ns = self.get_clock().now().nanoseconds - age_ns
         return replace(state, stamp_ns=stamp_ns, frame_id=self._frames.surface_frame_id)
 
-    def _not_lifted(self) -> str:
-        """Return how the last exploration ended if its finger was not lifted, '' if it was or another is running."""
-        end = self._last_end
-        return end.sentence if end and not end.outcome.lifted and self._explorer.current is None else ''
-
     def _report(self) -> DiagnosticReport:
         current, fault = self._explorer.current, self._explorer.fault()
         numbers = {
             'phase': current.state.phase.value if current else Phase.IDLE.value,
             'exploration': current.exploration_id if current else '',
-            'last_end': self._last_end.sentence if self._last_end else 'none',
+            'last_end': self._last_end,
             'arm_fault': fault or 'none',
             'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
@@ -516,7 +495,7 @@ class ExplorerNode(PatientLifecycleNode):
             return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
         if fault:
             return 'ERROR', fault, numbers
-        warning = self._explorer.arm.warning() or self._not_lifted()
+        warning = self._explorer.arm.warning() or ('' if current else self._not_lifted)
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
 
 
