@@ -41,11 +41,11 @@ from texture_estimation.roughness import (
     load_roughness_model,
     load_roughness_recipe,
     read_grades,
-    read_ratings,
     train_grades,
 )
 from texture_estimation.search import RecipeSpace, read_scores, write_scores
 from texture_estimation.training import train
+from texture_evaluation.panel import read_ratings
 from texture_exploration.arms.hand import load_profile
 from texture_exploration.presets import load_preset
 from texture_features.examples import LabelledFeatures

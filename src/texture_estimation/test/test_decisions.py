@@ -24,7 +24,6 @@ from texture_estimation.decisions import (
     SlideNovelty,
     StoppingRule,
     fit_confidence_floor,
-    fit_open_set_rule,
     fit_prediction_sets,
     fit_stopping_rule,
     slide_scores,
@@ -143,39 +142,48 @@ def test_scores_of_a_growing_slide_are_those_of_its_mean_as_far_as_slides_are_co
 STOP_WINDOWS = 1.0 + 0.5 * np.arange(9)
 
 
+def course(confidences, right, novelty_score=0.0, disturbance=''):
+    """Return what is said of a slide window by window; single values are said at all times."""
+    count = len(STOP_WINDOWS)
+    return SlideCourse(
+        confidences=np.broadcast_to(confidences, count),
+        right=np.broadcast_to(right, count),
+        effective_windows=STOP_WINDOWS,
+        known=np.ones(count, bool),
+        novelty_scores=np.full(count, novelty_score),
+        disturbance=disturbance,
+    )
+
+
 def slides(rng, count=400):
-    """Return a random walk to the right decision: Wald's test of two means, the confidence being the true one."""
+    """Return random walks to the right decision: Wald's test of two means, the confidence being the true one."""
     steps = rng.normal(0.5, 1.0, size=(count, len(STOP_WINDOWS)))
     odds = 2.0 * 0.5 * np.cumsum(steps, axis=1)  # log-likelihood ratio of mean 0.5 against -0.5
     confidences = 1.0 / (1.0 + np.exp(-np.abs(odds)))
-    return list(confidences), list(odds > 0), [STOP_WINDOWS] * count
+    return [course(*said) for said in zip(confidences, odds > 0, strict=True)]
 
 
-def outcome(rule, data):
+def outcome(rule, courses):
     ends = [
-        next((k for k in range(len(w)) if rule.decided(c[k], w[k])), len(w) - 1) for c, _, w in zip(*data, strict=True)
+        next((k for k, said in enumerate(zip(one.confidences, STOP_WINDOWS, strict=True)) if rule.decided(*said)), -1)
+        for one in courses
     ]
-    wrong = np.mean([not right[k] for k, (_, right, _) in zip(ends, zip(*data, strict=True), strict=True)])
-    return wrong, np.mean([STOP_WINDOWS[k] for k in ends])
+    wrong = np.mean([not one.right[end] for one, end in zip(courses, ends, strict=True)])
+    return wrong, np.mean(STOP_WINDOWS[ends])
 
 
 def test_the_rule_errs_as_rarely_on_new_slides_and_ends_sooner_if_more_errors_are_allowed():
     rng = np.random.default_rng(0)
     data, new = slides(rng, 2000), slides(rng, 2000)
-    rules = {wrong: fit_stopping_rule(*data, wrong) for wrong in (0.05, 0.1, 0.2)}
+    rules = {wrong: fit_stopping_rule(data, wrong, by_novelty=False) for wrong in (0.05, 0.1, 0.2)}
     errors, times = zip(*(outcome(rule, new) for rule in rules.values()), strict=True)
     assert errors == pytest.approx(tuple(rules), abs=0.025)
     assert times[0] > times[1] > times[2]
 
 
 def test_where_no_rule_errs_rarely_enough_the_one_that_errs_least_is_taken():
-    wrong_at_first = np.arange(9) >= 4
-    rule = fit_stopping_rule(
-        [np.full(9, 0.9)] * 5 + [np.full(9, 0.4)],
-        [wrong_at_first] * 5 + [np.zeros(9, bool)],
-        [STOP_WINDOWS] * 6,
-        0.0,
-    )
+    courses = [course(0.9, np.arange(9) >= 4)] * 5 + [course(0.4, right=False)]
+    rule = fit_stopping_rule(courses, 0.0, by_novelty=False)
     assert not rule.decided(0.9, 2.0)
     assert rule.decided(0.9, 3.0)
 
@@ -197,24 +205,11 @@ def test_at_the_start_of_a_slide_a_smaller_novelty_score_is_needed():
     assert not StoppingRule(novelty_score=0.5, early_novelty_score=1.0).decided(0.99, 1.0, 0.8)
 
 
-def course(right, novelty_score, disturbance=''):
-    """Return a slide of which the same is said at all times, with full confidence."""
-    count = len(STOP_WINDOWS)
-    return SlideCourse(
-        confidences=np.full(count, 0.99),
-        right=np.full(count, right),
-        effective_windows=STOP_WINDOWS,
-        known=np.ones(count, bool),
-        novelty_scores=np.full(count, novelty_score),
-        disturbance=disturbance,
-    )
-
-
 def test_the_rule_stops_few_disturbed_slides_wrongly():
-    undisturbed = [course(right=True, novelty_score=0.1)] * 50
-    strange = [course(right=False, novelty_score=8.0, disturbance='gain')] * 5
-    harmless = [course(right=True, novelty_score=0.1, disturbance='gain')] * 95
-    strict, lax = (fit_open_set_rule([*undisturbed, *strange, *harmless], 0.02, wrong) for wrong in (0.02, 0.05))
+    undisturbed = [course(0.99, right=True, novelty_score=0.1)] * 50
+    strange = [course(0.99, right=False, novelty_score=8.0, disturbance='gain')] * 5
+    harmless = [course(0.99, right=True, novelty_score=0.1, disturbance='gain')] * 95
+    strict, lax = (fit_stopping_rule([*undisturbed, *strange, *harmless], 0.02, wrong) for wrong in (0.02, 0.05))
     assert strict.decided(0.99, 1.0, 0.1)
     assert not strict.decided(0.99, 1.0, 8.0)
     assert lax.decided(0.99, 1.0, 8.0)
@@ -301,22 +296,35 @@ LENGTHS = np.arange(1.0, 12.0)
 STRICT = ConfidenceFloor((1.0,), (36.0,))  # no single window of the fixtures is so certain
 
 
-def slides_with(confidences):
-    return [np.full(len(LENGTHS), confidence) for confidence in confidences], [LENGTHS] * len(confidences)
+def slides_with(confidences, right=True):
+    said = np.ones(len(LENGTHS), bool)
+    return [
+        SlideCourse(np.full(len(LENGTHS), confidence), said & right, LENGTHS, said, np.zeros(len(LENGTHS)))
+        for confidence in confidences
+    ]
 
 
 def test_the_given_fraction_of_held_out_slides_lies_below():
     confidences = np.linspace(0.01, 0.99, 99)
-    floor = fit_confidence_floor(*slides_with(confidences), rate=0.1)
+    floor = fit_confidence_floor(slides_with(confidences), rate=0.1)
     for length in FLOOR_WINDOWS:
         below = sum(not floor.reached(confidence + 1e-9, length) for confidence in confidences)
         assert below == 9  # the tenth of 100 is the limit itself
 
 
 def test_too_few_slides_for_the_fraction_give_no_limit():
-    assert fit_confidence_floor(*slides_with([0.5] * 98), rate=0.01) == ConfidenceFloor()
-    assert fit_confidence_floor(*slides_with([0.5] * 99), rate=0.01).log_odds == pytest.approx((0.0,) * 6)
-    assert fit_confidence_floor(*slides_with([0.5] * 98), rate=0.0) == ConfidenceFloor()
+    assert fit_confidence_floor(slides_with([0.5] * 98), rate=0.01) == ConfidenceFloor()
+    assert fit_confidence_floor(slides_with([0.5] * 99), rate=0.01).log_odds == pytest.approx((0.0,) * 6)
+    assert fit_confidence_floor(slides_with([0.5] * 98), rate=0.0) == ConfidenceFloor()
+
+
+def test_the_limit_keeps_all_but_few_wrong_labels_unknown():
+    courses = [*slides_with([0.5] * 18), *slides_with([0.9, 0.8], right=False)]
+    strict, lax = (fit_confidence_floor(courses, 0.0, most) for most in (0.0, 0.05))
+    assert not strict.reached(0.9, effective_windows=3.0)
+    assert strict.reached(0.91, effective_windows=3.0)
+    assert not lax.reached(0.8, effective_windows=3.0)  # one of twenty may be wrong
+    assert lax.reached(0.81, effective_windows=3.0)
 
 
 def test_the_limit_is_interpolated_and_stays_beyond_its_ends():

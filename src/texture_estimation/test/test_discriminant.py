@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.config import folder
 from texture_core.types import FeatureVector
-from texture_estimation.decisions import FLOOR_WINDOWS, ONE_PLACE, fit_confidence_floor
+from texture_estimation.decisions import ONE_PLACE
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.evidence_rules import SoftVote, running_means
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant, linear_discriminant
@@ -284,16 +284,3 @@ def test_a_training_over_one_track_stays_one_in_the_card(make_examples):
     assert parts.decisions.domain.slides['cork'] == 8
     assert parts.training['slides'] == parts.decisions.error_bound.slides == 32
     assert 'sessions held out in turn, 3 parts' in parts.training['calibration']
-
-
-def test_the_confidence_floor_keeps_all_but_few_wrong_labels_unknown():
-    confidences = [np.array([0.6, 0.7, 0.99]), np.array([0.5, 0.8, 0.98])]
-    lengths = [np.array([1.0, 2.0, 10.0])] * 2
-    wrong = [np.array([0.9, 0.8] + [0.0] * 18)] * len(FLOOR_WINDOWS)
-    strict = fit_confidence_floor(confidences, lengths, 0.0, wrong, 0.0)
-    assert not strict.reached(0.9, effective_windows=3.0)
-    assert strict.reached(0.91, effective_windows=3.0)
-    one_of_20 = fit_confidence_floor(confidences, lengths, 0.0, wrong, 0.05)
-    assert not one_of_20.reached(0.8, effective_windows=3.0)
-    assert one_of_20.reached(0.81, effective_windows=3.0)
-    assert fit_confidence_floor(confidences, lengths, 0.0).log_odds == ()

@@ -34,11 +34,9 @@ LIKE = {'a': 0.0, 'b': 0.0}
 UNLIKE = {'a': -2.0, 'b': 2.0}
 
 
-@pytest.mark.parametrize('seed', [None, 1])
-def test_the_only_direction_in_which_two_textures_differ_is_chosen_though_it_is_longer(seed: int | None) -> None:
+def test_the_only_direction_in_which_two_textures_differ_is_chosen_though_it_is_longer() -> None:
     training = slides({SHORT: LIKE, ACROSS: UNLIKE})
-    rng = None if seed is None else np.random.default_rng(seed)
-    assert training.best_motion(training.uniform_log_prior, [SHORT, ACROSS], rng).motion == ACROSS
+    assert training.best_motion(training.uniform_log_prior, [SHORT, ACROSS]).motion == ACROSS
 
 
 def test_the_choice_depends_on_the_candidates_that_remain() -> None:
@@ -56,12 +54,10 @@ def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
 
 
 @pytest.mark.parametrize(('apart', 'nats'), [(0.0, 0.0), (2.0, 0.3368), (4.0, 0.6327), (100.0, np.log(2))])
-def test_information_of_two_gaussians_is_that_of_a_channel_with_two_signals(apart: float, nats: float) -> None:
+def test_information_of_two_gaussians_is_at_most_that_of_a_channel_with_two_signals(apart: float, nats: float) -> None:
     """Capacity of the binary-input Gaussian channel, by numerical integration."""
     gaussians = ClassConditionalGaussian(np.array([[-apart / 2], [apart / 2]]))
     prior = np.log([0.5, 0.5])
-    draws = np.random.default_rng(0).standard_normal((40_000, 1))
-    assert gaussians.sampled_information(prior, draws) == pytest.approx(nats, abs=5e-3)
     bound = np.log(2) - np.log1p(np.exp(-(apart**2) / 8))
     assert gaussians.least_information(prior) == pytest.approx(bound)
     assert bound <= nats + 1e-9

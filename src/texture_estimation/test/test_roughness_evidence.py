@@ -63,13 +63,15 @@ def last(identity='e1'):
     return FeatureVector(10**9, identity, 0.0, 0.1, last=True)
 
 
-def never_early(model):
-    evidence = dataclasses.replace(model.recipe.evidence, min_narrowing_grades=0.0)
-    return dataclasses.replace(model, recipe=dataclasses.replace(model.recipe, evidence=evidence))
+@pytest.fixture
+def never_early(monkeypatch):
+    """Let no grade be final before the end of a slide."""
+    monkeypatch.setattr('texture_estimation.roughness.MIN_NARROWING_GRADES', 0.0)
 
 
+@pytest.mark.usefixtures('never_early')
 def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> None:
-    evidence = RoughnessAccumulator(never_early(model))
+    evidence = RoughnessAccumulator(model)
     first, *_, before_last = [evidence.update(vector(sequence=k)) for k in range(6)]
     final = evidence.update(last())
     assert final.valid
@@ -78,8 +80,9 @@ def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> 
     assert 0.0 < final.grade_std < first.grade_std
 
 
+@pytest.mark.usefixtures('never_early')
 def test_more_sliding_never_makes_surer_than_people_agree(model) -> None:
-    evidence = RoughnessAccumulator(never_early(model))
+    evidence = RoughnessAccumulator(model)
     for number in range(500):
         estimate = evidence.update(vector(sequence=number))
     assert estimate.grade_std > 0.7 * SPREAD
@@ -121,8 +124,9 @@ def test_a_slide_too_short_and_a_missing_model_are_reported() -> None:
     assert 'shorter than the 0.5 s of a window' in RoughnessAccumulator(model).update(last()).message
 
 
+@pytest.mark.usefixtures('never_early')
 def test_a_bad_window_among_good_ones_is_left_out(model) -> None:
-    evidence = RoughnessAccumulator(never_early(model))
+    evidence = RoughnessAccumulator(model)
     evidence.update(vector())
     estimate = evidence.update(vector((3.0, 0.0, 9.0, 8.0), sequence=1))
     assert estimate.valid

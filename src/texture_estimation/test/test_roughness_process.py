@@ -46,8 +46,7 @@ def test_a_single_texture_cannot_be_trained_on() -> None:
     [
         ({'learner': 'svm_rbf'}, "no key 'learner'"),
         ({'regressor': 'gaussian_proces'}, "did you mean 'gaussian"),
-        ({'checks': {'least_force_n': -1}}, 'least_force_n'),
-        ({'evidence': {'min_narrowing': 1}}, "did you mean 'min_narrowing_grades'"),
+        ({'training': {'fold': 5}}, "did you mean 'folds'"),
     ],
 )
 def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence) -> None:

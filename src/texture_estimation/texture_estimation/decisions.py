@@ -248,44 +248,35 @@ class ConfidenceFloor:
         return low + (high - low) * (effective_windows - counts[after - 1]) / (counts[after] - counts[after - 1])
 
 
-def fit_confidence_floor(
-    confidences: Sequence[Array],
-    effective_window_counts: Sequence[Array],
-    rate: float,
-    errors: Sequence[Array] = (),
-    max_error_rate: float = 1.0,
-) -> ConfidenceFloor:
+def fit_confidence_floor(courses: Sequence[SlideCourse], rate: float, max_error_rate: float = 1.0) -> ConfidenceFloor:
     """Return the limit that a fraction of the slides over known surfaces stays below, and all but few wrong labels.
 
     Parameters
     ----------
-    confidences : of each slide (n_windows,)
-        Of the best label after each window, of undisturbed slides held out of the training that end with the right one.
-    effective_window_counts : of each slide (n_windows,)
-        Length of the evidence after each window.
+    courses
+        Of slides that were held out of the training; disturbed copies do not count.
     rate
-        Fraction of the slides that may lie below the limit at each length of evidence.
-    errors : of FLOOR_WINDOWS (n_slides,)
-        Confidence of each undisturbed held-out slide at these lengths where its label is wrong, 0 where it is right.
+        Fraction of the slides that end with the right label and may lie below the limit at each length of evidence.
     max_error_rate
-        Fraction of the slides whose label may be wrong above the limit.
+        Fraction of the slides whose label may be wrong above the limit; 1 for no limit.
 
     Returns
     -------
     ConfidenceFloor
         Without a limit if the slides are too few for both fractions.
     """
-    rank = int((len(confidences) + 1) * rate)
-    if not rank and not len(errors):
+    undisturbed = [course for course in courses if not course.disturbance]
+    right = [course for course in undisturbed if course.right[-1]]
+    rank = int((len(right) + 1) * rate)
+    if not rank and max_error_rate >= 1.0:
         return ConfidenceFloor()
     log_odds = []
-    for number, length in enumerate(FLOOR_WINDOWS):
+    for length in FLOOR_WINDOWS:
         limit = 0.0
         if rank:
-            places = [int(np.abs(own - length).argmin()) for own in effective_window_counts]
-            limit = np.sort([own[place] for own, place in zip(confidences, places, strict=True)])[rank - 1]
-        if len(errors):
-            wrong = np.sort(errors[number])[::-1]
+            limit = np.sort([course.confidences[course.place(length)] for course in right])[rank - 1]
+        if max_error_rate < 1.0:
+            wrong = np.sort([course.error_at(length) for course in undisturbed])[::-1]
             limit = max(limit, math.nextafter(wrong[min(int(len(wrong) * max_error_rate), len(wrong) - 1)], 1.0))
         limit = min(max(float(limit), 1.0 - LARGEST), LARGEST)
         log_odds.append(math.log(limit / (1.0 - limit)))
@@ -1248,7 +1239,7 @@ class SlideCourse:
     --------
     >>> right = np.array([False, True])
     >>> course = SlideCourse(np.array([0.6, 0.99]), right, np.array([1.0, 1.2]), np.array([True, True]), np.zeros(2))
-    >>> fit_open_set_rule([course] * 30, wrong=0.02, wrong_disturbed=0.02).decided(0.99, 1.2)
+    >>> fit_stopping_rule([course] * 30, wrong=0.02).decided(0.99, 1.2)
     True
     """
 
@@ -1259,34 +1250,23 @@ class SlideCourse:
     novelty_scores: Array
     disturbance: str = ''
 
+    def place(self, length: float) -> int:
+        """Return the window after which the evidence is nearest to this length."""
+        return int(np.abs(self.effective_windows - length).argmin())
+
+    def error_at(self, length: float) -> float:
+        """Return the confidence at this length of evidence if the surface is known and the label wrong, else 0."""
+        place = self.place(length)
+        return float(self.confidences[place]) if self.known[place] and not self.right[place] else 0.0
+
 
 def fit_stopping_rule(
-    confidences: Sequence[Array], right: Sequence[Mask], effective_window_counts: Sequence[Array], wrong: float
-) -> StoppingRule:
-    """Return the rule with the shortest mean slide whose error rate is at most `wrong`.
-
-    If no rule reaches the error rate, the one with the lowest error rate is returned.
-
-    Parameters
-    ----------
-    confidences, right, effective_window_counts : of each slide (n_windows,)
-        After each window: confidence of the best label, whether it is the true one, length of the evidence.
-    wrong
-        Share of the slides that may be decided wrongly.
-
-    Returns
-    -------
-    StoppingRule
-    """
-    tried = [StoppingRule(confidence, longest) for confidence, longest in product(CONFIDENCES.tolist(), MAX_WINDOWS)]
-    outcomes = _outcomes(tried, confidences, right, effective_window_counts)
-    least = max(wrong, min(errors for errors, _ in outcomes))
-    good = [(mean, number) for number, (errors, mean) in enumerate(outcomes) if errors <= least]
-    return tried[min(good)[1]]
-
-
-def fit_open_set_rule(
-    courses: Sequence[SlideCourse], wrong: float, wrong_disturbed: float, early_novelty_score: float = NEVER
+    courses: Sequence[SlideCourse],
+    wrong: float,
+    wrong_disturbed: float = 1.0,
+    early_novelty_score: float = NEVER,
+    *,
+    by_novelty: bool = True,
 ) -> StoppingRule:
     """Return the rule with the shortest mean undisturbed slide that rarely stops a slide with a wrong label.
 
@@ -1304,6 +1284,8 @@ def fit_open_set_rule(
         The same of the disturbed copies.
     early_novelty_score
         Of the rule, as it is.
+    by_novelty
+        Whether the novelty score counts; without one the length of a slide does, and what is said at its end.
 
     Returns
     -------
@@ -1311,11 +1293,12 @@ def fit_open_set_rule(
     """
     table = _CourseTable(courses, early_novelty_score)
     best, rule = (np.inf, np.inf), StoppingRule()
-    for confidence, novelty_score in product(CONFIDENCES.tolist(), NOVELTY_SCORES):
-        errors, disturbed_errors, windows = table.outcome(confidence, novelty_score)
+    ends = product(NOVELTY_SCORES, (NEVER,)) if by_novelty else product((NEVER,), MAX_WINDOWS)
+    for confidence, (novelty_score, longest) in product(CONFIDENCES.tolist(), ends):
+        errors, disturbed_errors, windows = table.outcome(confidence, novelty_score, longest, at_end=not by_novelty)
         excess = max(0.0, errors - wrong) + max(0.0, disturbed_errors - wrong_disturbed)
         if (excess, windows) < best:
-            best, rule = (excess, windows), StoppingRule(confidence, NEVER, novelty_score, early_novelty_score)
+            best, rule = (excess, windows), StoppingRule(confidence, longest, novelty_score, early_novelty_score)
     return rule
 
 
@@ -1333,12 +1316,16 @@ class _CourseTable:
         self._whole = np.array([course.effective_windows[-1] for course in courses])
         self._undisturbed = np.array([not course.disturbance for course in courses])
 
-    def outcome(self, confidence: float, novelty_score: float) -> tuple[float, float, float]:
+    def outcome(
+        self, confidence: float, novelty_score: float, longest: float, *, at_end: bool
+    ) -> tuple[float, float, float]:
         """Return the share of slides stopped with a wrong label, undisturbed and disturbed, and the mean evidence.
 
         The evidence is that of undisturbed slides, in effective windows; without disturbed ones, none of them is wrong.
         """
-        stops = (self._confidences >= confidence) & (self._novelty <= novelty_score)
+        stops = (self._confidences >= confidence) & (self._novelty <= novelty_score) | (self._windows >= longest)
+        if at_end:  # all slides stop there
+            stops |= self._windows == self._whole[:, None]
         places, stopped = stops.argmax(axis=1), stops.any(axis=1)
         rows = np.arange(len(places))
         wrong = stopped & self._wrong[rows, places]
@@ -1347,25 +1334,6 @@ class _CourseTable:
         disturbed = wrong[~undisturbed]
         disturbed_errors = float(disturbed.mean()) if len(disturbed) else 0.0
         return float(wrong[undisturbed].mean()), disturbed_errors, float(taken[undisturbed].mean())
-
-
-def _outcomes(
-    rules: Sequence[StoppingRule],
-    confidences: Sequence[Array],
-    right: Sequence[Mask],
-    effective_window_counts: Sequence[Array],
-) -> list[tuple[float, float]]:
-    """Return of each rule the share of wrong decisions, and the mean length of the evidence they took."""
-    windows, confident = _filled(effective_window_counts, -np.inf), _filled(confidences, -np.inf)
-    wrong = _filled([~correct for correct in right], 0.0) > 0.0
-    rows, last = np.arange(len(right)), np.array([len(correct) - 1 for correct in right])
-
-    def outcome(rule: StoppingRule) -> tuple[float, float]:
-        over = (confident >= rule.confidence) | (windows >= rule.max_windows)
-        places = np.where(over.any(axis=1), over.argmax(axis=1), last)
-        return float(wrong[rows, places].mean()), float(windows[rows, places].mean())
-
-    return [outcome(rule) for rule in rules]
 
 
 def _filled(rows: Sequence[Array | Mask], value: float) -> Array:

@@ -22,7 +22,6 @@ SAME_NATS = 1e-9  # informations that differ by less are the same
 LEAST = 2  # slides of one kind over one texture that tell how much slides differ; kinds among which to choose
 PARTS = 5  # that are held out in turn, to learn how sure a slide makes
 MIN_TEMPER = 1e-3
-SAMPLES = 200  # of each texture; the error of the estimate is some hundredths of a nat
 
 
 class NextTouch(NamedTuple):
@@ -85,25 +84,6 @@ class ClassConditionalGaussian:
         possible = prior > 0.0
         near = np.exp(-distance[possible][:, possible]) @ prior[possible]
         return max(0.0, -float(prior[possible] @ np.log(near)))
-
-    def sampled_information(self, log_prior: Array, draws: Array) -> float:
-        """Return the same by simulated slides, without bias: `draws` are standard normal, (n_samples, n_axes).
-
-        Parameters
-        ----------
-        log_prior : (n_textures,)
-            What is known before the slide.
-        draws : (n_samples, n_axes)
-            Standard normal numbers.
-        """
-        prior = np.exp(log_prior)
-        information = 0.0
-        for texture in np.flatnonzero(prior > 0.0):
-            off = self.means[texture] + draws[:, None, :] - self.means
-            likelihoods = -0.5 * np.einsum('nti,nti->nt', off, off)
-            after = log_softmax(log_prior + likelihoods)[:, texture]
-            information += prior[texture] * float(np.mean(after - log_prior[texture]))
-        return max(0.0, information)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,10 +242,8 @@ class NextTouchModel:
             )
         return log_softmax(self._checked(log_prior) + gaussians.log_likelihoods(values @ self.projection))
 
-    def information(
-        self, log_posterior: Array, motion: SlideMotion, rng: np.random.Generator | None = None, samples: int = SAMPLES
-    ) -> float:
-        """Return the information in nats that a slide is expected to give.
+    def information(self, log_posterior: Array, motion: SlideMotion) -> float:
+        """Return the information in nats that a slide is expected to give, by its lower bound in closed form.
 
         Parameters
         ----------
@@ -273,24 +251,15 @@ class NextTouchModel:
             What is known so far.
         motion
             How it would slide.
-        rng
-            Of simulated slides; without one, the lower bound in closed form.
-        samples
-            Simulated slides over each texture.
 
         Returns
         -------
         float
             At least 0, at most the entropy of what is known so far.
         """
-        gaussians, log_posterior = self._gaussian(motion), self._checked(log_posterior)
-        if rng is None:
-            return gaussians.least_information(log_posterior)
-        return gaussians.sampled_information(log_posterior, rng.standard_normal((samples, gaussians.means.shape[1])))
+        return self._gaussian(motion).least_information(self._checked(log_posterior))
 
-    def best_motion(
-        self, log_posterior: Array, motions: Sequence[SlideMotion], rng: np.random.Generator | None = None
-    ) -> NextTouch:
+    def best_motion(self, log_posterior: Array, motions: Sequence[SlideMotion]) -> NextTouch:
         """Return the motion with the largest expected information gain; of equal ones the shortest.
 
         Parameters
@@ -299,8 +268,6 @@ class NextTouchModel:
             What is known so far.
         motions
             Those that may be made.
-        rng
-            For an estimate by simulated slides; without one, by the lower bound in closed form.
 
         Returns
         -------
@@ -314,7 +281,7 @@ class NextTouchModel:
         """
         if not motions:
             raise InvalidParameter('there is no motion to choose from; name at least one that was trained')
-        choices = [NextTouch(motion, self.information(log_posterior, motion, rng)) for motion in motions]
+        choices = [NextTouch(motion, self.information(log_posterior, motion)) for motion in motions]
         most = max(choice.information for choice in choices)
         return min((c for c in choices if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
 

@@ -20,7 +20,7 @@ from scipy.stats import t as student
 
 from texture_core.config import MB, find_file, from_mapping, param, read_text, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
-from texture_core.types import NANOSECONDS, AnyArray, Array, FeatureVector, RoughnessEstimate
+from texture_core.types import NANOSECONDS, Array, FeatureVector, RoughnessEstimate
 from texture_estimation import model_files
 from texture_estimation.evidence import no_window
 from texture_estimation.learners.learner import Codes, standardisation
@@ -37,30 +37,9 @@ from texture_features.windows import WindowParams
 STICK_SLIP, LEVEL = 'peak_to_median_power', 'log_variance'
 
 
-@dataclass(frozen=True)
-class CheckParams:
-    """What makes a window unusable; both margins are beyond what was met in the training.
-
-    Examples
-    --------
-    >>> checks = Checks(CheckParams(min_force_n=0.1), ('mean',), {})
-    >>> 'force' in checks.refusal(FeatureVector(0, 'a', 0.5, 0.1, ('mean',), np.zeros(1), force_n=0.01))
-    True
-    """
-
-    min_force_n: float = param(0.05, 'Smallest force that counts as contact.', unit='N', low=0.0, high=100.0)
-    stick_slip_margin: float = param(
-        1.0,
-        f'Rise of `{STICK_SLIP}` over the training set that counts as stick-slip, as ln of power.',
-        low=0.0,
-        high=100.0,
-    )
-    quiet_margin: float = param(
-        0.7,
-        f'Fall of `{LEVEL}` below the training set that counts as too quiet, as ln of power.',
-        low=0.0,
-        high=100.0,
-    )
+MIN_FORCE_N = 0.05  # smallest that counts as contact
+STICK_SLIP_MARGIN = 1.0  # rise of STICK_SLIP over the training set that counts as stick-slip, as ln of power
+QUIET_MARGIN = 0.7  # fall of LEVEL below the training set that counts as too quiet, as ln of power
 
 
 def checked_columns(names: Sequence[str], feature: str) -> NDArray[np.intp]:
@@ -92,13 +71,11 @@ def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
     return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
 
 
-def limits_of(params: CheckParams, names: Sequence[str], values: Array) -> dict[str, float]:
-    """Return the largest `bursts` and the least `log_variance` to accept, from training windows (n, n_features).
+def limits_of(names: Sequence[str], values: Array) -> dict[str, float]:
+    """Return the largest STICK_SLIP and the least LEVEL to accept, from training windows (n, n_features).
 
     Parameters
     ----------
-    params
-        Which share of the training windows is accepted.
     names
         Name of each value.
     values : (n, n_features)
@@ -107,13 +84,13 @@ def limits_of(params: CheckParams, names: Sequence[str], values: Array) -> dict[
     Returns
     -------
     dict
-        Limits by their names.
+        Limits by their names; none of a feature that is missing.
     """
     limits = {}
     if (columns := checked_columns(names, STICK_SLIP)).size:
-        limits[STICK_SLIP] = float(values[:, columns].max()) + params.stick_slip_margin
+        limits[STICK_SLIP] = float(values[:, columns].max()) + STICK_SLIP_MARGIN
     if (columns := checked_columns(names, LEVEL)).size:
-        limits[LEVEL] = float(values[:, columns].max(axis=1).min()) - params.quiet_margin
+        limits[LEVEL] = float(values[:, columns].max(axis=1).min()) - QUIET_MARGIN
     return limits
 
 
@@ -123,15 +100,18 @@ class Checks:
 
     Parameters
     ----------
-    params
-        Of the recipe.
     names
         Of the features.
     limits
         As `limits_of` returns them.
+
+    Examples
+    --------
+    >>> checks = Checks(('mean',), {})
+    >>> 'force' in checks.refusal(FeatureVector(0, 'a', 0.5, 0.1, ('mean',), np.zeros(1), force_n=0.01))
+    True
     """
 
-    params: CheckParams
     names: tuple[str, ...]
     limits: Mapping[str, float]
     _columns: dict[str, NDArray[np.intp]] = field(default_factory=dict, repr=False)
@@ -141,7 +121,7 @@ class Checks:
 
     def refusal(self, vector: FeatureVector) -> str:
         """Return why a window cannot be graded; '' if it can."""
-        if vector.force_n < self.params.min_force_n:  # an unknown force is NaN and says nothing
+        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and says nothing
             return f'no contact: the force is {vector.force_n:.2f} N'
         finite = np.isfinite(vector.values)
         if not finite.all():
@@ -213,22 +193,22 @@ class RoughnessRegressor(Protocol):
 # Gaussian-process regression of the grade, with one point a texture.
 
 MIDDLE = 3.0  # of the scale: the grade of a texture of which nothing is known
-# What is known beforehand of the logarithms of the hyperparameters, in grades and in distances between textures:
-# mean and standard deviation of slope, of what is not straight, of its length, and of people's disagreement.
-PRIOR_MEANS = np.log([0.5, 0.5, 2.0, 0.5])
-PRIOR_SPREAD = np.array([1.0, 1.0, 0.5, 0.5])
+# What is known beforehand of the logarithms of slope and noise, in grades a typical distance between textures and in
+# grades that people disagree by: mean and standard deviation.
+PRIOR_MEANS = np.log([0.5, 0.5])
+PRIOR_SPREAD = np.array([1.0, 0.5])
 JITTER = 1e-9
 
 
 @dataclass(frozen=True)
 class GaussianProcess:
-    """A straight line plus a smooth function of standardised features, plus noise for each texture.
+    """A straight line of standardised features, plus noise for each texture.
 
     The windows of a texture share its grade and its noise: they are one point, their mean. So three thousand windows of
     fifteen textures are fifteen opinions, not three thousand, and the standard deviation says so. The hyperparameters
     maximise the marginal likelihood times a wide prior.
 
-    Source: Rasmussen & Williams 2006, sections 2.2 and 5.4.1.
+    Source: Rasmussen & Williams 2006, sections 2.1 and 5.4.1.
 
     Examples
     --------
@@ -239,8 +219,6 @@ class GaussianProcess:
     >>> isinstance(predictor, GaussianProcessPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
     (True, True)
     """
-
-    curved: bool = param(True, 'Whether a nonlinear (RBF) term is added; false: Bayesian linear regression.')
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
         """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,).
@@ -259,31 +237,25 @@ class GaussianProcess:
         targets = np.array([y[groups == code].mean() for code in codes]) - MIDDLE
         mean, scale = standardisation(points)
         # One unit is the distance of two typical textures, however many features tell of it.
-        places = (points - mean) / (scale * np.sqrt(points.shape[1]))
-        products, squares = places @ places.T, _squares(places, places)
+        scale = scale * np.sqrt(points.shape[1])
+        places = (points - mean) / scale
+        products = places @ places.T
+
+        def covariance(logs: Array) -> Array:
+            slope, noise = np.exp(logs)
+            found: Array = slope**2 * products + (noise**2 + JITTER) * np.eye(len(products))
+            return found
 
         def loss(logs: Array) -> float:
-            surprise = (logs - PRIOR_MEANS) / PRIOR_SPREAD
-            return _surprise(_covariance(self._hyper(logs), products, squares), targets) + 0.5 * float(
-                surprise @ surprise
-            )
+            surprise, of_targets = (logs - PRIOR_MEANS) / PRIOR_SPREAD, covariance(logs)
+            _, log_size = np.linalg.slogdet(of_targets)
+            likelihood = -0.5 * float(targets @ np.linalg.solve(of_targets, targets) + log_size)
+            return 0.5 * float(surprise @ surprise) - likelihood
 
-        hyper = self._hyper(minimize(loss, PRIOR_MEANS, method='L-BFGS-B').x)
-        covariance = _covariance(hyper, products, squares)
-        return {
-            'mean': mean,
-            'scale': scale * np.sqrt(points.shape[1]),
-            'places': places,
-            'weights': np.linalg.solve(covariance, targets),
-            'precision': np.linalg.inv(covariance),
-            'hyper': hyper,
-        }
-
-    def _hyper(self, logs: Array) -> Array:
-        hyper: Array = np.exp(logs)
-        if not self.curved:
-            hyper[1] = 0.0
-        return hyper
+        logs = minimize(loss, PRIOR_MEANS, method='L-BFGS-B').x
+        (slope, noise), weighed = np.exp(logs), np.linalg.solve(covariance(logs), places).T
+        spread = slope**2 * (np.eye(places.shape[1]) - slope**2 * weighed @ places)
+        return {'mean': mean, 'scale': scale, 'line': slope**2 * weighed @ targets, 'spread': spread, 'noise': noise}
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> GaussianProcessPredictor:
@@ -299,76 +271,32 @@ class GaussianProcessPredictor:
     ----------
     mean, scale : (n_features,)
         Of the standardisation.
-    places : (n_textures, n_features)
-    weights : (n_textures,)
-    precision : (n_textures, n_textures)
-        Inverse of the covariance of the grades.
-    hyper : (4,)
-        Slope, size and length of what is not straight, and noise.
+    line : (n_features,)
+        Mean of the slopes, grades.
+    spread : (n_features, n_features)
+        Covariance of the slopes.
+    noise
+        Standard deviation of people's grades of a texture.
     """
 
     mean: Array
     scale: Array
-    places: Array
-    weights: Array
-    precision: Array
-    hyper: Array
+    line: Array
+    spread: Array
+    noise: float
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return grade, within 1 and 5, and standard deviation, noise between textures included."""
         place = (X - self.mean) / self.scale
-        grade, variance = self._curved(place) if self.hyper[1] else self._straight(place)
-        return np.minimum(np.maximum(MIDDLE + grade, SMOOTH), ROUGH), np.sqrt(np.maximum(variance, 0.0))
-
-    def _curved(self, place: Array) -> tuple[Array, Array]:
-        slope, size, length, noise = self.hyper
-        own = slope**2 * (place * place).sum(axis=-1)
-        shared = slope**2 * (place @ self.places.T)
-        shared += size**2 * np.exp(-0.5 * _squares(place, self.places) / length**2)
-        return shared @ self.weights, own + size**2 + noise**2 - ((shared @ self.precision) * shared).sum(axis=-1)
-
-    def _straight(self, place: Array) -> tuple[Array, Array]:
-        line, spread = self._line
-        return place @ line, np.add.reduce((place @ spread) * place, axis=-1) + self.hyper[3] ** 2
-
-    @cached_property
-    def _line(self) -> tuple[Array, Array]:
-        """The posterior of a straight line: mean (n_features,) and covariance (n_features, n_features) of its slopes.
-
-        What `_curved` gives without its smooth function, multiplied out: a third of the time.
-        """
-        variance = float(self.hyper[0]) ** 2
-        line = variance * self.weights @ self.places
-        spread = np.eye(self.places.shape[1]) - variance * self.places.T @ self.precision @ self.places
-        return line, variance * spread
-
-
-def _covariance(hyper: Array, products: Array, squares: Array) -> Array:
-    """Return the covariance of the grades of textures with noise, (n, n)."""
-    slope, size, length, noise = hyper
-    smooth = slope**2 * products + size**2 * np.exp(-0.5 * squares / length**2)
-    covariance: Array = smooth + (noise**2 + JITTER) * np.eye(len(products))
-    return covariance
-
-
-def _surprise(covariance: Array, targets: Array) -> float:
-    """Return the negative logarithm of the marginal likelihood, less a constant."""
-    _, log_size = np.linalg.slogdet(covariance)
-    return 0.5 * float(targets @ np.linalg.solve(covariance, targets) + log_size)
-
-
-def _squares(left: Array, right: Array) -> Array:
-    """Return the squared distances, (..., n_right) of (..., n_features) and (n_right, n_features)."""
-    distances = (left * left).sum(axis=-1)[..., None] + (right * right).sum(axis=1) - 2.0 * left @ right.T
-    positive: Array = np.maximum(distances, 0.0)
-    return positive
+        variance = np.add.reduce((place @ self.spread) * place, axis=-1) + self.noise**2
+        return np.minimum(np.maximum(MIDDLE + place @ self.line, SMOOTH), ROUGH), np.sqrt(np.maximum(variance, 0.0))
 
 
 # --------------------
 # The regressors that a roughness recipe can name.
 
 REGRESSORS: Mapping[str, type[RoughnessRegressor]] = {
-    'gaussian_process': GaussianProcess,  # ours
+    'gaussian_process': GaussianProcess,  # Bayesian linear regression, Rasmussen & Williams 2006
 }
 
 
@@ -467,169 +395,9 @@ def _split(text: str, where: str) -> str:
 
 
 # --------------------
-# Grades from 1 (smooth) to 5 (rough) that people gave textures, and the table they are read from.
-
-RATINGS_GRADES = np.arange(1, 6)
-MAX_CELLS = 1_000_000  # people × textures
-COLUMNS = ('rater', 'texture', 'grade')
-SYNONYMS = {'rating': 'grade'}
-
-
-@dataclass(frozen=True, eq=False)
-class Ratings:
-    """What each person says of each texture.
-
-    Parameters
-    ----------
-    raters, textures
-        Names, in the order of their first appearance.
-    grades : (n_raters, n_textures)
-        1 to 5; NaN where a person did not grade a texture.
-    note
-        How the grades were made from what was read; '' if they stood there.
-
-    Examples
-    --------
-    >>> ratings = Ratings(('anna', 'ben'), ('silk', 'jute'), np.array([[1.0, 4.0], [2.0, 5.0]]))
-    >>> ratings.means.tolist(), ratings.votes[0].tolist()
-    ([1.5, 4.5], [1, 1, 0, 0, 0])
-    """
-
-    raters: tuple[str, ...]
-    textures: tuple[str, ...]
-    grades: Array
-    note: str = ''
-
-    @property
-    def means(self) -> Array:
-        """Mean grade of each texture, (n_textures,)."""
-        return np.asarray(np.nanmean(self.grades, axis=0))
-
-    @property
-    def deviations(self) -> Array:
-        """Standard deviation of the grades of each texture over the people, (n_textures,)."""
-        return np.asarray(np.nanstd(self.grades, axis=0, ddof=1))
-
-    @property
-    def votes(self) -> AnyArray:
-        """How many people gave each texture each grade, (n_textures, 5); what lies between is rounded."""
-        return np.asarray((np.rint(self.grades)[:, :, None] == RATINGS_GRADES).sum(axis=0))
-
-
-def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH)) -> Ratings:
-    """Read a CSV file with a line for each rating: columns `rater`, `texture` and `grade` (or `rating`).
-
-    Parameters
-    ----------
-    path
-        Of the file; other columns are left alone, and an empty grade means that there is none.
-    scale
-        Smoothest and roughest rating allowed; mapped linearly to 1 and 5.
-
-    Raises
-    ------
-    InvalidData
-        With the line, if the file cannot be read as such.
-    """
-    rows = _read_rows(Path(path))
-    raters = tuple(dict.fromkeys(row['rater'] for _, row in rows))
-    textures = tuple(dict.fromkeys(row['texture'] for _, row in rows))
-    if len(raters) * len(textures) > MAX_CELLS:
-        raise InvalidData(
-            f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MAX_CELLS}"
-        )
-    grades = _grades(rows, raters, textures, scale, path)
-    _check_filled(raters, textures, grades, path)
-    low, high = scale
-    note = '' if scale == (SMOOTH, ROUGH) else f'ratings from {low:g} to {high:g} were mapped linearly to 1 to 5'
-    return Ratings(raters, textures, grades, note)
-
-
-def _read_rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
-    """Return number and columns of each line."""
-    try:
-        reader = csv.DictReader(io.StringIO(read_text(path, MAX_BYTES, 'utf-8-sig'), newline=''))
-        names = [SYNONYMS.get(name.strip().lower(), name.strip().lower()) for name in reader.fieldnames or ()]
-        reader.fieldnames = names
-        rows: list[tuple[int, Mapping[str, str]]] = [(reader.line_num, row) for row in reader]
-    except (OSError, ValueError, csv.Error) as error:
-        raise InvalidData(f"'{path}' cannot be read: {error}; give a CSV file of ratings") from error
-    missing = [name for name in COLUMNS if name not in names]
-    if missing:
-        raise InvalidData(
-            f"'{path}' has the columns {', '.join(names) or 'none'} but no {', '.join(missing)}; "
-            'write one rating a line under rater,texture,grade'
-        )
-    if not rows:
-        raise InvalidData(f"'{path}' holds no rating; write one a line under rater,texture,grade")
-    for line, row in rows:
-        if any(row[name] is None for name in COLUMNS) or not row['rater'] or not row['texture']:
-            raise InvalidData(f"'{path}', line {line}: rater or texture is missing; write rater,texture,grade")
-    return rows
-
-
-def _grades(
-    rows: Sequence[tuple[int, Mapping[str, str]]],
-    raters: Sequence[str],
-    textures: Sequence[str],
-    scale: tuple[float, float],
-    path: str | Path,
-) -> Array:
-    """Return the grades, (n_raters, n_textures), NaN where there is none."""
-    rater_at = {name: index for index, name in enumerate(raters)}
-    texture_at = {name: index for index, name in enumerate(textures)}
-    grades = np.full((len(raters), len(textures)), np.nan)
-    for line, row in rows:
-        at = rater_at[row['rater']], texture_at[row['texture']]
-        if not np.isnan(grades[at]):
-            raise InvalidData(
-                f"'{path}', line {line}: rater '{row['rater']}' graded '{row['texture']}' before; give one grade each"
-            )
-        grades[at] = _rating(row['grade'], scale, f"'{path}', line {line}")
-    return grades
-
-
-def _rating(text: str, scale: tuple[float, float], where: str) -> float:
-    low, high = scale
-    if not low < high:
-        raise InvalidParameter(f'the scale goes from {low:g} to {high:g}; give the smooth end first, then a larger one')
-    if not text.strip():
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        needed = f'a number from {low:g} to {high:g} is needed, or name another scale with --scale'
-        raise InvalidData(f"{where}: the grade is '{text}'; {needed}")
-    return SMOOTH + (ROUGH - SMOOTH) * (value - low) / (high - low)
-
-
-def _check_filled(raters: Sequence[str], textures: Sequence[str], grades: Array, path: str | Path) -> None:
-    empty = np.isnan(grades).all(axis=0)
-    if empty.any():
-        raise InvalidData(f"'{path}': nobody graded '{textures[int(empty.argmax())]}'; leave it out or grade it")
-    if len(raters) < 2:
-        raise InvalidData(f"'{path}' has a single rater, '{raters[0]}'; a panel needs two or more")
-
-
-# --------------------
 # A roughness recipe: windows, inputs and features, head, checks and evidence, in one YAML file.
 
-KEYS = ('description', 'windows', 'inputs', 'regressor', 'checks', 'evidence', 'training')
-
-
-@dataclass(frozen=True)
-class EvidenceParams:
-    """When a grade is final before the slide ends."""
-
-    min_narrowing_grades: float = param(
-        0.1,
-        'The grade is final once more sliding would narrow its 90 % interval by less; 0: only at the end.',
-        low=0.0,
-        high=5.0,
-    )
-    min_windows: int = param(3, 'Smallest number of graded windows before a grade can be final.', low=1, high=10_000)
+KEYS = ('description', 'windows', 'inputs', 'regressor', 'training')
 
 
 @dataclass(frozen=True)
@@ -651,16 +419,14 @@ class RoughnessRecipe:
     Examples
     --------
     >>> recipe = RoughnessRecipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}}, 'mine')
-    >>> recipe.training == CalibrationParams(), recipe.evidence == EvidenceParams()
-    (True, True)
+    >>> recipe.training == CalibrationParams()
+    True
     """
 
     name: str
     feature_set: FeatureSet
     regressor_name: str
     regressor: RoughnessRegressor
-    checks: CheckParams = field(default_factory=CheckParams)
-    evidence: EvidenceParams = field(default_factory=EvidenceParams)
     training: CalibrationParams = field(default_factory=CalibrationParams)
     description: str = ''
 
@@ -686,8 +452,6 @@ class RoughnessRecipe:
             name,
             FeatureSet.from_mapping(content, where),
             *choose(REGRESSORS, content.get('regressor', 'gaussian_process'), 'regressor', where),
-            from_mapping(CheckParams, content.get('checks') or {}, f'{where}, checks'),
-            from_mapping(EvidenceParams, content.get('evidence') or {}, f'{where}, evidence'),
             from_mapping(CalibrationParams, content.get('training') or {}, f'{where}, training'),
             str(content.get('description', '')),
         )
@@ -698,8 +462,6 @@ class RoughnessRecipe:
             'description': self.description,
             **self.feature_set.as_mapping(),
             'regressor': {self.regressor_name: dataclasses.asdict(self.regressor)},
-            'checks': dataclasses.asdict(self.checks),
-            'evidence': dataclasses.asdict(self.evidence),
             'training': dataclasses.asdict(self.training),
         }
 
@@ -836,7 +598,7 @@ class RoughnessModel:
     @cached_property
     def checks(self) -> Checks:
         """What tells whether a window can be graded."""
-        return Checks(self.recipe.checks, self.names, self.limits)
+        return Checks(self.names, self.limits)
 
     @cached_property
     def _columns(self) -> NDArray[np.intp]:
@@ -905,6 +667,8 @@ NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estim
 SILENT = 'no grade: the surface resembles no training surface'
 # The scatter of the windows of a texture, known from the training, counts as so many windows.
 PRIOR_WINDOWS = 4.0
+# A grade is final once more sliding would narrow its 90 % interval by less, after so many graded windows.
+MIN_NARROWING_GRADES, MIN_WINDOWS = 0.1, 3
 
 
 class RoughnessAccumulator:
@@ -1006,8 +770,7 @@ class RoughnessAccumulator:
         shared, scatter = self._variances(model)
         std = math.sqrt(shared + scatter)
         to_gain = NORMAL_90 * (std - math.sqrt(shared))
-        params = model.recipe.evidence
-        narrow = self._windows >= params.min_windows and to_gain < params.min_narrowing_grades
+        narrow = self._windows >= MIN_WINDOWS and to_gain < MIN_NARROWING_GRADES
         return RoughnessEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -1113,7 +876,7 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
         recipe=recipe,
         parameters=recipe.regressor.fit(values, true, codes),
         calibration=calibration,
-        limits=limits_of(recipe.checks, examples.names, examples.values),
+        limits=limits_of(examples.names, examples.values),
         grades=table,
         training={
             'windows': len(codes),

@@ -14,10 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
-from texture_estimation import decisions as prediction_sets
-from texture_estimation import decisions as stopping_rule
 from texture_estimation.decisions import (
-    FLOOR_WINDOWS,
     HIDDEN,
     NOVELTY_WINDOWS,
     SCORES,
@@ -26,9 +23,12 @@ from texture_estimation.decisions import (
     Decisions,
     Domain,
     ErrorBound,
-    Mask,
     NoveltyDetector,
+    SlideCourse,
+    StoppingRule,
     fit_confidence_floor,
+    fit_prediction_sets,
+    fit_stopping_rule,
     slide_scores,
     space_means,
     window_count,
@@ -279,11 +279,6 @@ class HeldOutSlide:
         (n_windows, n_labels)
         """
         return rule.log_posterior(self.means, self.effective_windows[:, None], tempering_exponent)
-
-    def right(self, posterior: Array) -> Mask:
-        """Return whether the label after each window is the true one alone, (n_windows,)."""
-        right: Mask = (posterior.argmax(axis=1) == self.truth) & ~is_tied(posterior)
-        return right
 
 
 @dataclass(frozen=True, eq=False)
@@ -569,7 +564,7 @@ def fit_open_set(
     examples: LabelledFeatures,
     slides: Sequence[HeldOutSlide],
     tempering_exponent: float,
-) -> tuple[stopping_rule.StoppingRule, NoveltyDetector | None, ConfidenceFloor]:
+) -> tuple[StoppingRule, NoveltyDetector | None, ConfidenceFloor]:
     """Return when a slide may end, the novelty detector, and the smallest confidence of known surfaces.
 
     Without a novelty detector, as none is asked for or there are too few slides, there is no smallest confidence.
@@ -603,102 +598,38 @@ def fit_open_set(
             gain_range=recipe.augmentation.gain_range,
             scores=decisions.novelty_scores,
         )
-    if found is None:
-        rule = _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate)
-        return rule, None, ConfidenceFloor()
-    detector, traces = found
+    detector, traces = found or (None, slides)
     courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
-    floor = _fit_floor(courses, decisions.low_confidence_rejection_rate, decisions.max_known_error_rate)
-    courses = [_with_floor(course, floor) for course in courses]
-    rule = stopping_rule.fit_open_set_rule(
+    if not courses:
+        return StoppingRule(), None, ConfidenceFloor()
+    if detector is None:
+        return fit_stopping_rule(courses, decisions.max_error_rate, by_novelty=False), None, ConfidenceFloor()
+    floor = fit_confidence_floor(courses, decisions.low_confidence_rejection_rate, decisions.max_known_error_rate)
+    courses = [
+        replace(course, known=course.known & floor.reached_by(course.confidences, course.effective_windows))
+        for course in courses
+    ]
+    rule = fit_stopping_rule(
         courses, decisions.max_error_rate, decisions.max_disturbed_error_rate, decisions.early_novelty_score
     )
     return rule, detector, floor
 
 
 def _course(
-    trace: HeldOutSlide, detector: NoveltyDetector, rule: EvidenceRule, tempering_exponent: float
-) -> stopping_rule.SlideCourse:
+    trace: HeldOutSlide, detector: NoveltyDetector | None, rule: EvidenceRule, tempering_exponent: float
+) -> SlideCourse:
     posterior = trace.posterior(rule, tempering_exponent)
-    scores = np.zeros((len(posterior), 0)) if trace.scores is None else trace.scores
-    novelty_scores, thresholds = detector.scores_and_thresholds(scores, trace.effective_windows)
-    return stopping_rule.SlideCourse(
+    novelty_scores: Array = np.zeros(len(posterior))
+    thresholds: Array = novelty_scores
+    if detector is not None and trace.scores is not None:
+        novelty_scores, thresholds = detector.scores_and_thresholds(trace.scores, trace.effective_windows)
+    return SlideCourse(
         confidences=np.exp(posterior.max(axis=1)),
-        right=trace.right(posterior),
+        right=(posterior.argmax(axis=1) == trace.truth) & ~is_tied(posterior),
         effective_windows=trace.effective_windows,
         known=novelty_scores <= thresholds,
         novelty_scores=novelty_scores,
         disturbance=trace.disturbance,
-    )
-
-
-def _fit_floor(courses: Sequence[stopping_rule.SlideCourse], rate: float, max_error_rate: float) -> ConfidenceFloor:
-    """Return the smallest confidence of undisturbed slides that end with the right label, but for this fraction.
-
-    It rises until no more than `max_error_rate` of the undisturbed slides are known under a wrong label.
-    """
-    plain = [course for course in courses if not course.disturbance]
-    right = [course for course in plain if course.right[-1]]
-    errors = []
-    if max_error_rate < 1.0:
-        for length in FLOOR_WINDOWS:
-            places = [int(np.abs(course.effective_windows - length).argmin()) for course in plain]
-            wrong = [
-                course.confidences[place] if course.known[place] and not course.right[place] else 0.0
-                for course, place in zip(plain, places, strict=True)
-            ]
-            errors.append(np.array(wrong))
-    return fit_confidence_floor(
-        [course.confidences for course in right],
-        [course.effective_windows for course in right],
-        rate,
-        errors,
-        max_error_rate,
-    )
-
-
-def _with_floor(course: stopping_rule.SlideCourse, floor: ConfidenceFloor) -> stopping_rule.SlideCourse:
-    """Return a course that is known only where its confidence reaches the floor, too."""
-    return replace(course, known=course.known & floor.reached_by(course.confidences, course.effective_windows))
-
-
-def _fit_stopping(
-    slides: Sequence[HeldOutSlide], rule: EvidenceRule, tempering_exponent: float, wrong: float
-) -> stopping_rule.StoppingRule:
-    """Return when a slide may end."""
-    if not slides:
-        return stopping_rule.StoppingRule()
-    posteriors = [slide.posterior(rule, tempering_exponent) for slide in slides]
-    right = [slide.right(posterior) for slide, posterior in zip(slides, posteriors, strict=True)]
-    confidences = [np.exp(posterior.max(axis=1)) for posterior in posteriors]
-    return stopping_rule.fit_stopping_rule(confidences, right, [slide.effective_windows for slide in slides], wrong)
-
-
-def fit_prediction_sets(
-    slides: Sequence[HeldOutSlide], rule: EvidenceRule, tempering_exponent: float, coverage: float
-) -> prediction_sets.PredictionSets:
-    """Return which textures are candidates.
-
-    Parameters
-    ----------
-    slides
-        Held-out slides.
-    rule
-        Combines the windows of a slide.
-    tempering_exponent
-        How fast evidence grows.
-    coverage
-        Share of slides whose texture is among the candidates.
-
-    Returns
-    -------
-    PredictionSets
-    """
-    if not slides:
-        return prediction_sets.PredictionSets(coverage)
-    posteriors = [slide.posterior(rule, tempering_exponent) for slide in slides]
-    return prediction_sets.fit_prediction_sets(
-        posteriors, [slide.truth for slide in slides], [slide.effective_windows for slide in slides], coverage
     )
 
 
@@ -755,7 +686,12 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         decisions=Decisions(
             ErrorBound(min(len(slides_held_out), len(np.unique(made.groups))), decisions.max_error_rate),
             rule,
-            fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
+            fit_prediction_sets(
+                [slide.posterior(recipe.evidence, tempering_exponent) for slide in slides_held_out],
+                [slide.truth for slide in slides_held_out],
+                [slide.effective_windows for slide in slides_held_out],
+                decisions.coverage,
+            ),
             floor,
             _domain(made, recipe.training),
             novelty_detector,

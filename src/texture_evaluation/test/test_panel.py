@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_estimation.roughness import Ratings, read_ratings
 from texture_evaluation.panel import (
+    Ratings,
     deviations_chart,
     examine,
     intraclass_correlation,
     krippendorff_alpha,
     one_against_rest,
     protocol_violations,
+    read_ratings,
     votes_chart,
 )
 

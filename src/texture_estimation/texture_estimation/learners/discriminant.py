@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, Predictor, assign_folds, fit_in_folds
+from texture_estimation.learners.learner import UNBOUND, Codes, Fitted, Predictor, column_of, fit_in_folds
 from texture_estimation.numerics import shrunk_covariance
 
 # --------------------
@@ -187,12 +187,10 @@ class Discriminant:
         def fit(held: NDArray[np.bool_]) -> dict[str, Array]:
             return self._fit(X[~held], y[~held], groups[~held], n_labels)
 
-        split = assign_folds(y, groups, self.folds, parts)
-        if split is None:
-            nothing = np.zeros(len(y), dtype=bool)
-            return Fitted(fit(nothing), None, 'not calibrated, as a label has a single window')
         tempered = ('weights', 'offsets')
-        return fit_in_folds(fit, self.predictor, X, y, groups, split=split, tempered=tempered, most=8.0)
+        return fit_in_folds(
+            fit, self.predictor, X, y, groups, folds=self.folds, parts=parts, tempered=tempered, most=8.0
+        )
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
@@ -211,7 +209,6 @@ class Discriminant:
 # One discriminant for each range of forces: the spectrum that a surface excites changes with the force of the finger.
 
 FORCE = 'force'  # ends the name of the feature
-UNBOUND = -1
 STRETCHES = 6  # of a slide
 ELSEWHERE = 0.02  # of the weight of a window at the middle of a range, for those far from it: no class is without any
 FURTHEST = 30.0  # times the reach: a slide made wholly outside still has a label
@@ -334,8 +331,7 @@ class ForceDiscriminant(Discriminant):
 
     def of_examples(self, names: Sequence[str], _labels: Sequence[str]) -> ForceDiscriminant:
         """Return the learner for examples with these features."""
-        found = [number for number, name in enumerate(names) if name.rsplit('/', 1)[-1] == FORCE]
-        return replace(self, column=found[0] if found else UNBOUND)
+        return replace(self, column=column_of(names, FORCE))
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:

@@ -153,6 +153,22 @@ def of_examples(learner: Learner, names: Sequence[str], labels: Sequence[str]) -
     return bind(names, labels) if bind else learner
 
 
+UNBOUND = -1
+
+
+def column_of(names: Sequence[str], feature: str) -> int:
+    """Return the number of the first value of a feature in any input; UNBOUND if there is none.
+
+    Parameters
+    ----------
+    names : (n_features,)
+        Such as 'signal/force'.
+    feature
+        Name that ends it.
+    """
+    return next((number for number, name in enumerate(names) if name.rsplit('/', 1)[-1] == feature), UNBOUND)
+
+
 def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
     """Return the names of the keyword arguments that `fit` of a learner takes besides the examples.
 
@@ -213,6 +229,9 @@ def _numbered(groups: Codes) -> Codes:
     return rank[inverse.reshape(-1)]
 
 
+UNCALIBRATED = 'not calibrated, as a label has a single window'  # so nothing can be held out
+
+
 def fit_in_folds(
     fit: Callable[[NDArray[np.bool_]], dict[str, Any]],
     predictor: Callable[[Mapping[str, Any]], Predictor],
@@ -220,7 +239,8 @@ def fit_in_folds(
     y: Codes,
     groups: Codes,
     *,
-    split: tuple[Codes, str],
+    folds: int,
+    parts: Codes | None,
     tempered: Sequence[str],
     most: float = 4.0,
 ) -> Fitted:
@@ -234,8 +254,8 @@ def fit_in_folds(
         Makes a predictor of them.
     X, y, groups
         As `Learner.fit` takes them.
-    split
-        What `assign_folds` returned.
+    folds, parts
+        How to divide them, see `assign_folds`.
     tempered
         Parameters of which the scores are linear functions.
     most
@@ -244,15 +264,18 @@ def fit_in_folds(
     Returns
     -------
     Fitted
-        With the log-probabilities of each example when it was held out.
+        With the log-probabilities of each example when it was held out, if a label has more than a single window.
     """
+    split, nothing = assign_folds(y, groups, folds, parts), np.zeros(len(y), dtype=bool)
+    if split is None:
+        return Fitted(fit(nothing), None, UNCALIBRATED)
     folds_of, note = split
     scores, trusted = np.empty((len(y), int(y.max()) + 1)), None
-    folds = []
+    fits = []
     for part in np.unique(folds_of):
         held = folds_of == part
-        folds.append(FoldFit(np.unique(groups[held]), fit(held)))
-        fitted = predictor(folds[-1].parameters)
+        fits.append(FoldFit(np.unique(groups[held]), fit(held)))
+        fitted = predictor(fits[-1].parameters)
         scores[held] = fitted(X[held])
         if hasattr(fitted, 'trust'):
             trusted = np.ones(len(y)) if trusted is None else trusted
@@ -264,8 +287,8 @@ def fit_in_folds(
 
     for rows in chunks(*scores.shape):
         scores[rows] = log_softmax(scores[rows] / temperature)
-    folds = [FoldFit(fold.held_out, calibrated(fold.parameters)) for fold in folds]
-    return Fitted(calibrated(fit(np.zeros(len(y), dtype=bool))), scores, note, folds, trusted)
+    fits = [FoldFit(fold.held_out, calibrated(fold.parameters)) for fold in fits]
+    return Fitted(calibrated(fit(nothing)), scores, note, fits, trusted)
 
 
 # --------------------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.discriminant import linear_discriminant
-from texture_estimation.learners.learner import Codes, Fitted, assign_folds, fit_in_folds
+from texture_estimation.learners.learner import UNBOUND, Codes, Fitted, column_of, fit_in_folds
 from texture_estimation.numerics import chunks
 from texture_features.augmentation import Augmentation
 from texture_features.features.temporal import SLIDE_ONSET
@@ -325,17 +325,13 @@ class Mlp:
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
         n_labels = int(y.max()) + 1
-        split = assign_folds(y, groups, self.folds, parts)
-        if split is None:
-            fitted = self._fit(X, y, n_labels, augmented)
-            return Fitted(fitted, None, 'not calibrated, as a label has a single window')
 
         def fit(held: NDArray[np.bool_]) -> dict[str, Array]:
             rest = augmented.without(np.unique(groups[held])) if augmented else None
             share = CALIBRATION_SHARE if augmented and held.any() else 1.0
             return self._fit(X[~held], y[~held], n_labels, rest, share)
 
-        return fit_in_folds(fit, self.predictor, X, y, groups, split=split, tempered=TEMPERED)
+        return fit_in_folds(fit, self.predictor, X, y, groups, folds=self.folds, parts=parts, tempered=TEMPERED)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> MlpPredictor:
@@ -531,8 +527,6 @@ class OnsetMlpPredictor(MlpPredictor):
 # --------------------
 # Multilayer perceptron with a linear discriminant for the first window of a slide.
 
-UNBOUND = -1
-
 
 @dataclass(frozen=True)
 class OnsetMlp(Mlp):
@@ -576,8 +570,7 @@ class OnsetMlp(Mlp):
 
     def of_examples(self, names: Sequence[str], _labels: Sequence[str]) -> OnsetMlp:
         """Return the learner for examples with these features; without `slide_onset` it is the network alone."""
-        found = [number for number, name in enumerate(names) if name.rsplit('/', 1)[-1] == SLIDE_ONSET]
-        return dataclasses.replace(self, column=found[0] if found else UNBOUND)
+        return dataclasses.replace(self, column=column_of(names, SLIDE_ONSET))
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> OnsetMlpPredictor:

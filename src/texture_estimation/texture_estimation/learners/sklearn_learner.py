@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from texture_core.config import BROKEN_CONTENT, MB, Archive, library, parse_json, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
+from texture_estimation.learners.learner import UNCALIBRATED, Codes, Fitted, assign_folds, standardisation
 from texture_estimation.numerics import fit_temperature, log_softmax
 
 # --------------------
@@ -328,7 +328,7 @@ class SklearnLearner:
         parameters = {'packed': packed(fitted.estimator, self.estimator), 'mean': fitted.mean, 'scale': fitted.scale}
         split = assign_folds(y, groups, FOLDS)
         if split is None:
-            note = 'not calibrated, as a label has a single window'
+            note = UNCALIBRATED
             return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, note)
         held_out = np.empty((len(y), n_labels))
         for part in np.unique(split[0]):

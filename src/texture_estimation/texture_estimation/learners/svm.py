@@ -13,7 +13,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
+from texture_estimation.learners.learner import UNCALIBRATED, Codes, Fitted, assign_folds, standardisation
 from texture_estimation.numerics import fit_temperature, group_means, log_softmax
 
 # --------------------
@@ -425,7 +425,7 @@ class SvmRbf:
         split = assign_folds(y, groups, self.folds, parts)
         machines = self._fit(X, y, groups, differences)
         if split is None:
-            coupling, held_out, note = uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
+            coupling, held_out, note = uncalibrated(n_labels), None, UNCALIBRATED
         else:
             folds_of, note = split
             decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))

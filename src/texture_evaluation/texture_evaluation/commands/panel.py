@@ -7,8 +7,8 @@ import argparse
 import math
 from pathlib import Path
 
-from texture_estimation.roughness import ROUGH, SMOOTH, read_ratings
-from texture_evaluation.panel import PanelReport, deviations_chart, examine, votes_chart
+from texture_estimation.roughness import ROUGH, SMOOTH
+from texture_evaluation.panel import PanelReport, deviations_chart, examine, read_ratings, votes_chart
 
 SHOWN_VIOLATIONS = 5
 
