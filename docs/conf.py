@@ -19,7 +19,14 @@ extensions = ['myst_parser']
 myst_heading_anchors = 4
 root_doc = 'docs/index'
 # The pages lie where they are read on a forge as well; links between them, to files and to packages work in both.
-include_patterns = ['docs/**', 'src/*/README.md']
+include_patterns = [
+    'docs/**',
+    'src/*/README.md',
+    'CONTRIBUTING.md',
+    'CHANGELOG.md',
+    'QUALITY_DECLARATION.md',
+    'SECURITY.md',
+]
 exclude_patterns = ['.*', 'build', 'install', 'log', 'out', 'src/*/[!R]*', '**/__pycache__']
 
 html_theme = 'furo'
@@ -29,24 +36,15 @@ highlight_language = 'text'  # most blocks are commands and sentences
 
 # Sources of included numbers, which tools/figures.py reads: a forge hides them, and the site leaves them out.
 SOURCES = re.compile(r'<!--=.*?-->|<!-- (?:constants|measured once)(?:: \w+)? -->')
-MORE_PAGES = '<!-- more pages -->'
 # Tables that a benchmark wrote, linked from its page: without a title, so in no list of pages.
 TABLES = 'docs/charts/'
 
 
 def fill(app: object, docname: str, source: list[str]) -> None:
-    """Take the sources of numbers out of a page, and list pages in the index, before Sphinx reads the page."""
+    """Take the sources of numbers out of a page before Sphinx reads it."""
     if docname.startswith(TABLES):
         source[0] = f'---\norphan: true\n---\n{source[0]}'
     source[0] = SOURCES.sub('', source[0])
-    if MORE_PAGES in source[0]:
-        source[0] = source[0].replace(MORE_PAGES, more_pages(source[0]))
-
-
-def more_pages(index: str) -> str:
-    """Return the pages of this folder that the index does not name, so that none is lost."""
-    named = set(re.findall(r'^([\w-]+)$', index, re.MULTILINE)) | {'index'}
-    return '\n'.join(sorted({page.stem for page in DOCS.glob('*.md')} - named))
 
 
 def setup(app: object) -> None:

@@ -221,7 +221,8 @@ def said(path: Path) -> Iterator[str]:
 
 def test_the_sentences_in_troubleshooting_are_those_of_the_programs() -> None:
     spoken = '\n'.join(text for path in ROOT.glob('src/texture_*/texture_*/**/*.py') for text in said(path))
-    quoted = re.findall(r'^\| `([^`]+)`', (DOCS / 'troubleshooting.md').read_text(), re.MULTILINE)
+    troubleshooting = (DOCS / 'operate.md').read_text().partition('## Troubleshooting')[2]
+    quoted = re.findall(r'^\| `([^`]+)`', troubleshooting, re.MULTILINE)
     assert len(quoted) > 20
     assert [sentence for sentence in quoted if sentence not in spoken] == []
 
