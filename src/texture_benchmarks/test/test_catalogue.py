@@ -56,14 +56,14 @@ def missing(benchmark: BenchmarkOptions) -> BenchmarkResult:
 
 @pytest.fixture
 def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
-    benches = {'missing': missing, 'recipes': good, 'good': good}
+    benches = {'missing': missing, 'overview': good, 'good': good}
     monkeypatch.setattr(command, 'BENCHMARKS', benches)
     monkeypatch.setattr(catalogue, 'BENCHMARKS', benches)
     return benches
 
 
 def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
-    assert set(LONG) > {'recipes'}
+    assert set(LONG) > {'overview'}
     for more, count in (([], 1), (['--long'], 2)):
         assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
         said = capfd.readouterr().out
@@ -85,7 +85,7 @@ def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path:
 
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
-    [(['benchmark', 'recips'], "did you mean 'recipes'?"), (['benchmark', 'recipes', '--quick'], '--data')],
+    [(['benchmark', 'overvew'], "did you mean 'overview'?"), (['benchmark', 'overview', '--quick'], '--data')],
 )
 def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
     monkeypatch.delenv('TEXTURE_DATA', raising=False)

@@ -1,19 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What studies share: data sets imported once, work on all cores, charts with names."""
+"""What studies share: data sets imported once, work on all cores."""
 
 import threading
 from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
 from texture_benchmarks import study
-from texture_benchmarks.study import BenchmarkOptions, decided_at, imported, importing_once, map_forked
+from texture_benchmarks.study import BenchmarkOptions, imported, importing_once, map_forked
 from texture_core.errors import InvalidData
-from texture_core.types import Rejection, TextureEstimate
-from texture_evaluation.metrics import SlideResult
 
 
 @pytest.fixture
@@ -91,34 +88,3 @@ def test_linear_algebra_keeps_to_one_thread_in_each() -> None:
         return {pool['num_threads'] for pool in threadpool_info() if pool['user_api'] == 'blas'}
 
     assert map_forked(threads, [0]) == [{1}]
-
-
-# Cost and share; the first three are the front.
-VALUES = [(100.0, 0.70), (130.0, 0.72), (450.0, 0.95), (440.0, 0.50), (445.0, 0.49), (2000.0, 0.60)]
-FRONT = [0, 1, 2]
-
-
-def test_every_method_of_the_front_has_its_name() -> None:
-    assert set(FRONT) <= set(study._named(VALUES, FRONT))
-
-
-def test_the_evidence_chart_is_drawn_without_a_display(tmp_path: Path) -> None:
-    line = (np.array([0.5, 1.0]), np.array([0.8, 0.9]))
-    drawn = study.evidence_chart({f'm{k}': line for k in range(9)}, 'title', tmp_path / 'e.png')
-    assert matplotlib.image.imread(drawn).std() > 0
-
-
-def slide(surface: str, decisions: str, confidences: tuple[float, ...]) -> SlideResult:
-    """Return a slide whose windows of 0.5 s every 0.1 s decide letter by letter."""
-    estimates = [
-        TextureEstimate(0, 'e', label, Rejection.NONE, confidences[k], windows=k + 1, evidence_s=0.5 + 0.1 * k)
-        for k, label in enumerate(decisions)
-    ]
-    return SlideResult(surface, list(decisions), estimates)
-
-
-def test_slides_end_at_a_confidence_or_go_on_to_their_end() -> None:
-    growing = [slide('a', 'baa', (0.5, 0.7, 0.9)), slide('b', 'abb', (0.6, 0.6, 0.6))]
-    seconds, shares = decided_at(growing, (0.5, 0.7, 0.99))
-    np.testing.assert_allclose(seconds, [0.5, 0.65, 0.7])
-    np.testing.assert_array_equal(shares, [0.0, 1.0, 1.0])

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.recipes import DATA
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, map_forked
-from texture_benchmarks.trust import ROWS, TRAINED, disturbed, simulate
+from texture_benchmarks.disturbances import ROWS, TRAINED, disturbed, simulate
+from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked
 from texture_core.types import NANOSECONDS
 from texture_estimation.recipe import FAST_TOPIC, Recipe, load_recipe
 from texture_estimation.training import train

@@ -14,17 +14,13 @@ from pathlib import Path
 from texture_benchmarks import (
     borders,
     finger_check,
-    frontier,
     latency,
     learning,
     motion,
     next_motion,
     overview,
     papers,
-    peers,
     places,
-    recipes,
-    robustness,
     scale,
     scenes,
     trust,
@@ -36,31 +32,25 @@ from texture_estimation.search import single_blas_thread
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
     'hand': latency.run_hand,  # five BioTacs at once through the running nodes: latency and computing time
-    'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
-    'recipes_later': recipes.run_later,  # the same on the vibration of slides of a later time alone
-    'peers': peers.run,  # general classifiers of time series on the same later slides; in packages of their own
-    'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
+    # accuracy over sliding time and over computing time: ours, the papers' and peers, in one run
+    'overview': overview.run,
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'borders': borders.run,  # at another place, on another day, with another finger
     'places': places.run,  # trained at six places against six slides of one track, simulated samples that vary
     'finger_check': finger_check.run,  # another finger and another day, before and after `texture check`
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
-    'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
-    'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
+    'trust': trust.run,  # where recognition fails: how slides end under disturbances and across borders
     'roughness': latency.run_roughness,  # from window to grade
     'learning': learning.run,  # trained slide by slide against trained again on the same slides
     'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
     'next_motion_recorded': next_motion.run_recorded,  # the same among recorded speeds and forces
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
-    'overview': overview.run,  # accuracy against time in one picture, from the stored figures of others
 }
 # Where accuracy counts: they run side by side, one on each core, the longest first.
-SIDE_BY_SIDE = ('trust', 'learning', 'robustness', 'next_motion', 'next_motion_recorded')
+SIDE_BY_SIDE = ('trust', 'learning', 'next_motion', 'next_motion_recorded')
 # What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes or more.
-LONG = frozenset(
-    {'borders', 'finger_check', 'frontier', 'motion', 'peers', 'recipes', 'robustness', 'scale', 'scenes', 'trust'}
-)
+LONG = frozenset({'borders', 'finger_check', 'motion', 'overview', 'scale', 'scenes', 'trust'})
 
 Act = Callable[[str], int]  # runs a study by its name and returns the exit code of its process
 

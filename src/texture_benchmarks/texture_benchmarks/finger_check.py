@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.borders import DATES, DAY, BorderTrial, fingersense, for_recipe, recipe_of
-from texture_benchmarks.recipes import DATA
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, map_forked
-from texture_benchmarks.trust import ROWS, TRAINED, Outcome, disturbed, evaluate_slides, simulate
+from texture_benchmarks.disturbances import ROWS, TRAINED, disturbed, simulate
+from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked
+from texture_benchmarks.trust import Outcome, evaluate_slides
 from texture_estimation.few_shot import adapted
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import load_recipe

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, histogram_chart
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.types import Array
 from texture_estimation.model import TextureModel
 from texture_estimation.roughness import (
@@ -59,19 +59,12 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(options.seed), surfaces=surfaces)
         timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), options) for recipe in RECIPES}
     driver = driver_cpu()
-    chart = histogram_chart(
-        {f'{name}, {recipe}': values for recipe, timing in timings.items() for name, values in timing.charted.items()},
-        'From the last sample of a window to the estimate (simulated slides)',
-        'time (ms)',
-        options.out / 'latency.png',
-    )
     return BenchmarkResult(
         name='latency',
         measured=run.__doc__,
         data='simulated TSF-85, scene bench',
         split=f'trained on slides 1-{plan.slides - 1} of each surface; timed on slide {plan.slides}, live on a new one',
         numbers={'targets': TARGETS, **{recipe: timing.numbers(driver) for recipe, timing in timings.items()}},
-        charts=(chart,),
     )
 
 
@@ -82,10 +75,6 @@ class _Timing:
     alone_us: Array
     without_novelty_us: Array
     live: LiveLatency
-
-    @property
-    def charted(self) -> Mapping[str, Array]:
-        return {'in one process': self.alone_us / 1000, 'through DDS': 1000 * self.live.latency_s}
 
     def numbers(self, driver: float) -> Mapping[str, Any]:
         median, p99 = np.percentile(self.alone_us, (50, 99))
@@ -197,7 +186,6 @@ def run_roughness(options: BenchmarkOptions) -> BenchmarkResult:
     timed = QUICK_TIMED if options.quick else TIMED
     rounds = [{name: grading_us(model, windows, timed) for name, model in models.items()} for _ in range(ROUNDS)]
     times = {name: min((taken[name] for taken in rounds), key=np.median) for name in models}
-    title = 'From the samples of a window to the grade, in one process (simulated)'
     percentiles = {name: np.percentile(values, (50, 99)).tolist() for name, values in times.items()}
     return BenchmarkResult(
         name='roughness-latency',
@@ -211,7 +199,6 @@ def run_roughness(options: BenchmarkOptions) -> BenchmarkResult:
             'target_us': TARGET_US,
             **{name: {'median_us': median, 'p99_us': p99} for name, (median, p99) in percentiles.items()},
         },
-        charts=(histogram_chart(times, title, 'time (µs)', options.out / 'roughness-latency.png'),),
     )
 
 

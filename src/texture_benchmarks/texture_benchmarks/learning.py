@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, line_chart
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
 from texture_core.types import Array, TextureEstimate
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental import IncrementalClassifier
@@ -20,6 +20,7 @@ from texture_estimation.learners.mlp import Mlp
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
+from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import training_examples
 from texture_features.examples import LabelledFeatures
 from texture_recordings.dataset import SlideDataset
@@ -219,13 +220,20 @@ def _numbers(runs: Sequence[IncrementalRun], draws: Sequence[Any], stages: Seque
 
 
 def _chart(runs: Sequence[IncrementalRun], stages: Sequence[int], new: int, path: Path) -> Path:
-    lines = {}
-    for what in ('slides', 'windows'):
-        for how, which in (
-            ('added one slide at a time', 'incremental'),
-            ('trained again on the same slides', 'retrained'),
-        ):
-            shares = [[getattr(getattr(one, which)[stage], what) for one in runs] for stage in stages]
-            lines[f'{how}: {what}'] = (np.array(stages, dtype=float), 100 * np.mean(shares, axis=1))
+    """Draw slides and windows right over the number of slides of each new texture, mean and range over the draws."""
+    lines = (('incremental', 'added one slide at a time', COLOURS[0]), ('retrained', 'trained again', COLOURS[1]))
     title = f'{new} new materials added to the others (BioTac, later slides of all)'
-    return line_chart(lines, title, ('slides of each new material', 'right (%)'), path, logarithmic=True)
+    with chart(path, (8.0, 4.8), title, points=11.0) as figure:
+        axes = figure.subplots()
+        for what, dashes in (('slides', '-'), ('windows', '--')):
+            for which, how, colour in lines:
+                right = 100 * np.array([[getattr(getattr(one, which)[s], what) for one in runs] for s in stages])
+                axes.plot(stages, right.mean(axis=1), dashes, marker='o', color=colour, label=f'{how}: {what}')
+                axes.fill_between(stages, right.min(axis=1), right.max(axis=1), color=colour, alpha=0.15, linewidth=0)
+        axes.set(
+            xscale='log', xlabel='slides of each new material', ylabel='right (%), range of draws', ylim=(None, 101)
+        )
+        axes.set_xticks(stages, [f'{stage}' for stage in stages])
+        axes.minorticks_off()
+        axes.legend(loc='lower right')
+    return path

@@ -433,44 +433,6 @@ def _over_stiffness(
     axes.set(title=title, xlabel='stiffness of the contact (kN/m)', xticks=ticks, xticklabels=map(str, ticks))
 
 
-def hazard_chart(lags: Mapping[float, Trials], hazards: Mapping[str, Mapping[float, Trials]], path: Path) -> Path:
-    """Draw the overshoot over the stiffness, a line for each undeclared lag, and the highest force of each hazard."""
-    title = 'An arm without a force mode, 1 N at 0.05 m/s: undeclared lag, and hazards'
-    with chart(path, (11.0, 5.2), title) as figure:
-        left, right = figure.subplots(1, 2)
-        shares = {f'{1e3 * lag:.0f} ms': ([*t], [100 * one.overshoot for one in t.values()]) for lag, t in lags.items()}
-        _over_stiffness(left, shares, 'overshoot of the force (%)', 100 * TARGETS['overshoot'])
-        left.legend(title='undeclared lag', loc='center left')
-        rows = np.arange(len(hazards))
-        for number, (lag, colour) in enumerate(zip(lags, COLOURS, strict=False)):
-            peaks = [max(trial.peak_n for trial in by_lag[lag].values()) for by_lag in hazards.values()]
-            right.barh(rows + 0.2 * (number - 1.5), peaks, height=0.2, color=colour)
-        right.set(title='highest true force, worst stiffness (N)', yticks=rows, yticklabels=list(hazards))
-        right.invert_yaxis()
-    return path
-
-
-def robot_chart(robots: Mapping[str, Mapping[str, Any]], path: Path) -> Path:
-    """Draw how each robot kept force, speed and circle over the stiffness; `robots` is as in the JSON."""
-    title = 'Flat surfaces, 1 N: straight at 0.05 m/s (the hand 0.02), circle of 20 mm at 0.1 m/s'
-    with chart(path, (9.0, 6.4), title) as figure:
-        panels = list(figure.subplots(2, 2).flat)
-        for axes, (motions, number, name, times) in zip(panels, PANELS, strict=True):
-            lines = {}
-            for robot, rows in robots.items():
-                done: list[Mapping[str, float]] = [
-                    next((row[motion] for motion in motions if motion in row), {}) for row in rows.values()
-                ]
-                values = [times * row.get(number, math.nan) for row in done]
-                lines[robot] = ([float(stiffness.split()[0]) for stiffness in rows], values)
-            _over_stiffness(axes, lines, name, times * TARGETS[number])
-            axes.set_ylim(
-                top=1.15 * np.nanmax([times * TARGETS[number], *(v for _, own in lines.values() for v in own)])
-            )
-        figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
-    return path
-
-
 def surface_chart(surfaces: Mapping[str, Trials], path: Path) -> Path:
     """Draw force and speed errors over stiffness, a line for each surface."""
     with chart(path, (9.0, 4.4), 'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s') as figure:
@@ -578,9 +540,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'margin': margins(),
         },
         charts=(
-            robot_chart(robots, options.out / 'motion_robots.png'),
             surface_chart(surfaces, options.out / 'motion_surfaces.png'),
-            hazard_chart(lags, hazards, options.out / 'motion_hazards.png'),
             border_chart(border, options.out / 'motion_stability.png'),
         ),
     )

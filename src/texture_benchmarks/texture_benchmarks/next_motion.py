@@ -8,18 +8,15 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from texture_benchmarks.recipes import DATA
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
+from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported
 from texture_core.config import find
 from texture_core.types import AnyArray, Array, SlideMotion, Window
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.charts import COLOURS, chart
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow
@@ -152,23 +149,6 @@ def _events(scene: Scene, motion: SlideMotion, samples: Array) -> Iterator[CutWi
         yield CutWindow(0, str(number), length, length, {'signal': window}, speed, force, '')
 
 
-def slides_chart(
-    right: Mapping[str, Array], wanted: Sequence[float], path: str | Path, slides: str = 'simulated'
-) -> Path:
-    """Draw the accuracy against the number of slides; shaded is one standard deviation between seeds."""
-    with chart(path, (6.4, 4.0), f'Textures recognised after several slides ({slides})') as figure:
-        axes = figure.subplots()
-        for colour, marker, (name, shares) in zip(COLOURS, 'osvDP', right.items(), strict=False):
-            numbers, mean, off = np.arange(1, shares.shape[1] + 1), shares.mean(axis=0), shares.std(axis=0)
-            axes.plot(numbers, 100 * mean, color=colour, marker=marker, markersize=5, label=name)
-            axes.fill_between(numbers, 100 * (mean - off), 100 * (mean + off), color=colour, alpha=0.2, linewidth=0)
-        for share in wanted:
-            axes.axhline(100 * share, color='k', linewidth=1, linestyle='--')
-        axes.set(xlabel='slides', ylabel='trials with the right texture (%)', xticks=numbers, ylim=(None, 101))
-        axes.legend(loc='best', title='next motion')
-    return Path(path)
-
-
 SCENE, RECIPE = 'oriented', 'fast'
 SLIDE_S = 0.5
 FORCES_N, SPEEDS_M_S = (2.0, 1.0), (0.1, 0.05)
@@ -217,7 +197,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             },
             'choosing_us': float(np.median([cost for _, cost in parts])),
         },
-        charts=(slides_chart(right, WANTED, options.out / 'next_motion.png'),),
     )
 
 
@@ -275,7 +254,6 @@ def run_recorded(options: BenchmarkOptions) -> BenchmarkResult:
     right = {name: np.stack([shares[name] for shares, _ in draws]) for name in WAYS}
     accuracy = {name: shares.mean(axis=0).tolist() for name, shares in right.items()}
     best = float(np.mean([best for _, best in draws]))
-    path = options.out / 'next_motion_recorded.png'
     return BenchmarkResult(
         name='next_motion_recorded',
         measured=run_recorded.__doc__,
@@ -290,7 +268,6 @@ def run_recorded(options: BenchmarkOptions) -> BenchmarkResult:
                 'informed_less_best_order_after_two': accuracy['informed'][1] - best,
             }
         },
-        charts=(slides_chart(right, (), path, 'ntp21, recorded, 4 speeds and 4 forces'),),
     )
 
 

@@ -1,146 +1,440 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Accuracy against the time from first touch to decision, in one picture, from the stored figures of other studies."""
+"""Accuracy against sliding time and against computing time: ours, the papers' and peers, in one run by one protocol."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from texture_benchmarks.recipes import DATA, LATER, VIBRATION
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
-from texture_core.errors import InvalidData
-from texture_evaluation.charts import COLOURS, chart
+import numpy as np
+
+from texture_benchmarks.borders import recipe_of
+from texture_benchmarks.study import (
+    DATA,
+    QUICK_MATERIALS,
+    QUICK_SLIDES,
+    BenchmarkOptions,
+    BenchmarkResult,
+    imported,
+    map_forked,
+    trained_apart,
+)
+from texture_core.config import find
+from texture_core.types import AnyArray, Array
+from texture_estimation.recipe import FAST_TOPIC
+from texture_estimation.search import single_blas_thread
+from texture_evaluation import metrics
+from texture_evaluation.charts import COLOURS, chart, pareto_front
+from texture_evaluation.cross_validation import ChronologicalSplit, Split, cross_validate, interval, split_slides
+from texture_evaluation.evaluate import run_model
+from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_papers.protocol import digest_of
+from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide
 
-OURS, PEERS = 'this suite', 'general classifiers of time series'
-PAPERS, VARIANTS = 'recipes of the papers', 'variants of them, of no paper'
-STYLES: Mapping[str, dict[str, Any]] = {
-    OURS: {'color': COLOURS[0], 'linewidth': 2.2},
-    PAPERS: {'color': '#4d4d4d', 'linewidth': 1.2},
-    VARIANTS: {'color': '#a6a6a6', 'linewidth': 1.0, 'linestyle': ':'},
-    PEERS: {'color': COLOURS[5], 'linewidth': 1.2, 'linestyle': '--'},
+VIBRATION, ALL_CHANNELS = 'vibration', 'all channels'
+OURS, PAPERS, VARIANTS, PEERS = 'this suite', 'papers, word for word', 'variants, of no paper', 'general classifiers'
+RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
+    VIBRATION: {
+        OURS: ('default', 'fast', 'onset', 'any-place'),
+        PAPERS: (
+            'ets-fine-svm',
+            'ets-linear-svm',
+            'ets-linear-svm-vote',
+            'ets-linear-ann',
+            'hu-pca-svm',
+            'jamali-naive-bayes-3',
+            'jamali-naive-bayes-5',
+            'jamali-amplitude',
+        ),
+        VARIANTS: ('hu-log-pca-svm', 'jamali-stft', 'ets-linear-svm-recorded', 'peaks-naive-bayes'),
+        PEERS: ('SVC on log bands',),
+    },
+    ALL_CHANNELS: {
+        OURS: ('vibration-and-taxels', 'any-place-and-taxels', 'taxels-changes'),
+        PAPERS: ('kaboli-svm', 'kaboli-pa', 'kaboli-em'),
+        VARIANTS: ('kaboli-svm-rbf',),
+    },
 }
-TICKS_S = (0.5, 1.0, 2.0, 3.0, 5.0)
-LINE = 4.6  # least distance of two names, in percent of the slides
+QUICK_RECIPES = {'default', 'jamali-naive-bayes-5', 'kaboli-pa', 'vibration-and-taxels'}
+AUTHORS = {'ets': 'Roberge et al.', 'hu': 'Hu et al.', 'jamali': 'Jamali & Sammut', 'kaboli': 'Kaboli et al.'}
+LENGTHS_S, QUICK_LENGTHS_S = (0.1, 0.25, 1.0, 2.0), (0.25,)  # of the windows of `default`, besides its own
+FIRST = {False: 30 / 40, True: 4 / 6}  # fraction of the slides of each material that trains, by whether it is quick
+AT_S = 3.0  # the longest window of a paper is complete
+TIMED_SLIDES, LATENCY_ROUNDS = 40, 5  # the round with the lowest median counts, as other work only adds
+DATA_SET = f'{DATA["biotac20"]}; PAC at 2.2 kHz, and with all channels 19 electrodes and the slow ones'
+SPLIT = 'by time: trained on slides 1-30 of each surface, tested on slides 31-40; the same track'
 
+# --------------------
+# Peers: general classifiers of time series, from packages of their own.
 
-@dataclass(frozen=True)
-class AccuracyCurve:
-    """How often a method is right over time."""
-
-    name: str  # At its line
-    kind: str  # A key of STYLES
-    # seconds, shares: (n,) Time from first touch to decision, with computing, and share of slides that are
-    # right then, 0 to 1
-    seconds: Sequence[float]
-    shares: Sequence[float]
-    # Mean time and share right when each slide ends as soon as it is decided; None where it does not
-    ends: tuple[float, float] | None = None
-
-
-def overview_chart(methods: Sequence[AccuracyCurve], path: str | Path) -> Path:
-    """Draw all methods, each named at the left end of its line."""
-    with chart(path, (8.0, 5.4), 'Same track: slides recognised over the time since the first touch') as figure:
-        axes = figure.subplots()
-        for each in methods:
-            axes.plot(each.seconds, [100 * share for share in each.shares], **STYLES[each.kind])
-            if each.ends:
-                axes.plot(each.ends[0], 100 * each.ends[1], '*', color=COLOURS[0], markersize=13)
-                axes.annotate('ends when decided', each.ends, (each.ends[0] * 0.98, 103.0), fontsize=8, ha='center')
-        for each, height in zip(methods, spread_heights([100 * each.shares[0] for each in methods]), strict=True):
-            style = {'color': STYLES[each.kind]['color'], 'weight': 'bold' if each.kind == OURS else 'normal'}
-            axes.text(0.475, height, each.name, ha='right', va='center', fontsize=8.5, **style)
-        for kind, style in STYLES.items():
-            if any(each.kind == kind for each in methods):
-                axes.plot([], [], label=kind, **style)
-        axes.set(xscale='log', xlim=(0.14, 6.3), ylim=(0, 107), ylabel='slides recognised (%)')
-        axes.set_xlabel('time from first touch to decision, with computing (s)')
-        axes.set_xticks(TICKS_S, [f'{seconds:g}' for seconds in TICKS_S])
-        axes.minorticks_off()
-        axes.legend(loc='lower right')
-    return Path(path)
-
-
-def spread_heights(wanted: Sequence[float]) -> list[float]:
-    """Return heights near those wanted, in the same order, at least LINE apart."""
-    order = sorted(range(len(wanted)), key=wanted.__getitem__)
-    found = {order[0]: wanted[order[0]]}
-    for before, number in pairwise(order):
-        found[number] = max(wanted[number], found[before] + LINE)
-    return [found[number] for number in range(len(wanted))]
-
-
-# Of each paper on textures its own recipe, and what was made of it; the fifth paper grades roughness.
-SHOWN: Mapping[str, tuple[str, str]] = {
-    'onset': ('onset', OURS),
-    'default': ('default', OURS),
-    'fast': ('fast', OURS),
-    'ets-fine-svm': ('Roberge et al.: ets-fine-svm', PAPERS),  # that of one speed, as these slides have
-    'hu-pca-svm': ('Hu et al.: hu-pca-svm', PAPERS),
-    'jamali-naive-bayes-5': ('Jamali & Sammut: jamali-naive-bayes-5', PAPERS),
-    'kaboli-svm': ('Kaboli et al.: kaboli-svm, vibration alone', PAPERS),
-    'hu-log-pca-svm': ('hu-log-pca-svm', VARIANTS),
-    'kaboli-svm-rbf': ('kaboli-svm-rbf', VARIANTS),
-    'jamali-stft': ('jamali-stft', VARIANTS),
+PACKAGES = 'TEXTURE_PEERS'  # environment variable: the folder of the packages of the peers
+NEEDED = ('aeon', 'torch')
+CLASSIFIERS: Mapping[str, str] = {
+    'MiniRocket': 'aeon.classification.convolution_based:MiniRocketClassifier',  # Dempster et al. 2021
+    'Hydra': 'aeon.classification.convolution_based:HydraClassifier',  # Dempster et al. 2023
+    'QUANT': 'aeon.classification.interval_based:QUANTClassifier',  # Dempster et al. 2024
 }
-ALL_CHANNELS = 'vibration-and-taxels'
-SOURCES = {'recipes_later': True, 'trust': True, 'peers': False}  # whether each is needed
+OF_ALL_CHANNELS = ('MiniRocket', 'Hydra')  # a window of 23 channels takes the other a tenth of a second
+PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.5)
+FIRST_COUNTS = 1e-6  # of a vote: of equal counts, the label that was voted for first wins
+
+
+@contextmanager
+def _packages() -> Iterator[None]:
+    """Let the packages of the peers be found, behind those of the suite, which stay as they are."""
+    before, folder = list(sys.path), os.environ.get(PACKAGES)
+    if folder:
+        sys.path.append(str(Path(folder)))
+    try:
+        yield
+    finally:
+        sys.path[:] = before
+
+
+def windows_of(slide: LabelledSlide, topics: Sequence[str]) -> AnyArray:
+    """Return the windows of a slide, (n, n_channels, n_samples); slow channels keep each value until the next."""
+    signals = {topic: slide.signals[topic] for topic in topics}
+    found = []
+    for event in cut_recording(signals, slide.states, PEER_WINDOWS):
+        if isinstance(event, CutWindow):
+            count = len(event.windows[topics[0]].samples)
+            own = [event.windows[topic].samples for topic in topics]
+            found.append(np.concatenate([one[np.arange(count) * len(one) // count] for one in own], axis=1).T)
+    return np.stack(found).astype(np.float32)
+
+
+def right_over_time(votes: Array, code: int) -> list[bool]:
+    """Return whether the sum of the votes (n_windows, n_labels) is right after the first window, the second, and on."""
+    weights = 1.0 - FIRST_COUNTS * np.arange(len(votes))
+    right: list[bool] = (np.cumsum(votes * weights[:, None], axis=0).argmax(axis=1) == code).tolist()
+    return right
+
+
+@dataclass(frozen=True, eq=False)
+class _Peer:
+    """A trained classifier of windows; one that gives no shares votes for a label."""
+
+    classifier: Any
+    labels: AnyArray  # sorted
+
+    def votes(self, windows: AnyArray) -> Array:
+        """Return a vote for each label, (n_windows, n_labels)."""
+        if hasattr(self.classifier, 'predict_proba'):
+            return np.asarray(self.classifier.predict_proba(windows), dtype=np.float64)
+        return np.asarray(self.classifier.predict(windows)[:, None] == self.labels, dtype=np.float64)
+
+
+# --------------------
+# One run.
+
+
+class _Job(NamedTuple):
+    channels: str
+    kind: str
+    name: str
+    length_s: float | None = None  # of the windows; None for those of the recipe
+
+
+class _Tried(NamedTuple):
+    """What came of a job: its figures, and what tells how long one window takes, in µs."""
+
+    figures: dict[str, Any]
+    time_us: Callable[[], Array]
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Draw the picture from what lies in the folder of the results."""
-    stored = {}
-    for name, needed in SOURCES.items():
-        path = options.out / f'{name}.json'
-        if needed and not path.is_file():
-            raise InvalidData(f"no '{path}'; run `texture benchmark {name}` first, or name the folder with --out")
-        stored[name] = json.loads(path.read_text(encoding='utf-8'))['numbers'] if path.is_file() else {}
-    methods = methods_of(stored)
+    """Train every method on earlier slides and test it on later ones, each with its own windows.
+
+    Recipes as released, papers word for word, their training windows at least 0.5 s apart; peers with windows of 0.5 s
+    that do not overlap. Share of slides recognised over the sliding time, with 95 % intervals by bootstrap over
+    surfaces: slides over one are no independent draws; mean sliding time and share right when each slide ends as soon
+    as it is decided; computing time of a training (s) and of one window from samples to estimate (µs, median and 99th
+    percentile), by the clock of the processor, of the round of 5 over all methods whose median was lowest.
+    """
+    some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
+    with imported(options, 'biotac20', *some) as bags:
+        dataset = SlideDataset.from_bags(bags)
+    split = Split('by time', ChronologicalSplit(FIRST[options.quick]))
+    with _packages():
+        jobs = jobs_of(options.quick)
+        tried = dict(zip(jobs, map_forked(partial(_try, dataset, split, options.seed), jobs), strict=True))
+        with single_blas_thread():
+            rounds = [{job: one.time_us() for job, one in tried.items()} for _ in range(LATENCY_ROUNDS)]
+    numbers: dict[str, Any] = {VIBRATION: {}, ALL_CHANNELS: {}, 'window_lengths': {}}
+    for job, one in tried.items():
+        median, p99 = min((np.percentile(own[job], (50, 99)).tolist() for own in rounds), key=itemgetter(0))
+        cell = {**one.figures, 'latency_us': {'median': round(median, 1), 'p99': round(p99, 1)}}
+        if job.length_s:
+            numbers['window_lengths'][f'{job.length_s:g} s'] = cell
+        else:
+            numbers[job.channels][job.name] = cell
     return BenchmarkResult(
         name='overview',
-        measured=(
-            'share of slides recognised, against the sliding time used and the computing time of one window (s); and '
-            'where each slide ends when the label is decided. From '
-            + ', '.join(f'{name}.json' for name, found in stored.items() if found)
+        measured=run.__doc__,
+        data=DATA_SET,
+        split=SPLIT,
+        numbers=numbers,
+        charts=(
+            sliding_chart(numbers, options.out / 'accuracy_over_sliding.png'),
+            computing_chart(numbers, options.out / 'accuracy_over_computing.png'),
         ),
-        data=f'{DATA["biotac20"]}; PAC at 1 kHz; {ALL_CHANNELS}: all channels',
-        split='by time: trained on slides 1-30 of each surface, tested on slides 31-40',
-        numbers={
-            each.name: {
-                'kind': each.kind,
-                's': [round(seconds, 5) for seconds in each.seconds],
-                'share': list(each.shares),
-                'ends_when_decided': each.ends,
-            }
-            for each in methods
-        },
-        charts=(overview_chart(methods, options.out / 'overview.png'),),
     )
 
 
-def methods_of(stored: Mapping[str, Mapping[str, Any]]) -> list[AccuracyCurve]:
-    """Return what is drawn, from the stored figures of each benchmark; those of the peers may be missing.
-
-    Of recipes that have changed since they were measured nothing is drawn.
-    """
-    cells = stored['recipes_later'][VIBRATION][LATER]
-    current = {recipe: cell for recipe, cell in cells.items() if cell['definition'] == digest_of(recipe)}
-    methods = [_of_cell(title, kind, current[recipe]) for recipe, (title, kind) in SHOWN.items() if recipe in current]
-    methods += [_of_cell(name, PEERS, cell) for name, cell in stored['peers'].items()]
-    whole = stored['trust'][ALL_CHANNELS]
-    at_s = whole['accuracy_at_s']
-    ends = (whole['early']['mean_s'], whole['early']['accuracy'])
-    return [
-        *methods,
-        AccuracyCurve(f'{ALL_CHANNELS}\n(all channels)', OURS, [*map(float, at_s)], [*at_s.values()], ends),
+def jobs_of(quick: bool) -> list[_Job]:
+    """Return what is tried, the longest first; peers only where their packages are."""
+    there = all(find_spec(name) for name in NEEDED) and not quick
+    by_channels = {VIBRATION: tuple(CLASSIFIERS), ALL_CHANNELS: OF_ALL_CHANNELS}
+    peers = [_Job(channels, PEERS, name) for channels, names in by_channels.items() for name in names if there]
+    recipes = [
+        _Job(channels, kind, name)
+        for channels, kinds in RECIPES.items()
+        for kind, names in kinds.items()
+        for name in names
+        if not quick or name in QUICK_RECIPES
     ]
+    lengths = [_Job(VIBRATION, OURS, 'default', s) for s in (QUICK_LENGTHS_S if quick else LENGTHS_S)]
+    return [*peers, *recipes, *lengths]
 
 
-def _of_cell(title: str, kind: str, cell: Mapping[str, Any]) -> AccuracyCurve:
-    """Return what a cell of a table holds: all decisions, and when they are made with the time of computing."""
-    computing_s, found = 1e-6 * cell['latency_us']['median'], cell['decisions']
-    return AccuracyCurve(title, kind, [seconds + computing_s for seconds in found['s']], found['share'])
+def _try(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
+    return _try_peer(dataset, split, seed, job) if job.name in CLASSIFIERS else _try_recipe(dataset, split, job)
+
+
+def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
+    recipe = recipe_of(job.name)
+    if job.kind != OURS:
+        recipe = trained_apart(recipe)
+    if job.length_s:
+        windows = replace(recipe.feature_set.windows, length_s=job.length_s)
+        recipe = replace(recipe, feature_set=replace(recipe.feature_set, windows=windows, _layouts={}))
+    [fold] = (found := cross_validate(recipe, dataset, split.splitter)).folds
+    results = found.pooled
+    times = sorted({round(e.evidence_s, 6) for result in results for e in result.decisions})
+    shortest = min(result.estimates[-1].evidence_s for result in results)
+    right = {}
+    for seconds in times:
+        ends = [result.after(seconds) for result in results]
+        if seconds <= shortest + metrics.TOLERANCE_S and None not in ends:
+            right[seconds] = [
+                end is not None and end.label == one.surface for end, one in zip(ends, results, strict=True)
+            ]
+    figures = {
+        'kind': job.kind,
+        **({} if job.length_s or job.kind == PEERS else {'definition': digest_of(job.name)}),
+        'window_accuracy': metrics.window_accuracy(results),
+        'unclassified_windows': metrics.unclassified_windows(results),
+        **_over_time(right, [result.surface for result in results]),
+        'ends_when_decided': dict(metrics.early_decision(results)) if job.kind == OURS else None,
+        'train_s': round(fold.train_s, 2),
+    }
+    timed = dataset.slides[:: max(1, len(dataset) // TIMED_SLIDES)]
+    cut = [cut_slide(slide, recipe.feature_set) for slide in timed]
+
+    return _Tried(figures, partial(_time_recipe, replace(fold.model), cut))
+
+
+def _time_recipe(model: Any, cut: Sequence[Any]) -> Array:
+    """Return the computing times of windows, µs; the last of a slide is its end, and the first slide warms up."""
+    taken = [run_model(model, events, time.process_time)[2][:-1] for events in (cut[0], *cut)][1:]
+    return np.concatenate(taken)
+
+
+def _try_peer(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
+    topics = (FAST_TOPIC,) if job.channels == VIBRATION else tuple(sorted(dataset[0].signals))
+    windows = [windows_of(slide, topics) for slide in dataset]
+    [(trained, tested)] = split_slides(dataset, split.splitter, split.groups)
+    start = time.process_time()
+    classifier: Any = find({}, CLASSIFIERS[job.name], 'estimator')(random_state=seed)
+    labels = np.repeat(dataset.labels[trained], [len(windows[row]) for row in trained])
+    classifier.fit(np.concatenate([windows[row] for row in trained]), labels)
+    peer, taken_s = _Peer(classifier, np.unique(labels)), time.process_time() - start
+    alone, over_time = [], []
+    for row in tested:
+        votes, code = peer.votes(windows[row]), int(np.searchsorted(peer.labels, dataset.labels[row]))
+        alone += (votes.argmax(axis=1) == code).tolist()
+        over_time.append(right_over_time(votes, code))
+    hop_s = PEER_WINDOWS.hop_s
+    right = {round(hop_s * number, 6): list(own) for number, own in enumerate(zip(*over_time, strict=False), 1)}
+    figures = {
+        'kind': job.kind,
+        'window_accuracy': float(np.mean(alone)),
+        'unclassified_windows': 0.0,
+        **_over_time(right, dataset.labels[tested].tolist()),
+        'ends_when_decided': None,
+        'train_s': round(taken_s, 2),
+    }
+    timed = np.concatenate([windows[row][:2] for row in tested])[:: max(1, 2 * len(tested) // 100)]
+    return _Tried(figures, partial(_time_peer, peer, timed))
+
+
+def _time_peer(peer: _Peer, windows: AnyArray) -> Array:
+    taken_us = []
+    for window in (windows[0], *windows):
+        start = time.process_time()
+        peer.votes(window[None])
+        taken_us.append(1e6 * (time.process_time() - start))
+    return np.array(taken_us[1:])
+
+
+def _over_time(right: Mapping[float, Sequence[bool]], surfaces: Sequence[str]) -> dict[str, Any]:
+    """Return the share of slides that are right after each time, with intervals over the surfaces."""
+    surface = np.unique(surfaces, return_inverse=True)[1]
+    all_of_them = np.bincount(surface)
+    intervals = {
+        seconds: interval(np.stack([np.bincount(surface, own), all_of_them], axis=1).astype(np.float64))
+        for seconds, own in right.items()
+    }
+    share = {seconds: float(np.mean(own)) for seconds, own in right.items()}
+    usual = (*metrics.TIMES_S, AT_S)
+    return {
+        'slides': len(surfaces),
+        's': [*right],
+        'share': [round(one, 4) for one in share.values()],
+        'interval': [[round(edge, 4) for edge in edges] for edges in intervals.values()],
+        'accuracy_at_s': {f'{seconds:.1f}': _at(share, seconds) for seconds in usual},
+        'interval_at_s': {f'{seconds:.1f}': _at(intervals, seconds) for seconds in usual},
+        'accuracy_at_end': [*share.values()][-1],
+    }
+
+
+def _at(found: Mapping[float, Any], seconds: float) -> Any:
+    """Return what was last found until a time; None if nothing was, or if all slides are shorter."""
+    reached = [key for key in found if key <= seconds + metrics.TOLERANCE_S]
+    return found[max(reached)] if reached and max(found) >= seconds - metrics.TOLERANCE_S else None
+
+
+# --------------------
+# The charts, from the figures.
+
+STYLES: Mapping[str, dict[str, Any]] = {
+    OURS: {'color': COLOURS[0]},
+    PAPERS: {'color': '#4d4d4d'},
+    VARIANTS: {'color': '#9a9a9a'},
+    PEERS: {'color': COLOURS[5]},
+}
+DASHES = {OURS: '-', PAPERS: '-.', PEERS: '--'}
+LEAST = 0.3  # percent wrong that is drawn for none wrong: half a slide of 200 is 0.25
+TICKS = {LEAST: '0', 0.5: '0.5', 1.0: '1', 2.0: '2', 5.0: '5', 10.0: '10', 20.0: '20', 50.0: '50', 100.0: '100'}
+TICKS_S = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0)
+
+
+def wrong_percent(share: AnyArray | Sequence[float] | float) -> Array:
+    """Return the percentage wrong, LEAST for none."""
+    return np.maximum(100.0 * (1.0 - np.asarray(share, dtype=np.float64)), LEAST)
+
+
+def sliding_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
+    """Draw the percentage of slides wrong over the sliding time, with intervals, in a panel for the channels used."""
+    title = 'Same track, later slides: 20 surfaces, 200 slides'
+    with chart(path, (8.0, 8.6), title, points=11.0) as figure:
+        for axes, channels in zip(figure.subplots(2, 1, sharex=True), (VIBRATION, ALL_CHANNELS), strict=True):
+            _draw_sliding(axes, _shown(numbers, channels))
+            axes.set_title(channels)
+        axes.set_xlabel('sliding time (s)')
+        axes.plot([], [], '*', color='black', markersize=13, label='mean end and errors with early stopping')
+        axes.fill_between([], [], [], color='grey', alpha=0.2, label='95 % interval over surfaces')
+        figure.legend(loc='outside lower left', ncols=2)
+    return Path(path)
+
+
+def _shown(numbers: Mapping[str, Any], channels: str) -> dict[str, Mapping[str, Any]]:
+    """Return ours, the best recipe of a paper, which may leave channels out, and the peers, by the name at the line."""
+    cells = numbers[channels]
+    papers = {name: cell for own in (numbers[VIBRATION], cells) for name, cell in own.items() if cell['kind'] == PAPERS}
+    best = max(papers, key=lambda name: papers[name]['accuracy_at_end'])
+    ours = {name: cells[name] for name in ('default', 'onset', 'vibration-and-taxels') if name in cells}
+    peers = {name: cell for name, cell in cells.items() if cell['kind'] == PEERS}
+    return {**ours, f'{AUTHORS[best.split("-")[0]]}: {best}': papers[best], **peers}
+
+
+def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
+    for cell in shown.values():
+        style, wrong = STYLES[cell['kind']], wrong_percent(cell['share'])
+        high, low = wrong_percent(cell['interval']).T
+        axes.fill_between(cell['s'], low, high, alpha=0.13, linewidth=0, **style)
+        axes.plot(cell['s'], wrong, DASHES[cell['kind']], linewidth=2.0, **style)
+        if ends := cell['ends_when_decided']:
+            axes.plot(ends['mean_s'], wrong_percent(ends['accuracy']), '*', markersize=15, markeredgecolor='black',
+                      zorder=5, **style)  # fmt: skip
+    last = [float(np.log10(wrong_percent(cell['share'][-1]))) for cell in shown.values()]
+    for (name, cell), height in zip(shown.items(), spread(last, 0.17), strict=True):
+        axes.text(6.25, 10**height, name, va='center', **STYLES[cell['kind']])
+    axes.set(xscale='log', yscale='log', xlim=(0.45, 6.1), ylim=(100.0, LEAST * 0.8), ylabel='slides wrong (%)')
+    axes.set_xticks([s for s in TICKS_S if s > 0.4], [f'{s:g}' for s in TICKS_S if s > 0.4])
+    axes.set_yticks([*TICKS], [*TICKS.values()])
+    axes.minorticks_off()
+
+
+def spread(wanted: Sequence[float], apart: float) -> list[float]:
+    """Return heights near those wanted, in the same order, at least so far apart."""
+    order = sorted(range(len(wanted)), key=wanted.__getitem__)
+    found = {order[0]: wanted[order[0]]} if order else {}
+    for before, number in pairwise(order):
+        found[number] = max(wanted[number], found[before] + apart)
+    return [found[number] for number in range(len(wanted))]
+
+
+MARKS = {VIBRATION: 'o', ALL_CHANNELS: 's'}
+NAMED = 13  # of the methods: the others are points alone
+
+
+def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
+    """Draw the percentage of slides wrong after AT_S over the computing time of a window, with the front of all."""
+    cells = [
+        (name, channels, cell)
+        for channels in (VIBRATION, ALL_CHANNELS)
+        for name, cell in numbers[channels].items()
+        if cell['accuracy_at_s'][f'{AT_S:.1f}'] is not None
+    ]
+    shares = [cell['accuracy_at_s'][f'{AT_S:.1f}'] for _, _, cell in cells]
+    points = [(cell['latency_us']['median'], share) for (_, _, cell), share in zip(cells, shares, strict=True)]
+    front = pareto_front(points)
+    title = f'Same track: slides wrong after {AT_S:g} s of sliding, against computing time'
+    with chart(path, (8.0, 7.6), title, points=11.0) as figure:
+        axes = figure.subplots()
+        axes.step([points[at][0] for at in front], wrong_percent([points[at][1] for at in front]), where='post',
+                  color='black', linewidth=1.0, zorder=1, label='Pareto front')  # fmt: skip
+        for (_, channels, cell), (cost, share) in zip(cells, points, strict=True):
+            edges = wrong_percent(cell['interval_at_s'][f'{AT_S:.1f}'])
+            wrong, style = wrong_percent(share), STYLES[cell['kind']]
+            axes.plot([cost, cost], edges, linewidth=1.0, alpha=0.35, **style)
+            axes.plot([cost, cell['latency_us']['p99']], [wrong, wrong], linewidth=1.0, alpha=0.6, **style)
+            axes.plot(cost, wrong, MARKS[channels], markersize=7, **style)
+        _name_points(axes, [name for name, _, _ in cells], [cell['kind'] for _, _, cell in cells], points)
+        for kind, style in STYLES.items():
+            axes.plot([], [], 'o', markersize=7, label=kind, **style)
+        for channels, mark in MARKS.items():
+            axes.plot([], [], mark, color='white', markeredgecolor='black', markersize=7, label=channels)
+        axes.plot([], [], '-', color='grey', label='to the right: 99 of 100 windows; up and down: 95 % interval')
+        axes.set(xscale='log', yscale='log', ylim=(110.0, LEAST * 0.8), ylabel='slides wrong (%)')
+        axes.set_yticks([*TICKS], [*TICKS.values()])
+        axes.set_xlabel('computing time of a window, median (µs, logarithmic)')
+        axes.minorticks_off()
+        figure.legend(loc='outside lower left', ncols=2)
+    return Path(path)
+
+
+def _name_points(axes: Any, names: Sequence[str], kinds: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
+    """Write names above their points, the most accurate first, where they cover no other name."""
+    figure = axes.figure
+    taken: list[Any] = []
+    for index in sorted(range(len(names)), key=lambda at: (kinds[at] == VARIANTS, -points[at][1])):
+        for offset, side in (((6, 7), 'left'), ((-6, 7), 'right'), ((6, -7), 'left'), ((-6, -7), 'right')):
+            text = axes.annotate(names[index], (points[index][0], wrong_percent(points[index][1])), xytext=offset,
+                                 textcoords='offset points', ha=side, va='center', **STYLES[kinds[index]])  # fmt: skip
+            box = text.get_window_extent(figure.canvas.get_renderer())
+            if not any(box.overlaps(other) for other in taken):
+                taken.append(box)
+                break
+            text.remove()

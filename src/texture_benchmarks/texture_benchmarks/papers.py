@@ -21,8 +21,7 @@ from texture_benchmarks.borders import (
     across_places,
     figures,
 )
-from texture_benchmarks.recipes import DATA
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
+from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe

@@ -14,8 +14,15 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from texture_benchmarks.recipes import DATA, QUICK_MATERIALS, QUICK_SLIDES
-from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, in_own_process
+from texture_benchmarks.study import (
+    DATA,
+    QUICK_MATERIALS,
+    QUICK_SLIDES,
+    BenchmarkOptions,
+    BenchmarkResult,
+    imported,
+    in_own_process,
+)
 from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel

@@ -432,22 +432,6 @@ def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
     return Path(path)
 
 
-def cost_chart(costs: Mapping[tuple[str, bool], ScanCost], path: str | Path) -> Path:
-    """Draw the time of a slide by scene, with what is allowed."""
-    with chart(path, (8.0, 4.6), 'Simulated slides computed offline') as figure:
-        axes, places = figure.subplots(), np.arange(len(costs))
-        together, alone = ([getattr(cost, which) for cost in costs.values()] for which in ('together_ms', 'alone_ms'))
-        axes.barh(places - 0.2, together, 0.38, color=COLOURS[0], label=f'each of {MANY} slides at once')
-        axes.barh(places + 0.2, alone, 0.38, color=COLOURS[4], label='one slide alone')
-        targets = [TARGET_MS[sticks] for _, sticks in costs]
-        axes.vlines(targets, places - 0.45, places + 0.45, color=COLOURS[5], linewidth=2, label='target')
-        axes.set_yticks(places, [f'{name}\nstick-slip' if sticks else name for name, sticks in costs])
-        axes.set(xscale='log', xlabel='computing time of a slide of 0.5 s (ms)')
-        axes.invert_yaxis()
-        axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.13), ncols=3)
-    return Path(path)
-
-
 def _draw_ablation(axes: Any, ablation: Ablation) -> None:
     for label, which, colour, shift in (
         ('training and test slides', 'easier', COLOURS[0], -0.2),
@@ -536,10 +520,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
                 for effect in ablation.term_effects
             },
         },
-        charts=(
-            cost_chart(costs, options.out / 'scenes_cost.png'),
-            ablation_chart([*ablations, _together(added)], options.out / 'scenes_ablation.png'),
-        ),
+        charts=(ablation_chart([*ablations, _together(added)], options.out / 'scenes_ablation.png'),),
     )
 
 

@@ -612,7 +612,7 @@ def check_hazards(records: Sequence[HazardRecord]) -> list[Requirement]:
 
 
 def write_hazards(records: Sequence[HazardRecord], out: Path, seed: int, duration_s: float) -> Path:
-    """Write hazards.json and hazards.png into a folder; return the path of the figures."""
+    """Write hazards.json into a folder; return the path of the figures."""
     numbers = {
         name: {
             'explorations': len(own),
@@ -625,12 +625,6 @@ def write_hazards(records: Sequence[HazardRecord], out: Path, seed: int, duratio
         for name in dict.fromkeys(item.hazard for item in records)
         if (own := [item for item in records if item.hazard == name])
     }
-    with chart(out / 'hazards.png', (8.0, 4.0)) as figure:
-        axes = figure.subplots()
-        peaks_n = [max(item.peak_n for item in records if item.hazard == name) for name in numbers]
-        axes.barh(list(numbers), peaks_n, color=COLOURS[0])
-        axes.axvline(FORCE_LIMIT_N, color='black', linewidth=0.8)
-        axes.set(xlabel='highest true force in any direction (N); line: limit', xlim=(0, None))
     return BenchmarkResult(
         name='hazards',
         measured='true force on the finger in any direction, its time above the limit, and what is left at the end',
@@ -644,5 +638,4 @@ def write_hazards(records: Sequence[HazardRecord], out: Path, seed: int, duratio
             'requirements': [found._asdict() for found in check_hazards(records)],
             'hazards': numbers,
         },
-        charts=(out / 'hazards.png',),
     ).write(out)
