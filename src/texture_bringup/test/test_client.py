@@ -212,27 +212,30 @@ def with_decisions(model, **changes):
     return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, **changes))
 
 
-@pytest.mark.parametrize('name', SLIDES)
-def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path, name):
-    centre, count, said, action = SLIDES[name]
-    if name == 'a doubtful surface':
-        model = with_decisions(model, confidence_floor=ConfidenceFloor((1.0,), (36.0,)))
-    if name == 'another motion':
-        model = with_decisions(model, domain=dataclasses.replace(model.decisions.domain, speed_m_s=(0.05, 0.05)))
-    classifier = graph.add(Classifier, model=str(model.save(tmp_path / 'm')))
+def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path):
+    domain = dataclasses.replace(model.decisions.domain, speed_m_s=(0.05, 0.05))
+    models = {
+        'a doubtful surface': with_decisions(model, confidence_floor=ConfidenceFloor((1.0,), (36.0,))),
+        'another motion': with_decisions(model, domain=domain),
+    }
+    classifier = graph.add(Classifier)
     with World(graph) as world:
         windows = graph.peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         graph.until(lambda: windows.get_subscription_count() and classifier.count_subscribers('texture'))
         ids = graph.listen(ExplorationState, 'exploration', STATE_QOS)
+        for name, (centre, count, said, action) in SLIDES.items():
+            path = models.get(name, model).save(tmp_path / name.replace(' ', '_'))
+            [taken] = classifier.set_parameters([Parameter('model', value=str(path))])
+            assert taken.successful, taken.reason
 
-        def slide(_goal):
-            exploration_id = ids[-1].exploration_id
-            for k, row in enumerate(np.random.default_rng(1).normal(centre, size=(count, 2))):
-                values = {'feature_set': 'kind', **said}
-                windows.publish(to_msg(FeatureVector(k * 10**8, exploration_id, 0.5, 0.1, NAMES, row, **values)))
-            windows.publish(to_msg(FeatureVector(10**9, exploration_id, 0.0, 0.1, last=True)))
+            def slide(_goal, centre=centre, count=count, said=said):
+                exploration_id = ids[-1].exploration_id
+                for k, row in enumerate(np.random.default_rng(1).normal(centre, size=(count, 2))):
+                    values = {'feature_set': 'kind', **said}
+                    windows.publish(to_msg(FeatureVector(k * 10**8, exploration_id, 0.5, 0.1, NAMES, row, **values)))
+                windows.publish(to_msg(FeatureVector(10**9, exploration_id, 0.0, 0.1, last=True)))
 
-        result, _ = world.program.explore(slide, **QUICK)
-        assert result.error_code == R.ERROR_NONE, result.message
-        assert world.program.next_step(result) == action, result.texture
-        assert action == 'felt' or not result.texture.decided
+            result, _ = world.program.explore(slide, **QUICK)
+            assert result.error_code == R.ERROR_NONE, result.message
+            assert world.program.next_step(result) == action, (name, result.texture)
+            assert action == 'felt' or not result.texture.decided

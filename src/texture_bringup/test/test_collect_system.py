@@ -26,6 +26,7 @@ QUICK = CollectionParams(
     places=2, most_places=2, distance_m=0.03, speed_low_m_s=0.04, speed_high_m_s=0.05, bound=0.1
 )  # fmt: skip
 DEADLINE_S = 60.0
+PLATE = ('--force', '1', '--distance', '0.06')
 
 
 @pytest.fixture(scope='module')
@@ -93,7 +94,7 @@ def test_a_patch_that_was_never_taught_is_named(operator, folder):
 
 def test_the_finger_is_checked_by_a_slide_over_the_plate(operator, folder, capsys):
     model = str(folder / 'two')
-    assert main(['check', model, '--store', '--force', '1']) == 0
+    assert main(['check', model, '--store', *PLATE]) == 0
     assert 'is stored as the reference of the finger' in capsys.readouterr().out
-    assert main(['check', model, '--force', '1']) == 0
+    assert main(['check', model, *PLATE]) == 0
     assert 'the finger is as trained' in capsys.readouterr().out

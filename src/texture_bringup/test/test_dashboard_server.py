@@ -63,6 +63,7 @@ def test_the_page_is_served_and_may_load_nothing_from_elsewhere(path, kind) -> N
         answer = await client.get(path)
         assert (answer.status, answer.content_type) == (200, kind)
         assert answer.headers['Content-Security-Policy'].startswith("default-src 'none'")
+        assert not re.search(r'https?://|//\w+\.\w', (await answer.text()).replace("https:'", ''))
 
     with_client(story)
 

@@ -1,24 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dashboard as an operator meets it: the emulator, and the page in a real browser.
-
-Where no Chromium is installed the same story runs over the page's own requests and WebSocket, and a warning says so.
-"""
+"""The dashboard as an operator meets it: the emulator, and the requests and the WebSocket of the page."""
 
 import asyncio
 import json
 import os
-import re
-import shutil
 import socket
 import time
 import urllib.request
-import warnings
-from contextlib import contextmanager
 
 import aiohttp
 import pytest
 
-sync_api = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
@@ -29,59 +21,20 @@ DOMAIN = 90
 DEADLINE_S = 90.0
 NODES = {'emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier', 'dashboard'}
 SURFACES = ('glass', 'ridge_2mm_deep')
-CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'google-chrome'))), None)
 # Slow enough that there is time to press stop on a busy machine.
 LONG = {'motion': 'linear_slide', 'speed_m_s': 0.005, 'force_n': 1.0, 'distance_m': 0.15}
 SHORT = {'motion': 'linear_slide', 'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.08}
 
 
-class Browser:
-    """The page in headless Chromium."""
-
-    def __init__(self, page, address):
-        self.page = page
-        page.goto(address)
-        sync_api.expect(page.locator('#numbers input')).to_have_count(3)
-        sync_api.expect(page.locator('#lights li.green')).to_have_count(len(NODES))
-
-    def explore(self, request):
-        for name, value in request.items():
-            if name == 'motion':
-                self.page.select_option('#motion', value)
-            else:
-                self.page.fill(f'#numbers input[name={name}]', str(value))
-        self.page.click('#go')
-
-    def wait_for_estimate(self, label):
-        sync_api.expect(self.page.locator('#label[data-final=true]')).to_have_text(label)
-        sync_api.expect(self.page.locator('#evidence .bar').first).to_contain_text(label)
-
-    def wait_for_said(self, text):
-        sync_api.expect(self.page.locator('#banner')).to_contain_text(text)
-
-    def wait_for_phase(self, phase):
-        sync_api.expect(self.page.locator('#phase')).to_have_text(phase)
-
-    def wait_for_past(self, phase):
-        sync_api.expect(self.page.locator('#past li').first).to_contain_text(phase)
-
-    def stop(self):
-        self.page.click('#stop')
-
-    def replay_newest(self):
-        self.page.locator('#past button').first.click()
-        self.wait_for_said('replayed')
-
-
 class Wire:
-    """The requests that the page would send, without a browser."""
+    """The requests that the page sends."""
 
     def __init__(self, address):
         self._address = address
         self._answers = []
         self._until(lambda frame: {light['name'] for light in frame['lights'] if light['colour'] == 'green'} == NODES)
 
-    def _post(self, name, body):
+    def post(self, name, body):
         request = urllib.request.Request(
             f'{self._address}api/{name}', json.dumps(body).encode(), {'Content-Type': 'application/json'}
         )
@@ -99,7 +52,7 @@ class Wire:
 
     def explore(self, request):
         loop = asyncio.new_event_loop()
-        self._answers.append(loop.run_in_executor(None, self._post, 'explore', request))
+        self._answers.append(loop.run_in_executor(None, self.post, 'explore', request))
         self._loop = loop
 
     def wait_for_estimate(self, label):
@@ -115,7 +68,7 @@ class Wire:
         self._until(lambda frame: frame['past'][0]['phase'] == phase)
 
     def stop(self):
-        assert 'lifted' in self._post('stop', {})
+        assert 'lifted' in self.post('stop', {})
 
     def replay_newest(self):
         frames = []
@@ -165,49 +118,14 @@ def wait_for_page(address, launcher):
             return
 
 
-@contextmanager
-def opened(address, **context):
-    """Open the page in Chromium; fail on any error of its script."""
-    with sync_api.sync_playwright() as playwright:
-        # The sandbox of Chromium does not run as root, nor in many containers; the page is our own.
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=['--no-sandbox', '--disable-gpu'])
-        sync_api.expect.set_options(timeout=DEADLINE_S * 1000)
-        try:
-            page = browser.new_page(**context)
-            page.set_default_timeout(DEADLINE_S * 1000)
-            errors = []
-            page.on('pageerror', lambda error: errors.append(str(error)))
-            page.on('console', lambda reported: errors.append(reported.text) if reported.type == 'error' else None)
-            yield Browser(page, address)
-            assert not errors, errors
-        finally:
-            browser.close()
-
-
-@contextmanager
-def operating(address):
-    if CHROMIUM:
-        with opened(address) as browser:
-            yield browser
-    else:
-        warnings.warn('no Chromium: the page itself is not tested, only what it asks for', stacklevel=1)
-        yield Wire(address)
-
-
-def test_an_operator_explores_sees_the_estimate_and_stops_the_next_exploration(address) -> None:
-    with operating(address) as operator:
-        operator.explore(SHORT)
-        operator.wait_for_estimate(SURFACES[1])
-        operator.wait_for_said('ended as asked')
-        operator.explore(LONG)
-        operator.wait_for_phase('slide')
-        operator.stop()
-        operator.wait_for_past('aborted')
-        operator.replay_newest()
-
-
-def test_the_page_needs_nothing_from_elsewhere(address) -> None:
-    for path in ('', 'dashboard.js', 'dashboard.css'):
-        with urllib.request.urlopen(address + path, timeout=DEADLINE_S) as answer:
-            assert "default-src 'none'" in answer.headers['Content-Security-Policy']
-            assert not re.search(r'https?://|//\w+\.\w', answer.read().decode().replace("https:'", ''))
+def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_exploration(address) -> None:
+    operator = Wire(address)
+    operator.explore(SHORT)
+    operator.wait_for_estimate(SURFACES[1])
+    operator.wait_for_said('ended as asked')
+    assert 'tare has begun' in operator.post('tare', {})
+    operator.explore(LONG)
+    operator.wait_for_phase('slide')
+    operator.stop()
+    operator.wait_for_past('aborted')
+    operator.replay_newest()

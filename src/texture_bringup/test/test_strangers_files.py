@@ -52,7 +52,7 @@ from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
 from texture_recordings.bags import TYPES, BagWriter, decode, encode, typestore
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.public_sets import import_biotac20, import_ntp21
+from texture_recordings.public_sets import IMPORTS, import_biotac20
 from texture_recordings.tables import MAPPED, import_tables, load_mapping, mapping_from
 from texture_simulation.scene import load_scene
 
@@ -322,7 +322,7 @@ READERS = {
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
     'checkpoint': Reader(make_checkpoint, lambda folder: read_scores(folder / 'good.json', 'abc'), ('good.json',)),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
-    'NTP data set': Reader(make_ntp, read_import(import_ntp21), ('slides.npz',)),
+    'NTP data set': Reader(make_ntp, read_import(IMPORTS['ntp21']), ('slides.npz',)),
     'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
     **{f'table {suffix}': table_file(suffix) for suffix in ('.csv', '.mat', '.h5')},
     'foreign bag': Reader(

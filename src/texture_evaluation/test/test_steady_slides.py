@@ -13,15 +13,11 @@ from texture_features.feature import WindowBatch
 from texture_features.features.taxels import LogShares, SpatialBands
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset, find_slides
-from texture_recordings.public_sets import (
-    IMPORTS,
-    evenly,
-    import_fabricslide,
-    import_fingersense,
-    import_lmt29,
-    import_ntp21,
-)
+from texture_recordings.public_sets import IMPORTS, evenly
 
+import_ntp21, import_fabricslide, import_fingersense, import_lmt29 = (
+    IMPORTS[name] for name in ('ntp21', 'fabricslide', 'fingersense', 'lmt29')
+)
 PITCH_M = 10e-3
 
 

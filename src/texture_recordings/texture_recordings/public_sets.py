@@ -66,57 +66,24 @@ class BiotacSlide:
         if not 0 <= self.epoch < LAST_EPOCH_S:
             raise ValueError(f"'{self.slide}' began at {self.epoch:g} s; Unix time from 0 is needed")
 
-
-@dataclass(frozen=True, eq=False)
-class BiotacSlideMotion:
-    """Speed, direction and normal force over the time of one slide.
-
-    Examples
-    --------
-    >>> velocity, wrench = np.array([[0.0, 0.0, 0.02, 0.0]]), np.zeros((1, 7))
-    >>> slide = BiotacSlide('cork', '1', np.zeros((1, 44)), np.zeros(1), velocity, wrench, epoch=0.0)
-    >>> BiotacSlideMotion.of(slide).state(0, 0, 10).speed_m_s
-    0.02
-    """
-
-    named: ExplorationState
-    velocity: AnyArray
-    wrench: AnyArray
-
-    @classmethod
-    def of(cls, recording: BiotacSlide) -> BiotacSlideMotion:
-        """Return the motion of a slide, without what was not measured."""
-        velocity = recording.velocity[np.isfinite(recording.velocity).all(axis=1)]
-        wrench = recording.wrench[np.isfinite(recording.wrench).all(axis=1)]
+    def named(self) -> ExplorationState:
+        """Return a state of the slide with its names and its direction."""
+        velocity = _measured(self.velocity)
         x, y = velocity[:, 1:3].mean(axis=0) if len(velocity) else (math.nan, math.nan)
-        name = f'{recording.surface}/{recording.slide}'
-        named = ExplorationState(
-            0, name, 'linear_slide', Phase.SLIDE, direction_rad=math.atan2(y, x), surface=recording.surface
+        name = f'{self.surface}/{self.slide}'
+        return ExplorationState(
+            0, name, 'linear_slide', Phase.SLIDE, direction_rad=math.atan2(y, x), surface=self.surface
         )
-        return cls(named, velocity, wrench)
 
-    def state(self, start_ns: int, stamp_ns: int, end_ns: int) -> ExplorationState:
-        """Return the state that holds from `stamp_ns` to `end_ns` of a slide that began at `start_ns`.
+    def speed_and_force(self, time_s: float) -> tuple[float, float]:
+        """Return the speed, m/s, and the normal force, N, at a time of the slide; NaN if they were not measured."""
+        velocity, wrench = _measured(self.velocity), _measured(self.wrench)
+        speed = np.hypot(velocity[:, 1], velocity[:, 2])
+        return _at(time_s, velocity[:, 0], speed), _at(time_s, wrench[:, 0], wrench[:, NORMAL_FORCE])
 
-        Parameters
-        ----------
-        start_ns, stamp_ns, end_ns
-            Times on one clock.
 
-        Returns
-        -------
-        ExplorationState
-        """
-        time_s = (stamp_ns - start_ns) / NANOSECONDS
-        speed = np.hypot(self.velocity[:, 1], self.velocity[:, 2])
-        return replace(
-            self.named,
-            stamp_ns=stamp_ns,
-            steady_s=(end_ns - stamp_ns) / NANOSECONDS,
-            speed_m_s=_at(time_s, self.velocity[:, 0], speed),
-            force_n=_at(time_s, self.wrench[:, 0], self.wrench[:, NORMAL_FORCE]),
-            progress=(stamp_ns - start_ns) / (SLIDE_FRAMES * FRAME_NS),
-        )
+def _measured(rows: AnyArray) -> AnyArray:
+    return rows[np.isfinite(rows).all(axis=1)]
 
 
 def _at(time_s: float, times: AnyArray, values: AnyArray) -> float:
@@ -242,7 +209,7 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
     frames = recording.frames[: len(indices)]
     vibration = restore_sign(frames[:, PAC_COLUMNS].ravel()).astype(np.float32)[:, None]
     static = frames[:, STATIC_COLUMNS].astype(np.float32)
-    motion = BiotacSlideMotion.of(recording)
+    named = recording.named()
     stop_ns = start_ns + int(indices[-1] - indices[0] + 1) * FRAME_NS
     for count, part in enumerate(_batches(indices)):
         first = int(indices[part.start])
@@ -250,7 +217,12 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
         end_ns = stamp_ns + (part.stop - part.start) * FRAME_NS
         if count % STATE_BATCHES == 0:
             until_ns = min(stamp_ns + STATE_BATCHES * BATCH_FRAMES * FRAME_NS, stop_ns)
-            bag.write('exploration', motion.state(start_ns, stamp_ns, until_ns), stamp_ns)
+            speed_m_s, force_n = recording.speed_and_force((stamp_ns - start_ns) / NANOSECONDS)
+            state = replace(
+                named, stamp_ns=stamp_ns, steady_s=(until_ns - stamp_ns) / NANOSECONDS, speed_m_s=speed_m_s,
+                force_n=force_n, progress=(stamp_ns - start_ns) / (SLIDE_FRAMES * FRAME_NS),
+            )  # fmt: skip
+            bag.write('exploration', state, stamp_ns)
         fast = vibration[part.start * PAC_PER_FRAME : part.stop * PAC_PER_FRAME]
         bag.write('signal', _signal('pac', ('pac',), stamp_ns, first * PAC_PER_FRAME, fast), end_ns + DELAY_NS)
         if channels == 'all':
@@ -258,7 +230,7 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
             bag.write('signal_static', slow, end_ns + 2 * DELAY_NS)
     for count, phase in enumerate((Phase.LIFT, Phase.DONE)):
         after_ns = stop_ns + count * BATCH_FRAMES * FRAME_NS
-        state = replace(motion.named, stamp_ns=after_ns, phase=phase, progress=1.0)
+        state = replace(named, stamp_ns=after_ns, phase=phase, progress=1.0)
         bag.write('exploration', state, after_ns + 3 * DELAY_NS)
 
 
@@ -278,250 +250,184 @@ def _signal(part: str, channels: tuple[str, ...], stamp_ns: int, first: int, sam
 
 
 # --------------------
-# Write slides of evenly spaced samples at a constant speed and force, as labelled bags.
+# Sets whose slides lie in .npz files, of evenly spaced samples at a constant speed and force.
 
 START_NS = 1_000_000_000 * NANOSECONDS
 BATCH_S = 0.1
 
 
-@dataclass(frozen=True, eq=False)
-class SteadySlide:
-    """One slide.
+class SteadySlide(NamedTuple):
+    """One slide: samples (n, n_channels), conditions (NaN if unknown), and the samples in which the finger slides.
 
-    Parameters
-    ----------
-    exploration_id, surface
-        Name and label.
-    samples : (n, n_channels)
-        Evenly spaced.
-    speed_m_s, force_n, direction_rad
-        Of the finger; NaN if unknown.
-    steady
-        Samples in which the finger slides; before them it is in contact, after them it lifts. All if None.
-    motion
-        Name of the motion; '' if it is none of the catalogue.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> SteadySlide('cork-1', 'cork', np.zeros((200, 1)), speed_m_s=0.05, force_n=1.0, direction_rad=0.0).surface
-    'cork'
+    Before `steady` the finger is in contact, after it lifts; all samples belong to the slide if it is None.
     """
 
-    exploration_id: str
-    surface: str
     samples: AnyArray
     speed_m_s: float
     force_n: float
     direction_rad: float
     steady: range | None = None
-    motion: str = 'linear_slide'
+
+
+def _one_bag_each(surface: str, _order: Sequence[Any]) -> tuple[str, int]:
+    return surface, START_NS
 
 
 @dataclass(frozen=True)
-class ImportedStream:
-    """The stream that all slides of a data set share: as in a `TactileSignal`.
+class SlideSet:
+    r"""A data set of one stream: what its files and slides are called, and how its arrays are read.
 
-    Examples
-    --------
-    >>> ImportedStream('signal', 'finger', ('pac',), 'count', 100.0).to_ns(50)  # half a second
-    500000000
-    """
-
-    topic: str
-    sensor: str
-    channels: tuple[str, ...]
-    unit: str
-    rate_hz: float
-
-    def to_ns(self, samples: int) -> int:
-        """Return how long so many samples take."""
-        return round(samples * NANOSECONDS / self.rate_hz)
-
-
-def write_steady_slides(
-    path: Path, stream: ImportedStream, slides: Iterable[SteadySlide], start_ns: int = START_NS
-) -> Path:
-    """Write a bag of slides, one after the other in the order given; the stamps are made up.
-
-    A state is published at the start of each phase and guarantees its whole length: speed and force do not change.
-
-    Parameters
-    ----------
-    path
-        Of the new bag.
-    stream
-        Topic, sensor, channels and rate of the samples.
-    slides
-        In the order of their writing.
-    start_ns
-        Stamp of the first slide.
-
-    Returns
-    -------
-    Path
-        Of the bag.
-    """
-    first = 0
-    with BagWriter(path) as bag:
-        for slide in slides:
-            start_ns = _write(bag, stream, slide, start_ns, first) + PAUSE_NS
-            first += len(slide.samples)
-    return path
-
-
-def _write(bag: BagWriter, stream: ImportedStream, slide: SteadySlide, start_ns: int, first: int) -> int:
-    """Write one slide; return its end."""
-    count = len(slide.samples)
-    steady = slide.steady or range(count)
-    phases = [(Phase.CONTACT, range(steady.start)), (Phase.SLIDE, steady), (Phase.LIFT, range(steady.stop, count))]
-    named = ExplorationState(
-        0, slide.exploration_id, slide.motion, Phase.SLIDE, speed_m_s=slide.speed_m_s, force_n=slide.force_n,
-        direction_rad=slide.direction_rad, surface=slide.surface,
-    )  # fmt: skip
-    for phase, part in phases:
-        if len(part) or phase is not Phase.CONTACT:
-            _write_phase(bag, stream, slide, replace(named, phase=phase), part=part, start_ns=start_ns, first=first)
-    end_ns = start_ns + stream.to_ns(count)
-    bag.write('exploration', replace(named, stamp_ns=end_ns, phase=Phase.DONE, progress=1.0), end_ns + 2 * DELAY_NS)
-    return end_ns
-
-
-def _write_phase(
-    bag: BagWriter,
-    stream: ImportedStream,
-    slide: SteadySlide,
-    state: ExplorationState,
-    *,
-    part: range,
-    start_ns: int,
-    first: int,
-) -> None:
-    begin_ns, end_ns = (start_ns + stream.to_ns(index) for index in (part.start, part.stop))
-    progress = part.start / len(slide.samples)
-    # A state before the first batch it covers, and after the last batch of the phase before.
-    log_ns = begin_ns + (DELAY_NS if part.start else 0)
-    guaranteed_s = (end_ns - begin_ns) / NANOSECONDS
-    bag.write('exploration', replace(state, stamp_ns=begin_ns, steady_s=guaranteed_s, progress=progress), log_ns)
-    step = max(1, round(BATCH_S * stream.rate_hz))
-    for index in range(part.start, part.stop, step):
-        samples = slide.samples[index : min(index + step, part.stop)].astype('float32')
-        stamp_ns = start_ns + stream.to_ns(index)
-        batch = TactileSignal(
-            stamp_ns,
-            stream.sensor,
-            stream.channels,
-            (stream.unit,) * len(stream.channels),
-            stream.rate_hz,
-            first + index,
-            samples,
-            stream.sensor,
-        )
-        bag.write(stream.topic, batch, start_ns + stream.to_ns(index + len(samples)) + DELAY_NS)
-
-
-# --------------------
-# A data set whose slides lie in .npz files, to one bag for each surface or session.
-
-
-@dataclass(frozen=True)
-class SlideFile:
-    """What the files are called, and how their keys and arrays are read; slides are numbered in order of conditions.
+    Call it with the folder of the files, the folder for the bags, the numbers of the slides of each surface ('' for
+    all), surfaces (none for all) and channels; it returns the bags.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> from texture_recordings.dataset import find_slides
-    >>> stream = ImportedStream('signal', 'finger', ('pac',), 'count', 100.0)
-    >>> def place(key: str) -> tuple[str, int]:
-    ...     return key.split('-')[0], int(key.split('-')[1])
-    >>> def slide(key: str, surface: str, condition: int, samples: AnyArray) -> SteadySlide:
-    ...     return SteadySlide(key, surface, samples, 0.05, 1.0, 0.0)
+    >>> own = SlideSet(
+    ...     'slides.npz', r'([a-z]+)-(\d+)', 'signal', 'finger', ('pac',), 'count', 100.0,
+    ...     order=lambda surface, number: (surface, (int(number),)),
+    ...     slide=lambda order, samples: SteadySlide(samples, 0.05, 1.0, 0.0),
+    ... )
     >>> with TemporaryDirectory() as folder:
     ...     np.savez(f'{folder}/slides.npz', **{'cork-1': np.zeros((200, 1)), 'cork-2': np.zeros((200, 1))})
-    ...     bags = SlideFile('slides.npz', stream, place, slide).write_bags(folder, f'{folder}/bags', '', ())
-    ...     print([item.name for item in find_slides(bags)])
+    ...     print([item.name for item in find_slides(own(folder, f'{folder}/bags'))])
     ['cork/1', 'cork/2']
     """
 
-    name: str  # or a pattern, such as '2021-*.npz'
-    stream: ImportedStream
-    place: Callable[[str], tuple[str, Any] | None]  # surface and condition of a key, None if it is no such key
-    slide: Callable[[str, str, Any, AnyArray], SteadySlide]  # of key, surface, condition and array
-    # Bag and stamp of its first slide, of surface and condition: a bag is a session
-    session: Callable[[str, Any], tuple[str, int]] = lambda surface, _: (surface, START_NS)
+    files: str  # a name or a pattern, such as '2021-*.npz'
+    key: str  # pattern of the names of the arrays
+    topic: str
+    sensor: str
+    channels: tuple[str, ...]
+    unit: str
+    rate_hz: float
+    order: Callable[..., tuple[str, tuple[Any, ...]]]  # groups of the key → surface, and what its slides are sorted by
+    slide: Callable[[tuple[Any, ...], AnyArray], SteadySlide]  # of that order and the array
+    session: Callable[[str, tuple[Any, ...]], tuple[str, int]] = _one_bag_each  # name and start of the bag, ns
+    motion: str = 'linear_slide'
 
-    def write_bags(self, source: str | Path, out: str | Path, slides: str, surfaces: Sequence[str]) -> list[Path]:
-        """Write the slides of each surface that `slides` names ('' for all), of all surfaces if none is named.
+    def __call__(
+        self,
+        source: str | Path,
+        out: str | Path,
+        slides: str = '',
+        materials: Sequence[str] = (),
+        channels: str = 'all',
+    ) -> list[Path]:
+        """Write the bags, and return their paths.
 
         Parameters
         ----------
         source
-            Folder of the file.
+            Folder of the files.
         out
             Folder for the bags; made if missing.
         slides
             Numbers of the slides of each surface, such as '1-30'; '' for all.
-        surfaces
+        materials
             Labels of the surfaces; none for all.
-
-        Returns
-        -------
-        list of Path
-            Of the bags.
+        channels
+            'all', or 'fast' for a stream of vibration, which is the same here.
 
         Raises
         ------
         InvalidData, UnknownName
-            If the folder `source` lacks the file, slides or a surface, or a bag exists already.
+            If the folder `source` lacks the files, slides or a surface, the channels are not there, or a bag exists.
         """
-        content, wanted = self._read(Path(source)), parse_selection(slides)
-        found: defaultdict[str, list[tuple[Any, str]]] = defaultdict(list)
-        for key in content:
-            place = self.place(key)
-            if place is None:
-                raise InvalidData(f"'{self.name}' holds '{key}', which is no slide of this data set; fetch it again")
-            found[place[0]].append((place[1], key))
-        for name in surfaces:
+        allowed = ('fast', 'all') if self.topic == 'signal' else ('all',)
+        if channels not in allowed:
+            raise InvalidData(f"channels are '{channels}'; this set has {' and '.join(allowed)}")
+        arrays, wanted = self._read(Path(source)), parse_selection(slides)
+        found: defaultdict[str, list[tuple[tuple[Any, ...], str]]] = defaultdict(list)
+        for key in arrays:
+            match = re.fullmatch(self.key, key)
+            if match is None:
+                raise InvalidData(f"'{self.files}' holds '{key}', which is no slide of this data set; fetch it again")
+            surface, order = self.order(*match.groups())
+            found[surface].append((order, key))
+        for name in materials:
             if name not in found:
                 raise unknown_name(name, found, 'surface')
-        sessions: defaultdict[tuple[str, int], list[tuple[str, str, Any]]] = defaultdict(list)
-        for name in surfaces or sorted(found):
-            for condition, key in _chosen(name, found[name], wanted):
-                sessions[self.session(name, condition)].append((key, name, condition))
-        ordered = sorted(sessions.items(), key=lambda item: item[0][1])
+        bags: defaultdict[tuple[str, int], list[tuple[str, str, tuple[Any, ...]]]] = defaultdict(list)
+        for surface in materials or sorted(found):
+            numbered = enumerate(sorted(found[surface]), 1)
+            chosen = [slide for number, slide in numbered if wanted is None or number in wanted]
+            if not chosen:
+                raise InvalidData(f"'{surface}' has none of the slides asked for; it has 1 to {len(found[surface])}")
+            for order, key in chosen:
+                bags[self.session(surface, order)].append((key, surface, order))
+        ordered = sorted(bags.items(), key=lambda item: item[0][1])
         return [
-            write_steady_slides(
-                Path(out) / bag, self.stream, (self._slide(*slide, content[slide[0]]) for slide in slides), start_ns
-            )
-            for (bag, start_ns), slides in progress(ordered, 'import bags', len(ordered))
+            self._write(Path(out) / name, start_ns, ((*one, arrays[one[0]]) for one in members))
+            for (name, start_ns), members in progress(ordered, 'import bags', len(ordered))
         ]
 
-    def _slide(self, key: str, surface: str, condition: Any, values: AnyArray) -> SteadySlide:
-        try:
-            return self.slide(key, surface, condition, values)
-        except (ValueError, LookupError, ArithmeticError) as error:
-            raise InvalidData(
-                f"'{key}' of '{self.name}' is no slide of this data set: {error}; fetch it again"
-            ) from error
-
     def _read(self, folder: Path) -> dict[str, AnyArray]:
-        files = sorted(path for path in folder.glob(self.name) if path.is_file())
+        files = sorted(path for path in folder.glob(self.files) if path.is_file())
         if not files:
-            raise InvalidData(f"no file {self.name} in '{folder}'; give the folder that holds it")
-        return {key: values for file in files for key, values in _arrays(file).items()}
+            raise InvalidData(f"no file {self.files} in '{folder}'; give the folder that holds it")
+        return {key: rows for file in files for key, rows in _slides_in(file).items()}
+
+    def _write(self, path: Path, start_ns: int, slides: Iterable[tuple[str, str, tuple[Any, ...], AnyArray]]) -> Path:
+        """Write slides one after the other; the stamps are made up, and speed and force do not change in a phase."""
+        first = 0
+        with BagWriter(path) as bag:
+            for key, surface, order, array in slides:
+                try:
+                    slide = self.slide(order, array)
+                except (ValueError, LookupError, ArithmeticError) as error:
+                    raise InvalidData(
+                        f"'{key}' of '{self.files}' is no slide of this data set: {error}; fetch it again"
+                    ) from error
+                named = ExplorationState(
+                    0, key, self.motion, Phase.SLIDE, speed_m_s=slide.speed_m_s, force_n=slide.force_n,
+                    direction_rad=slide.direction_rad, surface=surface,
+                )  # fmt: skip
+                start_ns = self._write_slide(bag, slide, named, start_ns, first) + PAUSE_NS
+                first += len(slide.samples)
+        return path
+
+    def _write_slide(
+        self, bag: BagWriter, slide: SteadySlide, named: ExplorationState, start_ns: int, first: int
+    ) -> int:
+        """Write one slide; return its end."""
+        count = len(slide.samples)
+        steady = slide.steady or range(count)
+        at_ns = [start_ns + round(index * NANOSECONDS / self.rate_hz) for index in range(count + 1)]
+        step, units = max(1, round(BATCH_S * self.rate_hz)), (self.unit,) * len(self.channels)
+        phases = [(Phase.CONTACT, 0, steady.start), (Phase.SLIDE, steady.start, steady.stop)]
+        for phase, begin, end in [*phases, (Phase.LIFT, steady.stop, count)]:
+            if phase is Phase.CONTACT and begin == end:
+                continue
+            guaranteed_s = (at_ns[end] - at_ns[begin]) / NANOSECONDS
+            state = replace(
+                named, stamp_ns=at_ns[begin], phase=phase, steady_s=guaranteed_s, progress=begin / len(slide.samples)
+            )
+            # A state before the first batch it covers, and after the last batch of the phase before.
+            bag.write('exploration', state, at_ns[begin] + (DELAY_NS if begin else 0))
+            for index in range(begin, end, step):
+                after = min(index + step, end)
+                samples = slide.samples[index:after].astype('float32')
+                batch = TactileSignal(
+                    at_ns[index], self.sensor, self.channels, units, self.rate_hz, first + index, samples, self.sensor
+                )
+                bag.write(self.topic, batch, at_ns[after] + DELAY_NS)
+        done = replace(named, stamp_ns=at_ns[count], phase=Phase.DONE, progress=1.0)
+        bag.write('exploration', done, at_ns[count] + 2 * DELAY_NS)
+        return at_ns[count]
 
 
-def _arrays(file: Path) -> dict[str, AnyArray]:
+def _slides_in(file: Path) -> dict[str, AnyArray]:
     try:
         with open_regular(file) as opened:
             content = Arrays(opened)
-            return {key: _slide(key, content[key]) for key in content.names}
+            return {key: _rows_of(key, content[key]) for key in content.names}
     except (OSError, ValueError, KeyError) as error:
         raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
 
 
-def _slide(key: str, values: AnyArray) -> AnyArray:
+def _rows_of(key: str, values: AnyArray) -> AnyArray:
     values = values[:, None] if values.ndim == 1 else values
     if values.ndim != 2 or values.dtype.kind not in 'iuf' or len(values) < 2 or not np.isfinite(values).all():
         raise ValueError(
@@ -530,161 +436,62 @@ def _slide(key: str, values: AnyArray) -> AnyArray:
     return values
 
 
-def _chosen(surface: str, slides: list[tuple[Any, str]], wanted: frozenset[int] | None) -> list[tuple[Any, str]]:
-    chosen = [slide for number, slide in enumerate(sorted(slides), 1) if wanted is None or number in wanted]
-    if not chosen:
-        raise InvalidData(f"'{surface}' has none of the slides asked for; it has 1 to {len(slides)}")
-    return chosen
+def _taxels(count: int) -> tuple[str, ...]:
+    return tuple(f'taxel{number}' for number in range(1, count + 1))
 
 
 # --------------------
-# The slides of a 16-taxel capacitive finger over fabrics and printed gratings, as labelled bags.
+# fabricslide: a 16-taxel capacitive finger over fabrics and printed gratings, one bag each ('Canvas', 'Board10mm').
 #
 # Source: github wngfra/FabricSlide (Wang et al. 2022, "Fabric Classification Using a Finger-Shaped Tactile Sensor via
-# Robotic Sliding", MIT licence), joined into one `runs.npz`.
+# Robotic Sliding", MIT licence), joined into one `runs.npz`. Runs are numbered by direction (down first), then force,
+# speed and repeat: of a complete fabric 1-60 go down and 61-120 up, and within them each force has twelve in a row.
+# Force: the grip was regulated to a mean reading of the taxels, not to newtons; `force_n` holds that reading in
+# hundreds of counts, which distinguishes and orders forces, and is no force in newtons. Direction: +π/2 up, −π/2 down.
 
-FABRIC = re.compile(r'([^/]+)/F(\d+)/V(-?\d+)/(\d+)')
-GRATING = re.compile(r'grating/([^/]+?)_F(\d+)_V(-?\d+)mmps_(\d+)')
-FABRICSLIDE_TAXELS = slice(3, 19)  # after the time (ms) and two proximities
 ROW_S = 0.028
-FABRICSLIDE_STREAM = ImportedStream(
-    'signal_static', 'cpm/taxels', tuple(f'taxel{number}' for number in range(1, 17)), 'count', 1.0 / ROW_S
-)
 # The finger speeds up along a quarter sine in the time that it then takes for 47 mm, slides 500 mm, and slows down
 # likewise (`setDuration`, `setTimeMax` of the published controller).
 RAMP_M, STEADY_M = 0.03 * math.pi / 2, 0.5
-COUNTS_PER_FORCE = 100.0
 
 
-class SlideRun(NamedTuple):
-    """How one run was made; sorted as the slides are numbered: down before up, then by force, speed and repeat.
-
-    Examples
-    --------
-    >>> sorted([SlideRun(True, 500, 10, 1), SlideRun(False, 800, 10, 1)])[0].up  # down comes first
-    False
-    """
-
-    up: bool
-    counts: int
-    speed_mm_s: int
-    repeat: int
+def _fabricslide_order(
+    grating: str | None, grating_force: str, grating_speed: str, grating_repeat: str, *fabric: str
+) -> tuple[str, tuple[Any, ...]]:
+    named = (grating, grating_force, grating_speed, grating_repeat) if grating else fabric
+    name, force, speed, repeat = named
+    return str(name), (int(speed) > 0, int(force), abs(int(speed)), int(repeat))
 
 
-def fabricslide_place(key: str) -> tuple[str, SlideRun] | None:
-    """Return fabric or grating of a key, and the run."""
-    match = GRATING.fullmatch(key) or FABRIC.fullmatch(key)
-    if not match:
-        return None
-    speed = int(match[3])
-    return match[1], SlideRun(speed > 0, int(match[2]), abs(speed), int(match[4]))
-
-
-def fabricslide_slide(key: str, surface: str, run: SlideRun, recorded: AnyArray) -> SteadySlide:
-    """Return a slide, given its rows as recorded.
-
-    Parameters
-    ----------
-    key
-        Name of the run in the file.
-    surface
-        Label of the fabric or grating.
-    run
-        Direction, force, speed and repeat.
-    recorded : (n_rows, n_columns)
-        Time in s and the taxels.
-
-    Returns
-    -------
-    SteadySlide
-    """
-    speed_m_s = run.speed_mm_s / 1000.0
-    direction_rad = math.pi / 2 if run.up else -math.pi / 2
+def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
+    up, counts, speed_mm_s, _ = order
+    speed_m_s = speed_mm_s / 1000.0
     first, last = (round(way / speed_m_s / ROW_S) for way in (RAMP_M, RAMP_M + STEADY_M))
     # A run that is not of that length, as those over gratings, is taken as it is.
     steady = range(first, last) if first < last <= len(recorded) else None
-    return SteadySlide(
-        key, surface, recorded[:, FABRICSLIDE_TAXELS], speed_m_s, run.counts / COUNTS_PER_FORCE, direction_rad, steady
-    )
-
-
-FABRICSLIDE_DATA = SlideFile('runs.npz', FABRICSLIDE_STREAM, fabricslide_place, fabricslide_slide)
-
-
-def import_fabricslide(
-    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
-) -> list[Path]:
-    """Write one bag a fabric or grating ('Canvas', 'Board10mm') from runs.npz, and return their paths.
-
-    The runs of a fabric are numbered by direction (down first), then force, speed and repeat: of a complete fabric 1-60
-    go down and 61-120 up, and within them each force has twelve in a row. Rows are 28 ms apart and are written as they
-    are, on `signal_static`; there is no vibration, so `channels` must be 'all'. Force: the grip was regulated to a mean
-    reading of the taxels, not to newtons; `force_n` holds that reading in hundreds of counts, which distinguishes and
-    orders forces, and is no force in newtons. Direction: +π/2 up, −π/2 down. The states say `contact` while the finger
-    speeds up and `lift` while it slows down.
-    """
-    if channels != 'all':
-        raise InvalidData(f"channels are '{channels}'; this finger has slow taxels alone, import 'all'")
-    return FABRICSLIDE_DATA.write_bags(source, out, slides, materials)
+    # The taxels come after the time (ms) and two proximities.
+    return SteadySlide(recorded[:, 3:19], speed_m_s, counts / 100.0, math.pi / 2 if up else -math.pi / 2, steady)
 
 
 # --------------------
-# The slides of a 9-taxel MEMS array over 21 textures at several speeds and forces, as labelled bags.
+# ntp21: a 9-taxel MEMS array over 21 textures at several speeds and forces, one bag each ('texture00').
 #
 # Source: github LIMB-UCF/NTP ("Neuromorphic Real-time Tactile Perception Invariant to Contact Dynamics"), joined into
-# one
-# `slides.npz` with a key `textureNNN/speedSSS/forceF.F` (mm/s, N over contact) for each slide.
+# one `slides.npz` with a key `textureNNN/speedSSS/forceF.F` (mm/s, N over contact) for each slide. Slides are numbered
+# by speed, and by force within a speed. The recorded stamps jitter by half a sample while the samples are evenly spaced
+# (read so, the speeds agree better with each other): each slide is read as evenly spaced from its first stamp to its
+# last, and brought from its own rate (310 to 323 Hz) to 320 Hz by a cubic spline. `force_n` is that beyond contact.
 
-KEY = re.compile(r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)')
 NTP21_TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
 RATE_HZ = 320.0
 SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would ask for any number of samples
-# The published signal has no unit.
-NTP21_STREAM = ImportedStream(
-    'signal', 'ntp/array', tuple(f'taxel{n}' for n in range(1, NTP21_TAXELS + 1)), '', RATE_HZ
-)
 
 
-class SlideCondition(NamedTuple):
-    """How one slide was made; sorted as the slides are numbered: by speed, then by force.
-
-    Examples
-    --------
-    >>> sorted([SlideCondition(20.0, 0.5), SlideCondition(10.0, 1.0)])[0].speed_mm_s  # the slowest comes first
-    10.0
-    """
-
-    speed_mm_s: float
-    force_n: float
-
-
-def ntp21_place(key: str) -> tuple[str, SlideCondition] | None:
-    """Return texture and condition of a key."""
-    match = KEY.fullmatch(key)
-    return (match[1], SlideCondition(float(match[2]), float(match[3]))) if match else None
-
-
-def ntp21_slide(key: str, texture: str, condition: SlideCondition, recorded: AnyArray) -> SteadySlide:
-    """Return a slide, given its rows as recorded.
-
-    Parameters
-    ----------
-    key
-        Name of the slide in the file.
-    texture
-        Label of the texture.
-    condition
-        Speed, force and direction.
-    recorded : (n_rows, n_columns)
-        Time in s and the taxels.
-
-    Returns
-    -------
-    SteadySlide
-    """
+def _ntp21_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
+    speed_mm_s, force_n = order
     samples = evenly(np.asarray(recorded[:, :NTP21_TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
-    return SteadySlide(key, texture, samples, condition.speed_mm_s / 1000.0, condition.force_n, math.nan)
+    return SteadySlide(samples, speed_mm_s / 1000.0, force_n, math.nan)
 
 
 def evenly(samples: Array, duration_s: float) -> Array:
@@ -717,162 +524,60 @@ def evenly(samples: Array, duration_s: float) -> Array:
     return values
 
 
-NTP21_DATA = SlideFile('slides.npz', NTP21_STREAM, ntp21_place, ntp21_slide)
-
-
-def import_ntp21(
-    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
-) -> list[Path]:
-    """Write one bag a texture, 'texture00' and so on, from slides.npz, and return their paths.
-
-    The slides of a texture are numbered by speed, and by force within a speed: with four speeds and four forces, 1-4
-    are the slowest, of rising force, and 13-16 the fastest. The recorded stamps jitter by half a sample while the
-    samples are evenly spaced (read so, the speeds agree better with each other): each slide is read as evenly spaced
-    from its first stamp to its last, and brought from its own rate (310 to 323 Hz) to 320 Hz by a cubic spline.
-    `force_n` is the force beyond first contact. Fast channels and all are the same: the nine taxels.
-    """
-    if channels not in ('fast', 'all'):
-        raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")
-    return NTP21_DATA.write_bags(source, out, slides, materials)
-
-
 # --------------------
-# The slides of a 16-taxel capacitive finger over the same fabrics on several dates, one labelled bag a date.
+# fingersense: the finger of fabricslide over the same fabrics on several dates, one bag a date ('2021-05-31').
 #
 # Source: github wngfra/fingerSense (Apache-2.0) with its history, joined into `2021-02_03.npz` and `2021-05_06.npz`
-# with a key `date/Fabric/forceN/speedmms[/repeat]` for each slide.
+# with a key `date/Fabric/forceN/speedmms[/repeat]` for each slide. Slides of a fabric are numbered by date, then force,
+# speed and repeat. Direction: +π/2 for speeds above 0, −π/2 below. Forces are as the keys name them; those of 100 and
+# more (23 May) are hardly newtons. No rate is published. Rows of a slide grow by 28 (May) to 32 (February) m over the
+# speed in m/s; at 50 Hz that is a way of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
 
-FINGERSENSE = re.compile(r'(\d{4}-\d\d-\d\d)/([^/]+)/(\d+(?:\.\d+)?)N/(-?\d+)mms(?:/(\d+))?')
-# No rate is published. Rows of a slide grow by 28 (May) to 32 (February) m over the speed in m/s; at 50 Hz that is a
-# way of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
 NOMINAL_HZ = 50.0
-FINGERSENSE_STREAM = ImportedStream(
-    'signal_static', 'cpm/taxels', tuple(f'taxel{number}' for number in range(1, 17)), 'count', NOMINAL_HZ
-)
 FREE_SHARE = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact
 
 
-class DatedRun(NamedTuple):
-    """How one slide was made; sorted as the slides are numbered: by date, then force, speed and repeat.
-
-    Examples
-    --------
-    >>> sorted([DatedRun('2021-05-31', 2.0, 10, 0), DatedRun('2021-05-27', 4.0, 10, 0)])[0].date
-    '2021-05-27'
-    """
-
-    date: str
-    force_n: float
-    speed_mm_s: int
-    repeat: int
-
-
-def fingersense_place(key: str) -> tuple[str, DatedRun] | None:
-    """Return fabric of a key, and the run."""
-    match = FINGERSENSE.fullmatch(key)
-    return (match[2], DatedRun(match[1], float(match[3]), int(match[4]), int(match[5] or 0))) if match else None
-
-
-def fingersense_slide(key: str, surface: str, run: DatedRun, recorded: AnyArray) -> SteadySlide:
-    """Return a slide, given its rows as recorded.
-
-    Parameters
-    ----------
-    key
-        Name of the slide in the file.
-    surface
-        Label of the fabric or grating.
-    run
-        Date, force, speed and repeat.
-    recorded : (n_rows, 16)
-        The taxels.
-
-    Returns
-    -------
-    SteadySlide
-        It slides from the first row in contact to the last.
-    """
+def _fingersense_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
+    _, force_n, speed_mm_s, _ = order
     load = recorded.mean(axis=1)
     touching = np.flatnonzero(load > FREE_SHARE * np.quantile(load, 0.9))
     steady = range(int(touching[0]), int(touching[-1]) + 1) if len(touching) else None
-    direction_rad = math.copysign(math.pi / 2, run.speed_mm_s)
-    return SteadySlide(key, surface, recorded, abs(run.speed_mm_s) / 1000.0, run.force_n, direction_rad, steady)
+    return SteadySlide(recorded, abs(speed_mm_s) / 1000.0, force_n, math.copysign(math.pi / 2, speed_mm_s), steady)
 
 
-def _fingersense_session(_surface: str, run: DatedRun) -> tuple[str, int]:
-    midnight = datetime.fromisoformat(run.date).replace(tzinfo=timezone.utc)
-    return run.date, round(midnight.timestamp()) * NANOSECONDS
-
-
-FINGERSENSE_DATA = SlideFile(
-    '2021-*.npz', FINGERSENSE_STREAM, fingersense_place, fingersense_slide, _fingersense_session
-)
-
-
-def import_fingersense(
-    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
-) -> list[Path]:
-    """Write one bag a date ('2021-05-31'), so that a session is a date, from all 2021-*.npz, and return their paths.
-
-    The slides of a fabric are numbered by date, then force, speed and repeat. No rate is published: rows are written at
-    a nominal 50 Hz, on `signal_static`; there is no vibration, so `channels` must be 'all'. Direction: +π/2 for speeds
-    above 0, −π/2 below. Forces are as the keys name them; those of 100 and more (23 May) are hardly newtons. The states
-    say `contact` until the taxels carry a load and `lift` once they carry none.
-    """
-    if channels != 'all':
-        raise InvalidData(f"channels are '{channels}'; this finger has slow taxels alone, import 'all'")
-    return FINGERSENSE_DATA.write_bags(source, out, slides, materials)
+def _fingersense_session(_surface: str, order: Sequence[Any]) -> tuple[str, int]:
+    midnight = datetime.fromisoformat(order[0]).replace(tzinfo=timezone.utc)
+    return order[0], round(midnight.timestamp()) * NANOSECONDS
 
 
 # --------------------
-# Contact sound of a tool that strokes 29 textures by hand, as labelled bags.
-#
-# Source: the LMT haptic texture database (Strese et al. 2014) as it stands in the history of github
-# shinolab/vibrotactile-autoencoder, joined into one `recordings.npz` with a key `G1Texture[VersionN]/NN` a stroke.
+# Data sets that `texture import` knows, each called as `import_biotac20` is.
 
-STROKE = re.compile(r'(G\d[^/]*)/(\d+)')
-LMT29_STREAM = ImportedStream('signal', 'lmt/microphone', ('sound',), 'count', 22_050.0)
-
-
-def lmt29_place(key: str) -> tuple[str, int] | None:
-    """Return texture and number of a key."""
-    match = STROKE.fullmatch(key)
-    return (match[1], int(match[2])) if match else None
-
-
-def lmt29_slide(key: str, texture: str, _number: int, recorded: AnyArray) -> SteadySlide:
-    """Return a stroke, given its samples (n, 1): by hand, so speed, force and direction are unknown."""
-    return SteadySlide(key, texture, recorded[:, :1], math.nan, math.nan, math.nan, motion='')
-
-
-LMT29_DATA = SlideFile('recordings.npz', LMT29_STREAM, lmt29_place, lmt29_slide)
-
-
-def import_lmt29(
-    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
-) -> list[Path]:
-    """Write one bag a texture, 'G4Bamboo' and so on, from recordings.npz, and return their paths.
-
-    Sound at 22 050 Hz on `signal`, as recorded: the whole stroke counts as sliding. Fast channels and all are the same.
-    """
-    if channels not in ('fast', 'all'):
-        raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")
-    return LMT29_DATA.write_bags(source, out, slides, materials)
-
-
-# --------------------
-# Data sets that `texture import` knows.
-
-
-# Each takes the folder with the files of the data set, the folder for the bags, which slides of each material ('' for
-# all), names of materials (none for all) and 'fast' or 'all' channels, and returns the paths of the bags. InvalidData
-# is raised if the source lacks files or slides, the channels are not there, or a bag exists already.
 Importer = Callable[..., list[Path]]
-
 IMPORTS: Mapping[str, Importer] = {
     'biotac20': import_biotac20,  # 20 materials × 40 slides, BioTac on a robot arm
-    'ntp21': import_ntp21,  # 21 textures × speeds × forces, 9-taxel MEMS array
-    'fabricslide': import_fabricslide,  # 7 fabrics × forces × speeds × 2 directions and gratings, 16 capacitive taxels
-    'fingersense': import_fingersense,  # fabrics on several dates in 2021, 16 capacitive taxels
-    'lmt29': import_lmt29,  # contact sound of 29 textures, a tool stroked by hand
-}
+    'ntp21': SlideSet(
+        'slides.npz', r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)',
+        'signal', 'ntp/array', _taxels(NTP21_TAXELS), '', RATE_HZ,  # the published signal has no unit
+        order=lambda texture, speed, force: (texture, (float(speed), float(force))), slide=_ntp21_slide,
+    ),
+    'fabricslide': SlideSet(
+        'runs.npz', r'grating/([^/]+?)_F(\d+)_V(-?\d+)mmps_(\d+)|([^/]+)/F(\d+)/V(-?\d+)/(\d+)',
+        'signal_static', 'cpm/taxels', _taxels(16), 'count', 1.0 / ROW_S,
+        order=_fabricslide_order, slide=_fabricslide_slide,
+    ),
+    'fingersense': SlideSet(
+        '2021-*.npz', r'(\d{4}-\d\d-\d\d)/([^/]+)/(\d+(?:\.\d+)?)N/(-?\d+)mms(?:/(\d+))?',
+        'signal_static', 'cpm/taxels', _taxels(16), 'count', NOMINAL_HZ,
+        order=lambda date, fabric, force, speed, repeat: (fabric, (date, float(force), int(speed), int(repeat or 0))),
+        slide=_fingersense_slide, session=_fingersense_session,
+    ),
+    # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as it stands in the history of
+    # github shinolab/vibrotactile-autoencoder, joined into one file. The whole stroke counts as sliding; speed, force
+    # and direction are unknown.
+    'lmt29': SlideSet(
+        'recordings.npz', r'(G\d[^/]*)/(\d+)', 'signal', 'lmt/microphone', ('sound',), 'count', 22_050.0,
+        order=lambda texture, number: (texture, (int(number),)),
+        slide=lambda _order, recorded: SteadySlide(recorded[:, :1], math.nan, math.nan, math.nan), motion='',
+    ),
+}  # fmt: skip
