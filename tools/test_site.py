@@ -142,6 +142,18 @@ def test_the_sensor_of_the_page_delivers_and_counts_what_is_lost(examples: Path)
     assert set(SENSORS['daq'](SensorParams(), time.time_ns).counts) >= set(finger.counts)
 
 
+def test_the_files_that_the_page_on_extending_names_exist() -> None:
+    named = re.findall(r'(?:src/)?(texture_\w+/[\w/]+\.py)', (DOCS / 'extending.md').read_text())
+    assert len(named) > 10
+    paths = {name: [ROOT / 'src' / name, ROOT / 'src' / name.split('/')[0] / name] for name in named}
+    assert [name for name, found in paths.items() if not any(path.exists() for path in found)] == []
+
+
+def test_the_emulated_sensor_of_the_page_passes_its_own_test(examples: Path) -> None:
+    module = importlib.import_module('my_textures.test_udp_finger')
+    module.test_a_slide_arrives_as_it_was_sent_and_a_lost_datagram_is_counted()
+
+
 def test_the_motion_of_the_page_slides_along_its_bows(examples: Path) -> None:
     snake = importlib.import_module('my_textures.snake').snake
     now_ns, states, places = 1_000_000_000, [], []

@@ -49,7 +49,7 @@ def main(before: str, after: str, target: str) -> None:
                 colour = COLOURS[packages.index(package) % len(COLOURS)]
                 axis.add_patch(plt.Rectangle((x, y), width, height, facecolor=colour, edgecolor='white', linewidth=0.6))
             middle = area[0] + area[2] / 2, area[1] + area[3] / 2
-            axis.text(*middle, package.removeprefix('texture_'), ha='center', va='center', fontsize=9)
+            axis.text(*middle, package.removeprefix('texture_'), ha='center', va='center', fontsize=11)
         axis.set(xlim=(0, 1), ylim=(0, 1), aspect='equal', title=f'{name}: {sum(map(len, tree.values()))} modules')
         axis.axis('off')
     figure.savefig(target, dpi=110, bbox_inches='tight')
