@@ -45,7 +45,7 @@ PAIRS = {
         'ets-linear-svm-pairs-vote',
     ),
     'ets-linear-headings': ('ets-linear-svm', 'ets-linear-ann'),
-    'ets-circular': ('ets-circular-svm', 'ets-circular-ann'),
+    'ets-circular': ('ets-circular-svm', 'ets-circular-ann', 'ets-circular-svm-pairs'),
     'ets-ten-textures': ('ets-fine-svm', 'ets-fine-ann', 'ets-fine-svm-pairs'),
     'ets-roughness': (
         'ets-roughness-ann1',

@@ -113,7 +113,9 @@ PAPERS = {
         scene='ets_linear',
         surfaces=('ridge_1', 'ridge_2a'),
     ),
-    'Roberge et al., circles': Paper('tsf85_3x4', 'ets-circular', 'ets-circular-svm', ('ets-circular-ann',)),
+    'Roberge et al., circles': Paper(
+        'tsf85_3x4', 'ets-circular', 'ets-circular-svm', ('ets-circular-ann', 'ets-circular-svm-pairs')
+    ),
     'Roberge et al., ten textures': Paper(
         'tsf85_3x4', 'ets-ten-textures', 'ets-fine-svm', ('ets-fine-ann', 'ets-fine-svm-pairs')
     ),
@@ -123,6 +125,8 @@ PAPERS = {
         'jamali-naive-bayes-5',
         (
             'jamali-naive-bayes-3',
+            'jamali-naive-bayes-3-heights',
+            'jamali-naive-bayes-5-heights',
             'jamali-amplitude',
             'jamali-amplitude-deviation',
             'jamali-stft',

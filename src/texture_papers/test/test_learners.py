@@ -122,20 +122,6 @@ def test_one_or_two_windows_of_a_label_are_enough_to_answer(name, make_examples,
     assert model.labels == ('cork', 'felt', 'slate', 'wood')
 
 
-def test_labels_of_unequal_numbers_are_all_trained_on(name, make_examples):
-    many, few = make_examples(), make_examples(seed=4, slides=1, windows=3)
-    rows = np.concatenate(
-        [np.flatnonzero(many.labels != 'felt'), len(many.labels) + np.flatnonzero(few.labels == 'felt')]
-    )
-    both = dataclasses.replace(
-        many,
-        values=np.concatenate((many.values, few.values))[rows],
-        labels=np.concatenate((many.labels, few.labels))[rows],
-        groups=np.concatenate((many.groups, few.groups))[rows],
-    )
-    assert np.isfinite(learn(name, both).predict_log_proba(many.values)).all()
-
-
 def test_a_single_label_is_refused_with_a_sentence(name, make_examples):
     with pytest.raises(InvalidData, match="all windows are of 'cork'"):
         learn(name, make_examples(labels=('cork',)))
@@ -172,18 +158,6 @@ def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
     scaler = StandardScaler().fit(examples.values)
     expected = GaussianNB(var_smoothing=1e-9).fit(scaler.transform(examples.values), codes)
     np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
-
-
-def test_counted_naive_bayes_reports_labels_of_one_mean_and_width_apart_that_normal_distributions_cannot():
-    rng = np.random.default_rng(0)
-    flat, forked = rng.uniform(-1.0, 1.0, (300, 1)), rng.choice([-0.577, 0.577], (300, 1))  # variance 1/3 both
-    values, codes = np.concatenate((flat, forked)), np.repeat([0, 1], 300)
-    parameters = NaiveBayes(bins=9).fit(values, codes, np.arange(600)).parameters
-    predict = NaiveBayes.predictor(parameters)
-    assert predict(np.array([[0.577], [0.0]])).argmax(axis=1).tolist() == [1, 0]
-    np.testing.assert_allclose(np.exp(parameters['log_shares']).sum(axis=1), 1.0)
-    np.testing.assert_array_equal(predict(values[:5]), [predict(row) for row in values[:5]])
-    assert np.isfinite(predict(np.array([1e9, -1e9])[:, None])).all()
 
 
 def test_counted_naive_bayes_gives_the_probabilities_of_scikit_learn(task):

@@ -10,12 +10,14 @@ from texture_core.types import Window
 from texture_estimation import search
 from texture_estimation.evidence_rules import MajorityVote
 from texture_estimation.recipe import load_recipe
+from texture_estimation.roughness import Grades, load_roughness_recipe
 from texture_estimation.search import (
     UNDECIDED,
     ArrayStream,
     Axis,
     ClassificationTask,
     RecipeSpace,
+    RoughnessTask,
     SearchParams,
     SearchSlides,
     SlideArrays,
@@ -65,7 +67,10 @@ def test_the_variables_and_their_ranges_are_those_of_the_papers() -> None:
     np.testing.assert_allclose(np.diff(np.log10(axes['box_constraint'].values)), 0.05, atol=2e-3)
     circle = RecipeSpace.load('ets-circular-ann', load_recipe('ets-circular-ann')).axes
     assert circle['parts'].values == ('1', '3', '5', '7', '9')
-    assert (circle['hidden'].values[0], circle['hidden'].values[-1]) == (5, 50)
+    assert circle['hidden'].values == tuple(range(5, 51))
+    for regressor, own in (('ann5', {'hidden': (5, 50)}), ('svm5', {'kernel_scale': (1e-5, 1e5), 'peaks': (2, 15)})):
+        axes = RecipeSpace.load(f'ets-roughness-{regressor}', load_roughness_recipe(f'ets-roughness-{regressor}')).axes
+        assert {name: (axes[name].values[0], axes[name].values[-1]) for name in own} == own
 
 
 @pytest.mark.parametrize(
@@ -92,12 +97,10 @@ def test_every_individual_is_a_recipe_and_is_found_again_in_it(search, recipe) -
 @pytest.mark.parametrize(
     ('text', 'sentence'),
     [
-        ('variables: {a: {kind: integer, low: 3, high: 2, set: windows/hop_s}}', 'the first must be the smaller'),
         ('variables: {a: {kind: intger, low: 1, high: 2, set: windows/hop_s}}', "did you mean 'integer'?"),
         ('variables: {a: {kind: integer, low: 1, high: 1.0e+12, set: windows/hop_s}}', 'at most 100000 values'),
         ('variables: {a: {kind: choice, options: [x, x], set: windows/hop_s}}', 'name each once'),
         ('variables: {a: {kind: integer, low: 1, high: 2, set: learner/mlp/hidden}}', 'the recipe has no'),
-        ('varables: {}', "did you mean 'variables'?"),
         ('variables: {}', 'no variables'),
     ],
 )
@@ -199,13 +202,10 @@ def test_a_search_cut_off_and_resumed_ends_as_one_in_one_go(landscape, tmp_path)
     assert ended.history[-1].evaluated == whole.history[-1].tried - cut.history[-1].tried
     with pytest.raises(InvalidData, match='another search'):
         optimise(space, replace(slides, seed=1, _known={}), SearchParams(seed=1), Known(), resume=path)
-
-
-def test_a_checkpoint_that_is_none_is_refused(landscape, tmp_path) -> None:
-    (tmp_path / 'x.json').write_text('{"search": "abc"}')
-    for name in ('x.json', 'none.json'):
+    path.write_text('{"search": "abc"}')
+    for none in (path, tmp_path / 'none.json'):
         with pytest.raises(InvalidData, match='cannot be read'):
-            optimise(*landscape, SearchParams(), Known(), resume=tmp_path / name)
+            optimise(space, slides, SearchParams(), Known(), resume=none)
 
 
 # -- on slides
@@ -242,28 +242,20 @@ def test_scans_are_cut_into_parts_that_share_a_slide() -> None:
         scans(load_recipe('ets-fine-svm').training_windows)
 
 
-@pytest.mark.parametrize(
-    ('recipe', 'search_space'),
-    [('ets-linear-svm', 'ets-svm'), ('ets-linear-svm-vote', 'ets-svm'), ('ets-linear-ann', 'ets-ann')],
-)
+@pytest.mark.parametrize(('recipe', 'search_space'), [('ets-linear-svm', 'ets-svm'), ('ets-linear-ann', 'ets-ann')])
 def test_what_is_found_is_no_worse_than_where_it_began_and_scored_as_training_would(recipe, search_space) -> None:
     space = RecipeSpace.load(search_space, load_recipe(recipe))
-    slides = SearchSlides(tones(), SMALL.halves, SMALL.seed)
-    said = []
+    slides, said = SearchSlides(tones(), SMALL.halves, SMALL.seed), []
     best = optimise(space, slides, SMALL, ClassificationTask(), tell=said.append).best
-    alone = optimise(
-        RecipeSpace(space.base, {'one': Axis(('x',), edits={'x': ()})}), slides, SMALL, ClassificationTask()
-    )
-    assert said[-1].best.fitness >= alone.best.fitness
+    start = RecipeSpace(space.base, {'one': Axis(('x',), edits={'x': ()})})
+    assert said[-1].best.fitness >= optimise(start, slides, SMALL, ClassificationTask()).best.fitness
     assert best.fitness == best.searched.fitness  # all four halves in the search, too
     examples, halves = slides.split(best.recipe.training_windows)
     values, half = examples.values(ClassificationTask().features(best.recipe)), halves[1]
     learner = best.recipe.learner
     fitted = learner.fit(values[half], examples.codes[half], examples.slides[half])
-    scores = learner.predictor(fitted.parameters)(values)
-    if recipe != 'ets-linear-svm-vote':
-        right = decisions(scores) == examples.codes
-        assert best.scores[1] == (right[half].mean(), right[~half].mean())
+    right = decisions(learner.predictor(fitted.parameters)(values)) == examples.codes
+    assert best.scores[1] == (right[half].mean(), right[~half].mean())
 
 
 def test_slides_divided_otherwise_than_the_search_asks_are_refused() -> None:
@@ -316,3 +308,21 @@ def test_each_pair_has_a_search_and_a_checkpoint_of_its_own(tmp_path: Path) -> N
     again = optimise_pairs(space, slides, SMALL, resume=tmp_path / 'best.json')
     assert again.scores == found.scores
     assert all(one.history[-1].evaluated == 0 for one in again.by_pair.values())
+
+
+@pytest.mark.parametrize('regressor', ['ann1', 'ann5', 'svm5'])
+def test_the_recipes_of_the_roughness_paper_are_tuned_and_evaluated_by_their_heads(regressor) -> None:
+    grades = Grades({f'surface_{number}': float(number) for number in range(1, 6)})
+    levels = np.repeat(1.5 ** np.arange(5), 8)  # the level of a hiss rises with the grade
+    samples = levels[:, None, None] * np.random.default_rng(0).normal(size=(len(levels), 500, 1))
+    names, same = np.repeat(list(grades.grades), 8), np.ones(len(levels))
+    hisses = SlideArrays({'signal': ArrayStream(samples, 1000.0)}, names, 0.15 * same, same)
+    space = RecipeSpace.load(f'ets-roughness-{regressor}', load_roughness_recipe(f'ets-roughness-{regressor}'))
+    params = SearchParams(population=5, generations=2, halves=3, finalists=1)
+    found = optimise(space, SearchSlides(hisses, params.halves), params, RoughnessTask(grades))
+    assert found.history[-1].best.fitness >= found.history[0].best.fitness
+    assert found.best.fitness > 0.7
+    # what only the checks need is held out, and yet stays in the recipe
+    extracted = RoughnessTask(grades).features(found.best.recipe)
+    assert 'peak_to_median_power' not in [name for name, _ in extracted.inputs[0].features]
+    assert 'peak_to_median_power' in [name for name, _ in found.best.recipe.feature_set.inputs[0].features]

@@ -96,17 +96,6 @@ def test_a_model_of_pairs_is_stored_and_loads_with_all_its_variables(recipe, exa
         TunedPairs.predictor(broken)
 
 
-def test_a_window_alone_of_forty_five_pairs_is_decided_as_in_a_batch(make_examples):
-    labels = tuple(f'm{number}' for number in range(10))
-    examples = make_examples(labels=labels, features=8)
-    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    learner = TunedPairs('texture_papers.roberge:AnnPairs', AnnPairs(hidden=3, iterations=3))
-    predictor = learner.predictor(learner.fit(examples.values, codes, groups).parameters)
-    alone = np.stack([predictor.decisions(values) for values in examples.values])
-    np.testing.assert_allclose(alone, predictor.decisions(examples.values), atol=1e-9)
-    assert alone.shape == (len(examples.values), 45)
-
-
 @pytest.mark.parametrize(
     ('values', 'error', 'sentence'),
     [

@@ -1,5 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials by surface texture (Jamali & Sammut 2010): peaks grown from regions, naive Bayes."""
+"""Materials by surface texture (Jamali & Sammut 2010): peaks grown from regions, naive Bayes.
+
+What the paper says and what is done here, element by element:
+
+run
+    Paper: Down to about 1 N, straight at a constant speed, up (V.C). Speed and length are not told.
+    Here: Preset `jamali`: 0.05 m/s for 2 s.
+signals
+    Paper: Four PVDF films and four strain gauges at 2.5 kHz, low-pass of 500 Hz (III, V.B).
+    Here: The same: all eight channels.
+contact
+    Paper: Cut by hand, "the entire interval" (IV.A).
+    Here: Steady sliding alone, by the states of the exploration or found in the signal.
+peaks
+    Paper: Algorithm 1: equal regions by energy, neighbours joined; their number is not told (IV.A).
+    Here: `RegionPeaks` with 32 regions: the frequency of the largest coefficient of each peak (IV.B); `…-heights`
+        has the coefficients, too.
+learner
+    Paper: Naive Bayes of Weka (IV.B, VI).
+    Here: `NaiveBayes` with normal distributions; `…-heights` counts in bins that were tuned on recordings.
+baseline
+    Paper: "Average amplitude", "averaging the signals of each sensor" in the middle third (VI).
+    Here: `MeanAmplitude`, the mean of |s|, the reading nearest to the words and to 65.75 %; the experiment has the
+        others.
+future work
+    Paper: Short-term Fourier and wavelet transform, symbols (VII), without figures.
+    Here: `jamali-stft`, `-wavelets`, `-symbols`; what of them is taken is ours.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures."""
+"""Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures.
+
+What the paper says and what is done here, element by element:
+
+slide
+    Paper: 500 ms at 0.10, 0.15, 0.20 m/s and 1, 2.5, 5 N; ten textures: 10 cm at 0.125 m/s and 2 N (IV.A, V.A).
+    Here: The same in the presets, 50 ms longer, so that an arm that answers late covers it, too.
+transform
+    Paper: The signal less its mean, 1024 values from 0 to 500 Hz (III.B).
+    Here: The same: 2048 points at 1 kHz.
+peaks
+    Paper: Maxima with a least gap, 2 to 15, their frequency and amplitude, ranked by either (III.B, IV).
+    Here: The same: `SpectralPeaks`.
+integral, length
+    Paper: Equations 1 and 2.
+    Here: The same: `SignalEnergy`, `ArcLength`.
+network
+    Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not told.
+    Here: `AnnPairs`, trained as by MATLAB's default.
+machine
+    Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not told.
+    Here: `SvmPairs` with the RBF kernel.
+decision
+    Paper: Most pairs; a tie is unclassified (III.C).
+    Here: The same: `PairVotes`.
+vote
+    Paper: Five parts of one scan of 500 ms, at least three equal (III.C, IV.B.1).
+    Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a decision of its own.
+parts of a circle
+    Paper: 1 to 9, most votes; 7 or 9 in almost all cases (IV, IV.B.2).
+    Here: 7 of 70 ms for all pairs.
+search
+    Paper: 20 individuals, 30 generations, the mean of learning and test over 20 halves (IV); from there 10 and 10
+        for the vote, 13 and 10 for ten textures. Test slides are part of the fitness.
+    Here: `texture optimise`, `--tune`: 4 of the halves in the search, 20 for the best three. Test slides are never
+        part.
+variables
+    Paper: A set for each pair (III.C), not printed.
+    Here: `…-pairs`: searched once on simulated slides of another seed, in the size that the file names. The other
+        recipes have one set, by which the scenes were made.
+friction
+    Paper: The next question (VI).
+    Here: `texture experiment friction`, simulated. Live, the recipe `friction-svm` needs the arm `ur` or
+        `ros_controllers`.
+"""
 
 from __future__ import annotations
 
