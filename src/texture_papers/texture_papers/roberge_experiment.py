@@ -190,6 +190,7 @@ CIRCULAR = PaperProtocol(
             (
                 Method('ets-circular-ann', Figures(0.846, 0.811, 0.028)),
                 Method('ets-circular-svm', Figures(0.990, 0.867, 0.052), confusion=TABLE_2),
+                Method('ets-circular-svm-pairs', Figures(0.990, 0.867, 0.052)),
             ),
         ),
         RecognitionTask(
@@ -256,6 +257,7 @@ FINE = PaperProtocol(
             (
                 Method(FINE_ANN, Figures(0.963, 0.949, 0.007)),
                 Method(FINE_SVM, Figures(0.960, 0.958, 0.014), confusion=TABLE_3),
+                Method('ets-fine-svm-pairs', Figures(0.960, 0.958, 0.014)),
             ),
         ),
     ),
