@@ -213,6 +213,7 @@ class SerialSensor:
         self._baud = baud
         self._start_command = start_command
         self._stop_command = stop_command
+        self._path = params.device
         self._port: SerialPort | None = None
         self._opened = 0
         self._silent_s, self._babbles = 0.0, False
@@ -220,7 +221,7 @@ class SerialSensor:
     def open(self) -> None:
         """Open the device and start its stream; DeviceError if it cannot be reached."""
         self.close()
-        self._port = SerialPort(self._params.device, self._baud)
+        self._port = SerialPort(self._path, self._baud)
         self.send(self._start_command)
         self._opened += 1
         self._silent_s, self._babbles = 0.0, False
@@ -252,7 +253,10 @@ class SerialSensor:
         arrival_ns = self._now_ns()
         frames = self._decoder.valid_frames
         batches = self._decoder.feed(data, arrival_ns)
-        self._watch_silence(alive=self._decoder.valid_frames > frames, any_bytes=bool(data))
+        alive = self._decoder.valid_frames > frames
+        self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
+        self._babbles = not alive and (self._babbles or bool(data))  # since the last valid frame, not in the last read
+        self._act_on_silence()
         return batches
 
     def close(self) -> None:
@@ -270,7 +274,7 @@ class SerialSensor:
         return {**self._decoder.counts, 'reopened': max(0, self._opened - 1)}
 
     @property
-    def details(self) -> Mapping[str, float]:
+    def details(self) -> Mapping[str, str | float]:
         """What the decoder knows beside the samples, such as how much the device's clock is slow."""
         return self._decoder.details
 
@@ -289,9 +293,8 @@ class SerialSensor:
             raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
         return self._port
 
-    def _watch_silence(self, *, alive: bool, any_bytes: bool) -> None:
-        self._silent_s = 0.0 if alive else self._silent_s + self._params.batch_s
-        self._babbles = not alive and (self._babbles or any_bytes)  # since the last valid frame, not in the last read
+    def _act_on_silence(self) -> None:
+        """Raise DeviceError when the device has been silent for too long."""
         if self._silent_s < SILENCE_S:
             return
         what, check = 'nothing', 'that its firmware runs'

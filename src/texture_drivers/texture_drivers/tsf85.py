@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import math
 import time
@@ -26,7 +25,7 @@ from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers import serial_line
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import SerialPort
+from texture_drivers.serial_line import Decoder, SerialSensor
 from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumbering, SampleCounter, StreamClock
 
 # --------------------
@@ -801,7 +800,99 @@ REVIVALS = 3  # so many times, as the vendor does, before the port is given up
 REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
-class Tsf85:
+class Tsf85Decoder(Decoder):
+    """Decode the packets of a hub; see `texture_drivers.serial_line.Decoder`.
+
+    Parameters
+    ----------
+    layout
+        Kind of fingertip.
+    params
+        Of the sensor; its `config` means `Tsf85Settings`.
+    prefixes
+        Which fingers are published, and the prefix of the topics of each.
+    """
+
+    def __init__(self, layout: Tsf85Layout, params: SensorParams, prefixes: Mapping[int, str]) -> None:
+        settings = load_settings(Tsf85Settings, params.config)
+        self._prefixes = prefixes
+        self._parser = Tsf85Parser(layout)
+        self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in prefixes}
+        self._fingers = {
+            finger: FingerStream(layout, settings, params.static_rate_hz, params.frame_id) for finger in prefixes
+        }
+        self._last_packet: Packet | None = None
+        self._frames = self._repeated = 0
+
+    @property
+    def valid_frames(self) -> int:
+        """Sample frames of the fingers that are published."""
+        return self._frames
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals: samples published, samples lost, bogus candidates and bytes refused, and what was done about it."""
+        cutters = [finger.cutter for finger in self._fingers.values()]
+        return {
+            'samples': sum(cutter.samples for cutter in cutters),
+            'lost': sum(cutter.lost for cutter in cutters),
+            'bogus': self._parser.refused,
+            'refused_bytes': self._parser.refused_bytes,
+            'repeated': self._repeated,
+            'damaged_stamps': sum(finger.counter.damaged_stamps for finger in self._fingers.values()),
+            'images': sum(cutter.images for cutter in cutters),
+            'repeated_images': sum(cutter.repeated_images for cutter in cutters),
+            'clock_steps': sum(finger.clock.steps for finger in self._fingers.values()),
+        }
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """How much the device's clock is slow."""
+        return {SLOW_CLOCK: PPM * next(iter(self._fingers.values())).clock.drift}
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return {
+            f'{prefix}{topic}': rate
+            for number, prefix in self._prefixes.items()
+            for topic, rate in self._fingers[number].rates_hz.items()
+        }
+
+    @property
+    def limits(self) -> Limits:
+        """Ends of the int16 and of the uint16 by topic."""
+        return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in LIMITS.items()}
+
+    def restart(self) -> None:
+        """Go on after an interruption, with the index that the host's clock will tell."""
+        for finger in self._fingers.values():
+            finger.interrupt()
+
+    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches in `data`; none in the first 0.1 s of a stream."""
+        packets = self._without_duplicates(self._parser.feed(data))
+        topics: dict[str, Sequence[TactileSignal]] = {}
+        for number, finger in self._fingers.items():
+            frames = self._splitters[number].frames(packets)
+            self._frames += len(frames)
+            placed = finger.place(frames, arrival_ns)
+            topics |= {f'{self._prefixes[number]}{topic}': batches for topic, batches in placed.items()}
+        return topics
+
+    def _without_duplicates(self, packets: Sequence[Packet]) -> list[Packet]:
+        """Leave out what came twice: the same to the last bit, stamp and all."""
+        unique = []
+        for packet in packets:
+            if packet == self._last_packet and any(item.kind == TIMESTAMP for item in packet.items):
+                self._repeated += 1
+            else:
+                unique.append(packet)
+            self._last_packet = packet
+        return unique
+
+
+class Tsf85(SerialSensor):
     """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
 
     The device's own stamps number the samples, so losses are known exactly; over an interruption the host's clock
@@ -835,145 +926,53 @@ class Tsf85:
     ) -> None:
         if not fingers and params.finger >= FINGERS:
             raise InvalidParameter(f"parameter 'finger' is {params.finger}; a TSF-85 has the fingers 0 and 1")
-        self._params = params
-        self._now_ns = now_ns
-        settings = load_settings(Tsf85Settings, params.config)
-        self._port: SerialPort | None = None
-        self._parser = Tsf85Parser(layout)
-        self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in self._prefixes}
-        self._fingers = {
-            finger: FingerStream(layout, settings, params.static_rate_hz, params.frame_id) for finger in self._prefixes
-        }
+        self._published = fingers or (params.finger,)
+        prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
+        decoder = Tsf85Decoder(layout, params, prefixes)
+        super().__init__(params, now_ns, decoder, start_command=start_command(), stop_command=stop_command())
         self._serial = ''
-        self._last_packet: Packet | None = None
-        self._repeated = 0
-        self._silent_reads = self._silent_bytes = 0
-        self._opened = self._revived = self._revivals = 0
+        self._revived = self._revivals = 0
 
     def open(self) -> None:
         """Open the device and start its stream; DeviceError if it cannot be reached."""
         self.close()
-        device = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
-        port = SerialPort(device)
-        port.write(start_command())
-        self._port = port
-        self._serial = serial_line.serial_number(device)
-        self._opened += 1
-        self._silent_reads = self._silent_bytes = self._revivals = 0
-        self._interrupt()
-
-    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
-        """Wait for the length of one batch and return what arrived.
-
-        Raises
-        ------
-        DeviceError
-            If the port is not open or is gone, or the device stays silent after three restarts.
-        """
-        if self._port is None:
-            raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
-        time.sleep(self._params.batch_s)
-        data = self._port.read()
-        arrival_ns = self._now_ns()
-        packets = self._without_duplicates(self._parser.feed(data))
-        topics: dict[str, Sequence[TactileSignal]] = {}
-        alive = False
-        for number, finger in self._fingers.items():
-            frames = self._splitters[number].frames(packets)
-            alive = alive or bool(frames)
-            placed = finger.place(frames, arrival_ns)
-            topics |= {f'{self._prefixes[number]}{topic}': batches for topic, batches in placed.items()}
-        self._watch_silence(self._port, alive, len(data))
-        return topics
-
-    def close(self) -> None:
-        """Stop the stream and close the device."""
-        if self._port is None:
-            return
-        with contextlib.suppress(DeviceError):  # if it is gone there is nothing to stop
-            self._port.write(stop_command())
-        self._port.close()
-        self._port = None
+        self._path = serial_line.resolve(self._params.device, USB_IDS, 'TSF-85')
+        super().open()
+        self._serial = serial_line.serial_number(self._path)
+        self._revivals = 0
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals: samples published, samples lost, bogus candidates and bytes refused, and what was done about it."""
-        cutters = [finger.cutter for finger in self._fingers.values()]
-        return {
-            'samples': sum(cutter.samples for cutter in cutters),
-            'lost': sum(cutter.lost for cutter in cutters),
-            'bogus': self._parser.refused,
-            'refused_bytes': self._parser.refused_bytes,
-            'repeated': self._repeated,
-            'damaged_stamps': sum(finger.counter.damaged_stamps for finger in self._fingers.values()),
-            'images': sum(cutter.images for cutter in cutters),
-            'repeated_images': sum(cutter.repeated_images for cutter in cutters),
-            'reopened': max(0, self._opened - 1),
-            'revived': self._revived,
-            'clock_steps': sum(finger.clock.steps for finger in self._fingers.values()),
-        }
+        """Totals of the decoder, and how often the device was opened again and woken."""
+        return {**super().counts, 'revived': self._revived}
 
     @property
     def details(self) -> Mapping[str, str | float]:
         """Serial number of the USB device if it tells one, and how much its clock is slow."""
-        drift = next(iter(self._fingers.values())).clock.drift
         serial = {'serial number': self._serial} if self._serial else {}
-        return {**serial, SLOW_CLOCK: PPM * drift}
+        return {**serial, **super().details}
 
-    @property
-    def expected_rates_hz(self) -> Mapping[str, float]:
-        """Nominal rate of each topic."""
-        return {
-            f'{prefix}{topic}': rate
-            for number, prefix in self._prefixes.items()
-            for topic, rate in self._fingers[number].rates_hz.items()
-        }
-
-    @property
-    def limits(self) -> Limits:
-        """Ends of the int16 and of the uint16 by topic."""
-        return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in LIMITS.items()}
-
-    def _without_duplicates(self, packets: Sequence[Packet]) -> list[Packet]:
-        """Leave out what came twice: the same to the last bit, stamp and all."""
-        unique = []
-        for packet in packets:
-            if packet == self._last_packet and any(item.kind == TIMESTAMP for item in packet.items):
-                self._repeated += 1
-            else:
-                unique.append(packet)
-            self._last_packet = packet
-        return unique
-
-    def _watch_silence(self, port: SerialPort, alive: bool, n_bytes: int) -> None:
+    def _act_on_silence(self) -> None:
         """Wake a device that is open but silent; DeviceError when that does not help."""
-        if alive:
-            self._silent_reads = self._silent_bytes = self._revivals = 0
-            return
-        self._silent_reads += 1
-        self._silent_bytes += n_bytes
-        if self._silent_reads * self._params.batch_s < SILENCE_S:
+        if not self._silent_s:
+            self._revivals = 0
+        if self._silent_s < SILENCE_S:
             return
         if self._revivals == REVIVALS:
             raise DeviceError(self._silence_sentence())
-        self._silent_reads = 0
+        self._silent_s = 0.0
         self._revivals += 1
         self._revived += 1
-        port.write(stop_command())
+        self.send(self._stop_command)
         time.sleep(REVIVAL_PAUSE_S)
-        port.write(start_command())
-        self._interrupt()
+        self.send(self._start_command)
+        self._decoder.restart()
 
     def _silence_sentence(self) -> str:
-        fingers = ' or '.join(str(finger) for finger in self._prefixes)
-        if self._silent_bytes:
+        if self._babbles:
+            fingers = ' or '.join(str(finger) for finger in self._published)
             return (
                 f"device '{self._params.device}' sends bytes, and nothing of finger {fingers} in them that this driver "
                 'knows; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'
             )
         return f"device '{self._params.device}' is open and sends nothing, started {1 + REVIVALS} times; replug it"
-
-    def _interrupt(self) -> None:
-        for finger in self._fingers.values():
-            finger.interrupt()

@@ -14,7 +14,7 @@ from texture_drivers.biotac import LAYOUTS
 from texture_simulation import sensor_models as daq
 from texture_simulation import sensor_models as pvdf
 from texture_simulation.effects import SALT
-from texture_simulation.offline import record, simulate_slide_streams
+from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide, Trajectory, straight
 from texture_simulation.scene import Contact, Scene, scene_from
 from texture_simulation.sensor_models import BIOTAC_PATH_RATE_HZ as PATH_RATE_HZ
@@ -160,8 +160,8 @@ def scene_of(angle_rad: float = 0.0, noise_count: float = 0.0) -> Scene:
 
 
 def recorded(scene: Scene, speed_m_s: float, surface: str = 'sine', seed: int = 0, force_n: float = 2.0):
-    batches = record(scene, surface, speed_m_s, force_n, 2.0, rng=np.random.default_rng(seed))['signal']
-    return np.concatenate([batch.samples for batch in batches])[:, 0]
+    sliding = SimulatedSlide(speed_m_s, force_n, 2.0)
+    return simulate_slide_streams(scene, surface, 1, sliding, np.random.default_rng(seed))['signal'][0, :, 0]
 
 
 def test_too_strong_a_vibration_is_clipped_as_by_the_converter() -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -16,10 +18,23 @@ from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.types import TactileSignal, lost_samples
 from texture_drivers.sensor import SensorParams
 from texture_drivers.sound_card import AudioBlock, SoundCard
-from texture_simulation.devices.fingers import FRAMES_AT_ONCE, SYSTEM_CONFIG, EmulatedSoundCard
 
 pytestmark = pytest.mark.realtime
 
+# It lives in user space: ALSA's file plugin reads what is sampled from a pipe, and PortAudio lists it as a card. The
+# environment variable ALSA_CONFIG_PATH names its configuration, in the process that opens it and before PortAudio is
+# loaded there.
+FRAMES_AT_ONCE = 960  # a write of this size is read at once, or not at all; PortAudio asks for two blocks of 480 frames
+SYSTEM_CONFIG = '/usr/share/alsa/alsa.conf'
+CONFIG = """pcm.emulated {{
+  type file
+  slave.pcm null
+  file /dev/null
+  infile "{pipe}"
+  format raw
+  hint {{ show on description "emulated sound card" }}
+}}
+"""
 DEADLINE_S = 20.0
 RATE_HZ = 48_000
 TURN = 30_000
@@ -29,7 +44,12 @@ class PacedCard:
     """A card whose sample i holds i modulo 30 000."""
 
     def __init__(self, folder: Path) -> None:
-        self.card = EmulatedSoundCard(folder)
+        pipe, config = folder / 'pipe', folder / 'alsa.conf'
+        os.mkfifo(pipe)
+        config.write_text(CONFIG.format(pipe=pipe))
+        self.environment = {'ALSA_CONFIG_PATH': f'{SYSTEM_CONFIG}:{config}'}
+        # Both ends are open here: listing the cards opens and closes the pipe, too, and must not end it.
+        self._pipe = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
         self.silent = False
         self.start_ns = time.time_ns()
         self._stop = threading.Event()
@@ -41,10 +61,17 @@ class PacedCard:
         while not self._stop.wait(0.003):
             due = int((time.time_ns() - self.start_ns) / 1e9 * RATE_HZ / FRAMES_AT_ONCE)
             for number in range(blocks, due):
-                first = number * FRAMES_AT_ONCE
+                samples = (np.arange(FRAMES_AT_ONCE) + number * FRAMES_AT_ONCE) % TURN
                 if not self.silent:
-                    self.card.sample(((np.arange(FRAMES_AT_ONCE) + first) % TURN).astype(np.int16))
+                    with contextlib.suppress(BlockingIOError):  # nobody takes them
+                        os.write(self._pipe, samples.astype('<i2').tobytes())
             blocks = due
+
+    def drain(self) -> None:
+        """Throw away what nobody has taken, as a card does that is not open."""
+        with contextlib.suppress(BlockingIOError):
+            while os.read(self._pipe, 65536):
+                pass
 
     def stop(self) -> None:
         self._stop.set()
@@ -58,7 +85,7 @@ def card(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PacedCard]:
     made = PacedCard(tmp_path_factory.mktemp('alsa'))
     # Whoever lists the cards opens the pipe and waits for a writer: other tests of this process must not find it.
     with pytest.MonkeyPatch.context() as environment:
-        for name, value in made.card.environment.items():
+        for name, value in made.environment.items():
             environment.setenv(name, value)
         try:
             pytest.importorskip('sounddevice', exc_type=ImportError)
@@ -73,7 +100,7 @@ def make(card: PacedCard) -> Iterator[Callable[..., SoundCard]]:
     made: list[SoundCard] = []
 
     def make(config: str = '{decimation: 1}', device: str = 'emulated') -> SoundCard:
-        card.card.drain()
+        card.drain()
         made.append(SoundCard(SensorParams(device=device, config=config)))
         made[-1].open()
         return made[-1]
@@ -119,7 +146,7 @@ def test_closed_and_opened_again_it_goes_on_at_the_index_of_the_time(
     sensor = make()
     last = read_s(sensor, 0.5)[-1]
     sensor.close()
-    card.card.drain()
+    card.drain()
     sensor.open()
     first = read_s(sensor, 0.5)[0]
     gap_s = (first.stamp_ns - last.end_ns) / 1e9
@@ -154,7 +181,7 @@ def test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on(
     while not sensor._capture._overflowed:  # type: ignore[union-attr]
         assert time.monotonic() < deadline_s
         time.sleep(0.01)
-    card.card.drain()
+    card.drain()
     batches = read_s(sensor, 1.5)
     assert sensor.counts['overflows'] >= 1
     assert sensor.counts['lost'] > 0

@@ -17,7 +17,6 @@ from texture_simulation.devices.ur import (
     EmulatedController,
     EmulatedRobot,
     ForceMode,
-    InputClaims,
     LinearMove,
     RtdeMessage,
     RtdeSession,
@@ -245,7 +244,7 @@ def served():
 
 @pytest.fixture
 def session(served):
-    return RtdeSession(served, InputClaims())
+    return RtdeSession(served, {})
 
 
 def message(kind, payload=b''):
@@ -271,7 +270,7 @@ def test_data_come_at_the_wanted_rate(session, served):
 
 
 def test_an_input_belongs_to_one_client_until_it_leaves(served):
-    claims = InputClaims()
+    claims = {}
     first, second = RtdeSession(served, claims), RtdeSession(served, claims)
     setup = message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3,')
     assert first.receive(setup)[4:] == b'INT32,DOUBLE'

@@ -137,55 +137,6 @@ SLIDE_FROM_S = APPROACH_S + CONTACT_S
 STATE_PERIOD_S = 0.1
 
 
-def record(
-    scene: Scene,
-    surface: str,
-    speed_m_s: float,
-    force_n: float,
-    duration_s: float,
-    *,
-    rng: np.random.Generator,
-    direction_rad: float = 0.0,
-    radius_m: float = 0.0,
-    start_ns: int = 0,
-    finger: int = 0,
-) -> SimulatedRecording:
-    """Return steady sliding alone, by topic; see `simulate_exploration` for the arguments.
-
-    Parameters
-    ----------
-    scene
-        Scene: sensor, contact and effects.
-    surface
-        Name of the surface.
-    speed_m_s
-        Wanted speed.
-    force_n
-        Wanted normal force.
-    duration_s
-        Duration of the slide.
-    rng
-        All random numbers: positions on the sample, effects, noise.
-    direction_rad
-        Direction of travel, from +x towards +y; at the start, for a circle.
-    radius_m
-        Radius of a circle, travelled anticlockwise; 0 is a straight line.
-    start_ns
-        Stamp of the first sample.
-    finger
-        Which individual of the sensor.
-
-    Returns
-    -------
-    SimulatedRecording
-        Signals of steady sliding.
-    """
-    sliding = SimulatedSlide(speed_m_s, force_n, duration_s, direction_rad, radius_m)
-    kind = find(SENSORS, scene.sensor, 'sensor model')
-    streams = simulate_slide_streams(scene, surface, 1, sliding, rng, finger=finger)
-    return {stream.topic: _batches(streams[stream.topic][0], stream, start_ns) for stream in kind.streams}
-
-
 def simulate_exploration(
     scene: Scene,
     surface: str,

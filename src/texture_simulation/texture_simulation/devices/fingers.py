@@ -9,7 +9,7 @@ import os
 import re
 import struct
 import tty
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -92,8 +92,7 @@ def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, versi
     bytes
         The whole frame.
     """
-    rows, columns = values.shape
-    return _frame(struct.pack('<cBHIBB', b'B', version, sequence % 2**16, time_us % 2**32, rows, columns) + reply)
+    return framed(ord('B'), version, sequence, time_us, shape=values.shape, body=reply)
 
 
 def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
@@ -113,11 +112,15 @@ def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
     bytes
         The whole frame.
     """
-    header = struct.pack('<cBHIBB', b'S', VERSION, sequence % 2**16, time_us % 2**32, 1, len(serials))
-    return _frame(header + ','.join(serials).encode('ascii'))
+    return framed(ord('S'), VERSION, sequence, time_us, shape=(1, len(serials)), body=','.join(serials).encode('ascii'))
 
 
-def _frame(content: bytes) -> bytes:
+def framed(kind: int, version: int, sequence: int, time_us: int, *, shape: tuple[int, ...], body: bytes) -> bytes:
+    """Return a frame of a serial line of our own design; its number wraps at 16 bits, its time at 32.
+
+    `shape` is rows and columns of what it holds.
+    """
+    content = struct.pack('<BBHIBB', kind, version, sequence % 2**16, time_us % 2**32, *shape) + body
     return stuff(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
 
 
@@ -398,6 +401,12 @@ class EmulatedDevice:
         """Begin clock and numbers again, as after a brown-out."""
         self._held_back = b''
 
+    def _disturbed(self, frames: Iterable[bytes]) -> bytes:
+        """Return frames as they go out, some of them left out or sent twice."""
+        if self.frame_faults == FrameFaults():
+            return b''.join(frames)
+        return b''.join(self.frame_faults.apply(frame, self._rng) for frame in frames)
+
     def _send(self, data: bytes) -> None:
         if self.streaming:
             self._held_back += data
@@ -427,10 +436,8 @@ class EmulatedAnySkin(EmulatedDevice):
         field_ut : (n_frames, 15)
             Field along x, y, z of each magnetometer.
         """
-        frames = encode(field_ut[:, 3:] if self.wrong_firmware else field_ut)  # a board with fewer magnetometers
-        if self.frame_faults != FrameFaults():
-            frames = (self.frame_faults.apply(frame, self._rng) for frame in frames)
-        self._send(b''.join(frames))
+        # With the wrong firmware it is a board with fewer magnetometers.
+        self._send(self._disturbed(encode(field_ut[:, 3:] if self.wrong_firmware else field_ut)))
 
     def skip(self, frames: int) -> None:
         """Let time pass without sending: the board does not number its frames."""
@@ -577,10 +584,7 @@ class EmulatedPapillArray(EmulatedDevice):
 
     def _packets(self, times_us: Array, pillars: Array) -> bytes:
         encoder = self._unknown_encoder if self.wrong_firmware else self._encoder
-        packets = encoder.packets(self._sent, times_us, pillars)
-        if self.frame_faults == FrameFaults():
-            return b''.join(packets)
-        return b''.join(self.frame_faults.apply(packet, self._rng) for packet in packets)
+        return self._disturbed(encoder.packets(self._sent, times_us, pillars))
 
     def _execute(self, data: bytes) -> None:
         received = self._received + data
@@ -696,10 +700,7 @@ def encode_samples(stream: SampledStream, number: int, time_us: int, counts: Cou
     bytes
         The whole frame.
     """
-    rows, columns = counts.shape
-    content = struct.pack('<BBHIBB', stream.kind, version, number % 2**16, time_us % 2**32, rows, columns)
-    content += counts.astype('<i2').tobytes()
-    return stuff(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
+    return framed(stream.kind, version, number, time_us, shape=counts.shape, body=counts.astype('<i2').tobytes())
 
 
 # --------------------
@@ -737,80 +738,6 @@ class EmulatedPvdf(EmulatedSampler):
     def sample(self, film: Counts, force: Counts) -> None:
         """Take samples, (n_film,) and (n_force,)."""
         self.advance({'film': film[:, None], 'force': force[:, None]})
-
-
-# --------------------
-# A sound card without hardware: ALSA's file plugin reads what is sampled from a pipe, PortAudio lists it as a card.
-#
-# It lives in user space: the environment variable `ALSA_CONFIG_PATH` names its configuration, in the process that opens
-# it and before PortAudio is loaded there.
-
-# A write of this many bytes is read at once, or not at all; PortAudio asks for two blocks of 480 frames.
-FRAMES_AT_ONCE = 960
-SYSTEM_CONFIG = '/usr/share/alsa/alsa.conf'
-CONFIG = """pcm.{name} {{
-  type file
-  slave.pcm null
-  file /dev/null
-  infile "{pipe}"
-  format raw
-  hint {{ show on description "emulated sound card" }}
-}}
-"""
-
-
-class EmulatedSoundCard:
-    """A card that delivers, in its own time, what it is given.
-
-    Parameters
-    ----------
-    folder
-        Where its configuration and its pipe are made; must exist.
-    name
-        By which PortAudio knows it.
-    """
-
-    def __init__(self, folder: Path, name: str = 'emulated') -> None:
-        self.name = name
-        self.dropped_frames = 0  # nobody took them
-        pipe, config = folder / f'{name}.pipe', folder / f'{name}.conf'
-        os.mkfifo(pipe)
-        config.write_text(CONFIG.format(name=name, pipe=pipe))
-        self.environment = {'ALSA_CONFIG_PATH': f'{SYSTEM_CONFIG}:{config}'}
-        # Both ends are open here: listing the cards opens and closes the pipe, too, and must not end it.
-        self._pipe = os.open(pipe, os.O_RDWR | os.O_NONBLOCK)
-
-    def sample(self, counts: NDArray[np.int16]) -> None:
-        """Deliver 960 samples of the only channel.
-
-        Parameters
-        ----------
-        counts : (960,)
-            Samples; what nobody takes is dropped and counted.
-
-        Raises
-        ------
-        ValueError
-            If there are more or fewer.
-        """
-        if counts.shape != (FRAMES_AT_ONCE,):
-            raise ValueError(f'the samples have the shape {counts.shape}; ({FRAMES_AT_ONCE},) is delivered at once')
-        try:
-            os.write(self._pipe, counts.astype('<i2').tobytes())
-        except BlockingIOError:
-            self.dropped_frames += FRAMES_AT_ONCE
-
-    def drain(self) -> None:
-        """Throw away what nobody has taken, as a card does that is not open."""
-        try:
-            while os.read(self._pipe, 65536):
-                pass
-        except BlockingIOError:
-            return
-
-    def close(self) -> None:
-        """Close the pipe; who reads it gets nothing any more."""
-        os.close(self._pipe)
 
 
 # --------------------
@@ -862,27 +789,6 @@ class Tsf85Encoder:
             items += bytes([0x20 | head, 0, 0])
             items += bytes([0x30 | head]) + RESTING_ACCELERATION + bytes([0x40 | head]) + RESTING_ROTATION
         return bytes([0x9A, 0x00, 0x58, len(items)]) + items
-
-    def encode(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> bytes:
-        """Return the bytes of some milliseconds; see `packets`.
-
-        Parameters
-        ----------
-        first_ms
-            Device's clock at the first millisecond.
-        dynamic : (n,) or (n, 2)
-            Dynamic values, a row for each millisecond.
-        image : (n_taxels,) or (2, n_taxels)
-            Taxel image.
-        image_is_new
-            Whether the image changed since the last call.
-
-        Returns
-        -------
-        bytes
-            Packets one after the other.
-        """
-        return b''.join(self.packets(first_ms, dynamic, image, image_is_new))
 
     def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:
         """Yield the packets of some milliseconds.
@@ -1000,9 +906,7 @@ class EmulatedTsf85(EmulatedDevice):
         packets = self._encoder.packets(self._clock_ms, dynamic, self._image, self._image_is_new)
         if self.wrong_firmware:
             packets = (UNKNOWN_ITEM.join([packet[:4], packet[4:]]) for packet in packets)
-        if self.frame_faults == FrameFaults():
-            return b''.join(packets)
-        return b''.join(self.frame_faults.apply(packet, self._rng) for packet in packets)
+        return self._disturbed(packets)
 
     def _execute(self, data: bytes) -> None:
         received = self._received + data

@@ -16,9 +16,9 @@ from typing import TypeVar
 import numpy as np
 
 from texture_core.config import param
-from texture_core.framing import cobs_decode, cobs_encode
+from texture_core.framing import cobs_decode
 from texture_core.types import FingerSender, FingerState
-from texture_simulation.devices.fingers import ByteFaults, PtyPort
+from texture_simulation.devices.fingers import ByteFaults, PtyPort, framed
 
 # --------------------
 # The rails of a PVDF finger: their firmware and their mechanics, written from the protocol.
@@ -109,10 +109,8 @@ class RailsFirmware:
         x, y = (round(place * self.machine.xy_counts_m) for place in self.position[:2])
         z = round((self.position[2] - self.machine.start_height_m) * self.machine.z_counts_m)
         body = struct.pack('<iiiiBH', x, y, z, round(1e3 * self.force_n), self._flags, self.watchdog_stops % 2**16)
-        head = struct.pack('<BBHIBB', 0x20, VERSION, self._sent % 2**16, round(self._time_s * 1e6) % 2**32, 1, 1)
         self._sent += 1
-        content = head + body
-        return cobs_encode(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'
+        return framed(0x20, VERSION, self._sent - 1, round(self._time_s * 1e6), shape=(1, 1), body=body)
 
     def _execute(self, kind: int, body: bytes) -> None:
         self._silent_for_s = 0.0
@@ -186,7 +184,20 @@ def _checked(segment: bytes) -> bytes | None:
 
 
 # --------------------
-# What emulated robots on a serial line share: a real-time thread, a plug, and finger states for the emulator.
+# What emulated robots share: finger states for the emulator; on a serial line a real-time thread and a plug.
+
+
+@dataclass(frozen=True)
+class FingerPortParams:
+    """Whom an emulated robot tells where its finger is."""
+
+    finger_port: int = param(
+        0,
+        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
+
 
 LineT = TypeVar('LineT', bound='EmulatedSerialRobot')
 

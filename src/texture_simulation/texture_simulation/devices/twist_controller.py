@@ -13,11 +13,59 @@ from texture_core.config import param
 from texture_core.types import Array, FingerState, rotation_matrix
 
 # --------------------
+# The surface under the finger of an emulated arm, and a wall.
+
+
+@dataclass(frozen=True)
+class TouchedSurfaceParams:
+    """Where the surface lies, and how finger and force sensor begin."""
+
+    start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
+    surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
+    wall_m: float = param(
+        2.0,
+        'X coordinate, in the surface frame, of a wall across the way of the finger.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    wall_stiffness_n_m: float = param(20000.0, 'Stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0)
+    force_offset_n: float = param(1.5, 'Offset of the force sensor until it is zeroed.', unit='N')
+    seed: int = param(1, 'Seed of noise and jitter; equal seeds give equal noise.', low=0)
+
+
+STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
+
+
+def coulomb_n(friction: float, pressing_n: float, normal: Array, velocity_m_s: Array) -> Array:
+    """Return the Coulomb friction on a finger that is pressed on a surface with this normal.
+
+    Parameters
+    ----------
+    friction
+        Coefficient.
+    pressing_n
+        Normal force.
+    normal, velocity_m_s : (3,)
+
+    Returns
+    -------
+    (3,)
+        N, along the surface and against the movement.
+    """
+    along = velocity_m_s - (velocity_m_s @ normal) * normal
+    speed = math.sqrt(float(along @ along))
+    return -friction * pressing_n * along / max(speed, STICTION_M_S)
+
+
+# --------------------
 # The parameters of an emulated arm with a Cartesian velocity controller.
 
 
 @dataclass(frozen=True)
-class TwistControllerParams:
+class TwistControllerParams(TouchedSurfaceParams):
     """The emulated controller, its arm, its force sensor and the surface under the finger."""
 
     lag_s: float = param(
@@ -52,12 +100,6 @@ class TwistControllerParams:
         high=5.0,
     )
     active: bool = param(True, 'Lets the controller follow commands; false makes it listen without moving the arm.')
-    start_height_m: float = param(
-        0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
-    )
-    surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
-    surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')
-    surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
     surface_rx_rad: float = param(
         0.0, 'X component of the rotation vector of the surface in the base frame.', unit='rad'
     )
@@ -77,18 +119,9 @@ class TwistControllerParams:
     tool_mass_kg: float = param(
         0.2, 'Mass of the tool, whose weight the force sensor shows.', unit='kg', low=0.0, high=20.0
     )
-    force_offset_n: float = param(1.5, 'Offset of the force sensor on each axis.', unit='N')
     force_noise_n: float = param(
         0.002, 'Standard deviation of the noise of the force sensor.', unit='N', low=0.0, high=5.0
     )
-    wall_m: float = param(
-        2.0,
-        'X coordinate, in the surface frame, of a wall across the way of the finger.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    wall_stiffness_n_m: float = param(20000.0, 'Stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0)
     invert_twist: bool = param(False, 'Moves against each commanded velocity, as behind a frame that is upside down.')
     invert_force: bool = param(
         False, 'Shows the force of the tool on its surroundings, as a sensor of the other convention.'
@@ -107,7 +140,6 @@ class TwistControllerParams:
         low=0.0,
         high=1.0,
     )
-    seed: int = param(1, 'Seed of noise and jitter; equal seeds give equal noise.', low=0)
 
 
 # --------------------
@@ -116,7 +148,6 @@ class TwistControllerParams:
 STEP_NS = 1_000_000
 MAX_STEPS = 100  # in one go, after the machine was busy
 GRAVITY_M_S2 = 9.81
-STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
 TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)  # quaternion x, y, z, w: the tool's z axis points against that of the base
 TOOL_AXES = np.diag([1.0, -1.0, -1.0])
 
@@ -196,9 +227,7 @@ class EmulatedTwistArm:
         depth_m = -float((self.position - self._origin) @ normal)
         behind_m = max(0.0, float((self.position - self._origin) @ self._axes[:, 0]) - params.wall_m)
         pressing_n = params.stiffness_n_m * max(0.0, depth_m)
-        along = self.velocity - (self.velocity @ normal) * normal
-        speed = math.sqrt(float(along @ along))
-        force: Array = pressing_n * normal - params.friction * pressing_n * along / max(speed, STICTION_M_S)
+        force = pressing_n * normal + coulomb_n(params.friction, pressing_n, normal, self.velocity)
         return force - params.wall_stiffness_n_m * behind_m * self._axes[:, 0]
 
     def reading_n(self) -> Array:

@@ -28,6 +28,8 @@ import numpy as np
 from texture_core.config import from_mapping, param, parameters_of
 from texture_core.errors import DeviceError, TextureError
 from texture_core.types import Array, FingerSender, FingerState, rotation_matrix
+from texture_simulation.devices.rails import FingerPortParams
+from texture_simulation.devices.twist_controller import TouchedSurfaceParams, coulomb_n
 
 # --------------------
 # What moves the emulated robot: each motion says which velocity comes next.
@@ -238,7 +240,6 @@ class SafetyMode(enum.IntEnum):
 
 
 SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2}
-SAFETY_NAMES: Mapping[SafetyMode, str] = {SafetyMode.NORMAL: 'NORMAL', SafetyMode.PROTECTIVE_STOP: 'PROTECTIVE_STOP'}
 ROBOT_RUNNING = 7  # robot_mode
 PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
 COMMAND_REGISTERS = (0, 24)  # input_int registers of the control script: of the lower range, of the upper one
@@ -287,21 +288,11 @@ READY, DONE = 1, 2  # output_int_register_0
 
 
 @dataclass(frozen=True)
-class UrControllerParams:
+class UrControllerParams(FingerPortParams, TouchedSurfaceParams):
     """The emulated controller, its robot and the surface under the finger."""
 
     ip: str = param('127.0.0.2', 'Loopback address to listen on; the ports of a UR controller are fixed.')
     version: str = param('5.12', 'Version of the emulated control software.', choices=tuple(VERSIONS))
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
-    )
-    start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
-    surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
-    surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')
-    surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
     slope_x: float = param(0.0, 'Rise of the surface along x, in metres per metre.', low=-1.0, high=1.0)
     slope_y: float = param(0.0, 'Rise of the surface along y, in metres per metre.', low=-1.0, high=1.0)
     bump_height_m: float = param(
@@ -328,15 +319,6 @@ class UrControllerParams:
     friction: float = param(
         0.5, 'Coefficient of Coulomb friction; larger values drag the finger more.', low=0.0, high=3.0
     )
-    wall_m: float = param(
-        2.0,
-        'X coordinate of a wall across the way of the finger, from the centre of the surface.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    wall_stiffness_n_m: float = param(20000.0, 'Stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0)
-    force_offset_n: float = param(1.5, 'Offset of the force sensor until it is zeroed.', unit='N')
     force_noise_n: float = param(0.02, 'Standard deviation of the noise of the force sensor.', unit='N', low=0.0)
     stop_force_n: float = param(
         100.0, 'Force above which the controller goes into a protective stop.', unit='N', low=1.0
@@ -344,13 +326,10 @@ class UrControllerParams:
     unlock_delay_s: float = param(
         5.0, 'How long a protective stop cannot be unlocked after it occurred.', unit='s', low=0.0, high=60.0
     )
-    seed: int = param(1, 'Seed of the noise; equal seeds give equal noise.', low=0)
 
 
 # --------------------
 # The surface under the robot's finger: a plane that may slope and have a bump, elastic and with friction; a wall.
-
-STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
 
 
 class ContactPlane:
@@ -388,9 +367,7 @@ class ContactPlane:
         pressing = self._params.stiffness_n_m * max(0.0, depth)
         if pressing == 0.0:
             return wall
-        along = velocity_m_s - (velocity_m_s @ normal) * normal
-        speed = math.sqrt(along @ along)
-        return wall + pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
+        return wall + pressing * normal + coulomb_n(self.friction, pressing, normal, velocity_m_s)
 
     def _depth_and_normal(self, position_m: Array) -> tuple[float, Array]:
         params = self._params
@@ -999,6 +976,22 @@ class Session:
         """Leave nothing behind."""
 
 
+FIXED_ANSWERS: Mapping[str, str] = {
+    'get serial number': SERIAL_NUMBER,
+    'get robot model': 'UR5',
+    'is in remote control': 'true',
+    'robotmode': 'Robotmode: RUNNING',
+    'isprogramsaved': 'true rtde_control',
+    'close safety popup': 'closing safety popup',
+    'close popup': 'closing popup',
+    'popup': 'showing popup',
+    'addtolog': 'Added log message',
+    'power on': 'Powering on',
+    'brake release': 'Brake releasing',
+    'quit': 'Disconnected',
+}
+
+
 class DashboardSession(Session):
     """The conversation on the dashboard."""
 
@@ -1006,9 +999,34 @@ class DashboardSession(Session):
         self, controller: EmulatedController, go_offline: Callable[[float], None], go_silent: Callable[[float], None]
     ) -> None:
         self._controller = controller
-        self._go_offline = go_offline
-        self._go_silent = go_silent
         self._received = b''
+        robot, plane = controller.robot, controller.robot.surface
+        numbers = '.'.join(str(number) for number in controller.version.numbers)
+        self._answers: Mapping[str, str | Callable[[str], str]] = {
+            **FIXED_ANSWERS,
+            'polyscopeversion': f'URSoftware {numbers} (emulated)',
+            'safetystatus': lambda _: f'Safetystatus: {controller.safety.name}',
+            'safetymode': lambda _: f'Safetymode: {controller.safety.name}',
+            'running': lambda _: f'Program running: {str(controller.playing).lower()}',
+            'programstate': self._state,
+            'get loaded program': self._loaded,
+            'load': self._load,
+            'play': self._play,
+            'stop': self._stop,
+            'pause': self._pause,
+            'unlock protective stop': lambda _: 'Protective stop releasing' if controller.unlock() else TOO_EARLY,
+            'emulate protective stop': self._emulate_stop,
+            'emulate offline': partial(_set, go_offline, 'seconds', 'Going offline'),
+            'emulate silence': partial(_set, go_silent, 'seconds', 'Falling silent'),
+            'emulate slow': partial(
+                _set, partial(setattr, controller, 'acknowledge_s'), 'seconds', 'Acknowledging late'
+            ),
+            'emulate speed': partial(_set, partial(setattr, robot, 'speed_share'), 'shares', 'The speed was set'),
+            'emulate drop': partial(_set, partial(setattr, plane, 'drop_m'), 'metres', 'The surface was moved'),
+            'emulate friction': partial(
+                _set, partial(setattr, plane, 'friction'), 'newtons per N', 'The friction was set'
+            ),
+        }
 
     def greeting(self) -> bytes:
         """Return the line with which the server begins."""
@@ -1020,17 +1038,10 @@ class DashboardSession(Session):
         return b''.join(self._answer(line.decode('utf-8', 'replace').strip()).encode() + b'\n' for line in lines)
 
     def _answer(self, line: str) -> str:
-        for command, answer in ANSWERS.items():
+        for command, answer in self._answers.items():
             if line.lower() == command or line.lower().startswith(command + ' '):
-                return answer(self, line[len(command) :].strip())
+                return answer if isinstance(answer, str) else answer(line[len(command) :].strip())
         return f'could not understand: {line}'
-
-    def _safety(self) -> str:
-        return SAFETY_NAMES[self._controller.safety]
-
-    def _version(self, _argument: str) -> str:
-        numbers = '.'.join(str(number) for number in self._controller.version.numbers)
-        return f'URSoftware {numbers} (emulated)'
 
     def _load(self, argument: str) -> str:
         self._controller.loaded = argument
@@ -1059,88 +1070,21 @@ class DashboardSession(Session):
         self._controller.stop_program()
         return 'Stopped'
 
-    def _unlock(self, _argument: str) -> str:
-        return 'Protective stop releasing' if self._controller.unlock() else TOO_EARLY
-
     def _emulate_stop(self, _argument: str) -> str:
         self._controller.protective_stop()
-        return f'Safetystatus: {self._safety()}'
-
-    def _emulate_offline(self, argument: str) -> str:
-        return self._with_seconds(argument, self._go_offline, 'Going offline')
-
-    def _emulate_silence(self, argument: str) -> str:
-        return self._with_seconds(argument, self._go_silent, 'Falling silent')
-
-    def _emulate_slow(self, argument: str) -> str:
-        return self._with_seconds(argument, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
-
-    def _emulate_speed(self, argument: str) -> str:
-        robot = self._controller.robot
-        return self._with_number(argument, partial(setattr, robot, 'speed_share'), 'The speed was set', 'shares')
-
-    def _emulate_drop(self, argument: str) -> str:
-        plane = self._controller.robot.surface
-        return self._with_number(argument, partial(setattr, plane, 'drop_m'), 'The surface was moved', 'metres')
-
-    def _emulate_friction(self, argument: str) -> str:
-        plane = self._controller.robot.surface
-        return self._with_number(argument, partial(setattr, plane, 'friction'), 'The friction was set', 'newtons per N')
-
-    def _with_seconds(self, argument: str, use: Callable[[float], None], done: str) -> str:
-        return self._with_number(argument, use, done, 'seconds')
-
-    @staticmethod
-    def _with_number(argument: str, use: Callable[[float], None], done: str, unit: str) -> str:
-        try:
-            number = float(argument)
-        except ValueError:
-            number = math.nan
-        if not 0 <= number < math.inf:
-            return f"came '{argument}'; a number of {unit} is needed"
-        use(number)
-        return done
+        return f'Safetystatus: {self._controller.safety.name}'
 
 
-Answer = Callable[[DashboardSession, str], str]
-
-
-def _fixed(text: str) -> Answer:
-    return lambda _session, _argument: text
-
-
-ANSWERS: Mapping[str, Answer] = {
-    'polyscopeversion': DashboardSession._version,
-    'get serial number': _fixed(SERIAL_NUMBER),
-    'get robot model': _fixed('UR5'),
-    'is in remote control': _fixed('true'),
-    'robotmode': _fixed('Robotmode: RUNNING'),
-    'safetystatus': lambda session, _argument: f'Safetystatus: {session._safety()}',
-    'safetymode': lambda session, _argument: f'Safetymode: {session._safety()}',
-    'running': lambda session, _argument: f'Program running: {str(session._controller.playing).lower()}',
-    'programstate': DashboardSession._state,
-    'get loaded program': DashboardSession._loaded,
-    'isprogramsaved': _fixed('true rtde_control'),
-    'load': DashboardSession._load,
-    'play': DashboardSession._play,
-    'stop': DashboardSession._stop,
-    'pause': DashboardSession._pause,
-    'unlock protective stop': DashboardSession._unlock,
-    'close safety popup': _fixed('closing safety popup'),
-    'close popup': _fixed('closing popup'),
-    'popup': _fixed('showing popup'),
-    'addtolog': _fixed('Added log message'),
-    'power on': _fixed('Powering on'),
-    'brake release': _fixed('Brake releasing'),
-    'quit': _fixed('Disconnected'),
-    'emulate protective stop': DashboardSession._emulate_stop,
-    'emulate offline': DashboardSession._emulate_offline,
-    'emulate silence': DashboardSession._emulate_silence,
-    'emulate slow': DashboardSession._emulate_slow,
-    'emulate speed': DashboardSession._emulate_speed,
-    'emulate drop': DashboardSession._emulate_drop,
-    'emulate friction': DashboardSession._emulate_friction,
-}
+def _set(use: Callable[[float], None], unit: str, done: str, argument: str) -> str:
+    """Set what a fault switch sets by a number, and return the answer."""
+    try:
+        number = float(argument)
+    except ValueError:
+        number = math.nan
+    if not 0 <= number < math.inf:
+        return f"came '{argument}'; a number of {unit} is needed"
+    use(number)
+    return done
 
 
 # --------------------
@@ -1290,14 +1234,18 @@ PROTOCOL_VERSION = 2
 OUTPUT_RECIPE = 1
 
 
-class InputClaims(dict[str, 'RtdeSession']):
-    """Who writes which input: each may belong to one session only."""
-
-
 class RtdeSession(Session):
-    """The conversation with one client; `package` is what it gets each cycle once it has asked for it."""
+    """The conversation with one client; `package` is what it gets each cycle once it has asked for it.
 
-    def __init__(self, controller: EmulatedController, claims: InputClaims) -> None:
+    Parameters
+    ----------
+    controller
+        Whose variables are read and written.
+    claims
+        Who writes which input, over all sessions: each may belong to one only.
+    """
+
+    def __init__(self, controller: EmulatedController, claims: dict[str, RtdeSession]) -> None:
         self._controller = controller
         self._claims = claims
         self._received = b''
@@ -1459,7 +1407,7 @@ class Server:
     def __init__(self, controller: EmulatedController, ip: str, finger_port: int) -> None:
         self._controller = controller
         self._ip = ip
-        claims = InputClaims()
+        claims: dict[str, RtdeSession] = {}
         self._kinds: dict[int, Callable[[], Session]] = {
             RTDE_PORT: partial(RtdeSession, controller, claims),
             SCRIPT_PORT: partial(ScriptSession, controller),
@@ -1472,7 +1420,7 @@ class Server:
         self._online_ns = 0
         self._offline_s = 0.0  # asked for
         self._silent_until_ns = 0
-        self._finger = FingerReport(controller, finger_port)
+        self._emulator = FingerSender(finger_port)
         self._open()
 
     def run(self, stopped: Callable[[], bool]) -> None:
@@ -1558,7 +1506,10 @@ class Server:
         if not self._silent:
             for connection, session in list(self._sessions.items()):
                 self._send(connection, session.package())
-        self._finger.send()
+        robot = self._controller.robot
+        x, y, z = (robot.pose[:3] - robot.surface.origin).tolist()
+        vx, vy, vz = robot.velocity[:3].tolist()
+        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
 
     def _send(self, connection: socket.socket, data: bytes) -> None:
         """Send all of it, or hang up on a client that does not read."""
@@ -1577,21 +1528,6 @@ class Server:
             self._selector.unregister(connection)
             session.close()
             connection.close()
-
-
-class FingerReport:
-    """Sends the finger state to the emulator in every cycle; nothing if the port is 0."""
-
-    def __init__(self, controller: EmulatedController, port: int) -> None:
-        self._controller = controller
-        self._emulator = FingerSender(port)
-
-    def send(self) -> None:
-        """Send one datagram."""
-        robot = self._controller.robot
-        x, y, z = (robot.pose[:3] - robot.surface.origin).tolist()
-        vx, vy, vz = robot.velocity[:3].tolist()
-        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
 
 
 # --------------------

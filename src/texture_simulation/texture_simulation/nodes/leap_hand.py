@@ -13,10 +13,11 @@ from rclpy.node import Node
 from texture_core.config import param
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
 from texture_simulation.devices.dynamixel import LEAP_FINGERS, EmulatedDynamixelBus, leap_hand
+from texture_simulation.devices.rails import FingerPortParams
 
 
 @dataclass(frozen=True)
-class LeapHandParams:
+class LeapHandParams(FingerPortParams):
     """Where the motors are reached, what they hold, and which finger senses it."""
 
     link: str = param(
@@ -24,12 +25,6 @@ class LeapHandParams:
         'Path of the symbolic link to the emulated hand, which is the device path of the arm.',
     )
     finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
-    )
     stiffness_n_m: float = param(
         2000.0, 'Stiffness of fingertip and object in contact; 0 removes the object.', unit='N/m', low=0.0
     )

@@ -12,22 +12,16 @@ from rclpy.node import Node
 
 from texture_core.config import param
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+from texture_simulation.devices.rails import EmulatedRails, FingerPortParams, RailsMachine
 
 
 @dataclass(frozen=True)
-class RailsLinkParams:
+class RailsLinkParams(FingerPortParams):
     """Where the rails are reached, and whom they tell where the finger is."""
 
     link: str = param(
         '/tmp/texture/rails',
         'Path of the symbolic link to the emulated rails, which is the device path of the arm.',
-    )
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
     )
 
 

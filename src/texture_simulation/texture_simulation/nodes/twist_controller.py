@@ -18,6 +18,7 @@ from rclpy.node import Node
 from texture_core.config import param
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, on_change, run
 from texture_core.types import FingerSender
+from texture_simulation.devices.rails import FingerPortParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 COMMANDED_S = 0.3  # who commands an arm that moves does so more often
@@ -25,7 +26,7 @@ LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
 
 
 @dataclass(frozen=True)
-class ControllerTopicParams:
+class ControllerTopicParams(FingerPortParams):
     """Names of the topics and frames, which are those of `ur_robot_driver` by default."""
 
     twist_topic: str = param('twist_controller/twist', 'Topic of the commanded velocities.')
@@ -55,12 +56,6 @@ class ControllerTopicParams:
     )
     stamp_when_sent: bool = param(
         False, 'Stamps a delayed force when it is published; false stamps it when it was measured.'
-    )
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
     )
 
 
