@@ -725,21 +725,26 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
     """
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
         raise InvalidParameter(f'{where}: {cls!r} is no class with parameters; name a dataclass')
+    return cls(**_read(cls, values, where, _checked))
+
+
+def _read(cls: type, values: Any, where: str, check: Callable[[Parameter, Any, str], Any]) -> dict[str, Any]:
+    """Return what the parameters of a dataclass take of a mapping, each value checked."""
     known = {parameter.name: parameter for parameter in parameters_of(cls)}
     place = f'{where}: ' if where else ''
     if not isinstance(values, Mapping):
         raise InvalidParameter(f'{place}came {safe_repr(values)}; a mapping of parameter names to values is needed')
-    return cls(**{name: _checked(known, name, value, place) for name, value in values.items()})
+    for name in values:
+        if name not in known:
+            raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
+    return {name: check(known[name], value, where) for name, value in values.items()}
 
 
-def _checked(known: Mapping[str, Parameter], name: str, value: Any, place: str) -> Any:
-    """Return the value that a parameter takes; InvalidParameter, with the place, if there is no such parameter."""
-    if name not in known:
-        raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
+def _checked(parameter: Parameter, value: Any, where: str) -> Any:
     try:
-        return known[name].check(value)
-    except (InvalidParameter, UnknownName) as error:
-        raise InvalidParameter(f'{place}{error}') from error
+        return parameter.check(value)
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{where}: {error}' if where else str(error)) from error
 
 
 def markdown_table(cls: type) -> str:
@@ -780,15 +785,7 @@ def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
     InvalidParameter
         If a name is unknown (with the nearest known one), or a value has the wrong type or range.
     """
-    values = {} if values is None else values
-    if not isinstance(values, Mapping):
-        raise InvalidParameter(f'{where}: came {safe_repr(values)}; a mapping of parameter names to values is needed')
-    known = {parameter.name: parameter for parameter in parameters_of(cls)}
-    read = {}
-    for name, value in values.items():
-        if name not in known:
-            raise InvalidParameter(f'{where}: {unknown_name(str(name), known, "parameter")}')
-        read[name] = _value(known[name], value, where)
+    read = _read(cls, {} if values is None else values, where, _value)
     try:
         return cls(**read)
     except InvalidParameter as error:
@@ -801,10 +798,7 @@ def _value(parameter: Parameter, value: Any, where: str) -> Any:
         return tree_from_mapping(kind, value, f'{where}, {parameter.name}')  # type: ignore[arg-type]
     if typing.get_origin(kind) in (Mapping, dict):
         return _values_by_name(parameter, value, where)
-    try:
-        return parameter.check(_as_text(kind, value))
-    except InvalidParameter as error:
-        raise InvalidParameter(f'{where}: {error}') from error
+    return _checked(parameter, _as_text(kind, value), where)
 
 
 def _values_by_name(parameter: Parameter, value: Any, where: str) -> dict[str, Any]:

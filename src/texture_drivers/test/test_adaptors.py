@@ -143,11 +143,6 @@ def test_a_bridge_tells_what_it_misses_and_that_nobody_knows_what_was_missed_bef
     assert (values['lost'], values['lost before the start']) == (198, 'unknown')
 
 
-def test_a_message_package_that_is_missing_is_reported_in_one_sentence(kth_graph: LocalGraph) -> None:
-    with pytest.raises(InvalidParameter, match=r'cannot be imported .*build the package'):
-        kth_graph.add(BiotacAdaptor, message_type='no_such_msgs/msg/BioTacHand')
-
-
 def test_a_message_of_unknown_layout_is_reported_with_the_known_ones(kth_graph: LocalGraph) -> None:
     with pytest.raises(UnknownName, match='BioTacHand, BiotacAll'):
         kth_graph.add(BiotacAdaptor, message_type='biotac_sensors/msg/BioTacFoot')

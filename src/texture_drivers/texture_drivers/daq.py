@@ -12,7 +12,7 @@ import numpy as np
 from texture_core.config import from_mapping, param, safe_repr
 from texture_core.errors import InvalidParameter
 from texture_drivers.sensor import SensorParams, read_settings
-from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder
+from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder, baud_param
 
 # --------------------
 # Numbers of the data acquisition finger.
@@ -46,12 +46,7 @@ class DaqChannel:
 class DaqSettings:
     """Parameters of the analogue-to-digital converter."""
 
-    baud: int = param(
-        BAUD,
-        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
-        low=9600,
-        high=12_000_000,
-    )
+    baud: int = baud_param(BAUD)
     rate_hz: float = param(
         RATE_HZ,
         'Nominal sampling rate of every channel; it must equal that of the device.',

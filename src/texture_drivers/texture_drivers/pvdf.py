@@ -14,7 +14,7 @@ from texture_core.config import param
 from texture_core.types import Samples, TactileSignal
 from texture_drivers.health import Limits
 from texture_drivers.sensor import SensorParams, load_settings
-from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder
+from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecoder, baud_param
 
 # --------------------
 # A piezoelectric film in its amplifier: charge follows the force, and leaks away.
@@ -132,12 +132,7 @@ COULOMB_PC = 1e12
 class PvdfSettings:
     """Parameters of the PVDF film, its amplifier and the force sensor."""
 
-    baud: int = param(
-        BAUD,
-        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
-        low=9600,
-        high=12_000_000,
-    )
+    baud: int = baud_param(BAUD)
     film_rate_hz: float = param(
         FILM_RATE_HZ,
         'Nominal sampling rate of the film; it must equal that of the device.',

@@ -18,6 +18,7 @@ import serial
 from numpy.typing import NDArray
 from serial.tools import list_ports
 
+from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
 from texture_core.types import NANOSECONDS, Array, TactileSignal
@@ -73,6 +74,16 @@ class FramedStream:
 PORT_ERRORS = (serial.SerialException, OSError, termios.error)
 MAX_BYTES = 65536  # at once
 MODEM_SETTLE_S = 0.2  # the vendor's pause between raising DTR and the first command
+
+
+def baud_param(default: int) -> Any:
+    """Return the parameter `baud` of a sensor on a line."""
+    return param(
+        default,
+        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        low=9600,
+        high=12_000_000,
+    )
 
 
 class SerialPort:

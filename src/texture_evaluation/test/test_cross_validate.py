@@ -23,7 +23,6 @@ from texture_evaluation.cross_validation import (
     compare_all,
     cross_validate,
     interval,
-    mcnemar,
     parse_split,
     slide_counts,
     split_slides,
@@ -261,13 +260,6 @@ def cross_validation(recipe: str, *folds: list[bool]) -> CrossValidation:
         }
         made.append(FoldResult(str(fold), (), results, None, 0.0))
     return CrossValidation(recipe, ('cork', 'felt'), tuple(made))
-
-
-def test_the_exact_test_gives_the_binomial_probability() -> None:
-    # Of 8 coins at most one, or at least seven, shows heads: 2·(1 + 8)/2⁸.
-    assert mcnemar(1, 7) == pytest.approx(18 / 256)
-    assert mcnemar(7, 1) == mcnemar(1, 7)
-    assert mcnemar(0, 0) == mcnemar(5, 5) == 1.0
 
 
 def test_a_comparison_counts_the_slides_that_the_one_alone_recognises() -> None:

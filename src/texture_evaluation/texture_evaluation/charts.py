@@ -113,14 +113,8 @@ def draw_confusion(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
     axes.set_yticks(range(len(labels)), labels)
     axes.set(xlabel='taken for', ylabel='surface under the finger')
     axes.figure.colorbar(image, ax=axes, label='windows of the surface (%)', fraction=0.046)
-    if len(labels) <= MANY:
-        _write_shares(axes, percent)
-
-
-def _write_shares(axes: Any, percent: AnyArray) -> None:
-    """Write the shares of half a percent and more into the cells."""
     size = 8 if len(percent) <= 12 else 6
-    for row, column in np.argwhere(percent >= 0.5):
+    for row, column in np.argwhere(percent >= 0.5) if len(labels) <= MANY else ():
         value = percent[row, column]
         colour = 'white' if value > 60 else 'black'
         axes.text(column, row, f'{value:.0f}', ha='center', va='center', fontsize=size, color=colour)

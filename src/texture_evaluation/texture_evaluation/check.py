@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from texture_core.config import writing
+from texture_core.config import write_json
 from texture_core.errors import InvalidData
 from texture_core.types import Array, Phase
 from texture_estimation.few_shot import DAY_SUFFIX, adapted
@@ -84,7 +82,7 @@ def check_finger(
     today = statistics_of(slide, topics)
     path = file_beside(model, REFERENCE)
     if store:
-        _write(path, {topic: one.as_mapping() for topic, one in today.items()})
+        write_json({topic: one.as_mapping() for topic, one in today.items()}, path)
         return True, f"the slide is stored as the reference of the finger, '{path}'"
     reference = read_reference(model)
     if missing := sorted(set(topics) - set(reference)):
@@ -100,7 +98,7 @@ def check_finger(
     sentence = f'the finger is not as trained: {"; ".join(faults)}'
     if not correct:
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
-    _write(correction, Correction.of(found).as_mapping())
+    write_json(Correction.of(found).as_mapping(), correction)
     return False, f"{sentence}. The model is corrected, '{correction}': start it again, with its card as the recipe"
 
 
@@ -110,11 +108,6 @@ def _numbers(found: Mapping[str, InputComparison]) -> str:
         f'× {one.noise_ratio:.1f}, drift {one.drift:.1f} rms'
         for topic, one in found.items()
     )
-
-
-def _write(path: Path, content: Mapping[str, Any]) -> None:
-    with writing(path):
-        path.write_text(json.dumps(content), encoding='utf-8')
 
 
 def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> tuple[Path, str]:

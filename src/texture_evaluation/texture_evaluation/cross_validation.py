@@ -533,11 +533,7 @@ def parse_split(text: str, seed: int = 0) -> Split:
         raise InvalidParameter(f"the split is '{text}': {error}; {ALLOWED}") from error
 
 
-def _stratified(name: str, argument: str, seed: int) -> Split:
-    return Split(name, StratifiedGroupKFold(int(argument or 5), shuffle=True, random_state=seed))
-
-
-def _leave_one_out(name: str, argument: str, seed: int) -> Split:
+def _leave_one_out(name: str, argument: str) -> Split:
     condition, _, parts = argument.partition(':')
     of_place = condition == 'place'
     count = int(parts or 2) if of_place else 1
@@ -547,19 +543,15 @@ def _leave_one_out(name: str, argument: str, seed: int) -> Split:
     return Split(name, LeaveOneGroupOut(), condition, count)
 
 
-def _chronological(name: str, argument: str, seed: int) -> Split:
-    return Split(name, ChronologicalSplit(float(argument or 0.75)))
-
-
-def _random(name: str, argument: str, seed: int) -> Split:
-    return Split(name, GroupShuffleSplit(int(argument or 20), test_size=TEST_SIZE, random_state=seed))
-
-
 SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
-    'stratified': _stratified,
-    'leave-one-out': _leave_one_out,
-    'chronological': _chronological,
-    'random': _random,
+    'stratified': lambda name, folds, seed: Split(
+        name, StratifiedGroupKFold(int(folds or 5), shuffle=True, random_state=seed)
+    ),
+    'leave-one-out': lambda name, condition, _seed: _leave_one_out(name, condition),
+    'chronological': lambda name, share, _seed: Split(name, ChronologicalSplit(float(share or 0.75))),
+    'random': lambda name, splits, seed: Split(
+        name, GroupShuffleSplit(int(splits or 20), test_size=TEST_SIZE, random_state=seed)
+    ),
 }
 ALLOWED = (
     f'write stratified:FOLDS, leave-one-out:CONDITION ({", ".join(CONDITIONS)}; place:PARTS), '

@@ -17,7 +17,6 @@ from texture_core.types import NANOSECONDS, FingerState, TactileSignal, lost_sam
 from texture_drivers.pvdf import Pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import Tsf85
-from texture_simulation.devices.fingers import ByteFaults
 from texture_simulation.emulator import LIVE_SENSORS, Emulator, EmulatorParams
 from texture_simulation.path import straight
 from texture_simulation.scene import load_scene
@@ -107,21 +106,6 @@ def test_the_sample_can_be_swapped_while_the_finger_slides(emulator: Emulator, s
     with pytest.raises(UnknownName, match="did you mean 'glass'"):
         emulator.set_surface('glas')
     assert emulator.surface == 'glass'
-
-
-def test_a_bad_line_costs_samples_and_every_one_is_counted(emulator: Emulator, sensor: Tsf85) -> None:
-    read(sensor, 200)
-    emulator.device.faults = ByteFaults(drop=1e-3)
-    batches = read(sensor, 3000)
-    emulator.device.faults = ByteFaults()
-    batches += read(sensor, 200)
-    lost = lost_samples(batches) - emulator.counts['skipped samples']  # what a machine that stalls leaves out
-    share = lost / (batches[-1].next_sample - batches[0].first_sample)
-    # A packet has 47 bytes, so 1 − 0.999^47 = 4.6 % are hit; each may take its forerunner or successor along.
-    assert 0.02 < share < 0.1
-    assert sensor.counts['bogus'] > 0
-    span_s = (batches[-1].stamp_ns - batches[0].stamp_ns) / 1e9
-    assert (batches[-1].first_sample - batches[0].first_sample) / 1000 == pytest.approx(span_s, abs=0.01)
 
 
 def test_a_device_that_is_silent_after_opening_is_woken(emulator: Emulator, tmp_path: Path) -> None:

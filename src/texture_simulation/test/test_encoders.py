@@ -8,7 +8,6 @@ import pytest
 
 from texture_core.framing import FrameDecoder
 from texture_drivers.biotac import LAYOUTS, decode, sampling_command
-from texture_drivers.tsf85 import SIGNAL, FingerStream, SampleFrameSplitter, Tsf85Parser
 from texture_simulation.devices.fingers import (
     SampledStream,
     Tsf85Encoder,
@@ -96,22 +95,3 @@ def test_new_firmware_sends_an_image_once() -> None:
     came = b''.join(encoder.packets(0, np.zeros(3, dtype=np.int16), IMAGE, image_is_new=True))
     assert came.startswith(bytes.fromhex(f'9A 00 58 39 10 {IMAGE_HEX} 9A'))
     assert came.count(bytes.fromhex(IMAGE_HEX)) == 1
-
-
-def test_without_stamps_the_index_jumps_over_lost_packets_and_the_times_are_right_again() -> None:
-    encoder, parser, splitter, finger = (
-        Tsf85Encoder(stamped=False),
-        Tsf85Parser(),
-        SampleFrameSplitter(0),
-        FingerStream(),
-    )
-    errors_ms: dict[int, float] = {}
-    for first_ms in range(0, 6000, 10):
-        packets = list(encoder.packets(first_ms, np.arange(first_ms, first_ms + 10, dtype=np.int16), IMAGE, False))
-        data = b'' if 3000 <= first_ms < 3200 else b''.join(packets)
-        for batch in finger.place(splitter.frames(parser.feed(data)), (first_ms + 10) * 1_000_000).get(SIGNAL, []):
-            sent_ms = int(batch.samples[0, 0])
-            errors_ms[sent_ms] = batch.stamp_ns / 1e6 - sent_ms
-    assert max(abs(error) for ms, error in errors_ms.items() if ms < 3000) < 2.0
-    assert max(abs(error) for ms, error in errors_ms.items() if ms > 3800) < 2.0
-    assert finger.cutter.lost == pytest.approx(200, abs=2)

@@ -269,15 +269,3 @@ def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, hos
     for _ in range(200):
         device.advance(TEN_MS, NO_IMAGE)
     assert device.dropped_bytes > 50_000
-
-
-def test_unplugging_breaks_the_port_and_removes_the_link(device: EmulatedTsf85, host: Host, tmp_path: Path) -> None:
-    device.unplug()
-    device.unplug()
-    with pytest.raises(OSError, match='Input/output'):
-        os.write(host.end, START)
-    assert not os.path.lexists(tmp_path / 'new' / 'tsf85')
-    device.advance(TEN_MS, NO_IMAGE)
-    device.plug()
-    assert (tmp_path / 'new' / 'tsf85').exists()
-    assert not device.streaming

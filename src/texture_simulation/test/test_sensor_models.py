@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -20,8 +19,6 @@ from texture_simulation.scene import Contact, Scene, scene_from
 from texture_simulation.sensor_models import BIOTAC_PATH_RATE_HZ as PATH_RATE_HZ
 from texture_simulation.sensor_models import COLUMNS, ELECTRODE_PITCH_M, PA_PER_N, PDC_PA, BioTacModel, Tsf85Model
 from texture_simulation.sensor_models import ELECTRODE_BASELINE as BASELINE
-from texture_simulation.sensor_models import TSF85_OVERSAMPLING as OVERSAMPLING
-from texture_simulation.sensor_models import TSF85_PATH_RATE_HZ as TSF85_RATE_HZ
 
 BIOTAC = LAYOUTS['biotac']
 PITCH_M = 1e-3
@@ -62,16 +59,6 @@ def test_touching_cools_the_finger() -> None:
     assert slow(values, 'tac')[10] < slow(values, 'tac')[-1]  # the flow of heat ebbs away
 
 
-def test_cutting_the_path_into_blocks_changes_nothing() -> None:
-    path = slide(40, speed_m_s=0.05)
-    whole = model('ridges').advance(path)
-    pieces, parts = model('ridges'), []
-    for first in range(0, 40, 8):
-        points = np.arange(first * len(BIOTAC.slots), (first + 8) * len(BIOTAC.slots))
-        parts.append(pieces.advance(path.at(points)))
-    assert (np.concatenate(parts) == whole).all()
-
-
 SPEED_M_S = 0.05  # over ridges of 1 mm: 50 Hz
 
 
@@ -85,11 +72,6 @@ def scene() -> Scene:
 def slide_at(rate_hz: float, seconds: float, speed_m_s: float = SPEED_M_S, force_n: float = 1.0) -> Trajectory:
     x_m = np.arange(round(seconds * rate_hz)) / rate_hz * speed_m_s
     return Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
-
-
-def peak_hz(samples: np.ndarray, rate_hz: float) -> float:
-    spectrum = np.abs(np.fft.rfft((samples - samples.mean()) * np.hanning(len(samples))))
-    return float(np.fft.rfftfreq(len(samples), 1 / rate_hz)[spectrum.argmax()])
 
 
 def test_films_forget_a_constant_force_and_gauges_do_not(scene: Scene) -> None:
@@ -133,32 +115,6 @@ def test_the_force_sensor_reports_the_force_in_newtons_at_64_hz(scene: Scene) ->
     assert force[-1] * tables.FORCE_N_PER_COUNT == pytest.approx(1.5, abs=0.01)
 
 
-@pytest.mark.parametrize('parts', [2, 7])
-def test_blocks_give_the_same_as_the_whole(scene: Scene, parts: int) -> None:
-    path = slide_at(pvdf.PVDF_PATH_RATE_HZ, 0.5)
-    cuts = np.linspace(0, len(path) // 2, parts + 1).astype(int) * 2
-    pieces = [path.at(np.arange(a, b)) for a, b in itertools.pairwise(cuts)]
-    for kind in (pvdf.PvdfModel, daq.DaqModel):
-        whole = kind(scene, scene.surface('ridges'), np.random.default_rng(0)).advance(path)
-        model = kind(scene, scene.surface('ridges'), np.random.default_rng(0))
-        found = [model.advance(piece) for piece in pieces]
-        if isinstance(whole, tuple):
-            for i, values in enumerate(whole):
-                np.testing.assert_array_equal(np.concatenate([piece[i] for piece in found]), values)
-        else:
-            np.testing.assert_array_equal(np.concatenate(found), whole)
-
-
-COARSE_M = 1.5e-3
-
-
-def scene_of(angle_rad: float = 0.0, noise_count: float = 0.0) -> Scene:
-    term = {'kind': 'grating', 'pitch_m': COARSE_M, 'depth_m': 1e-4, 'angle_rad': angle_rad}
-    rough = {'kind': 'self_affine', 'seed': 5}
-    effects = {'patch_growth': {}, 'force_gain': {}, 'noise': {'fast_count': noise_count, 'slow_count': 0.0}}
-    return scene_from('test', {'surfaces': {'sine': [term], 'rough': [rough]}, 'effects': effects})
-
-
 def recorded(scene: Scene, speed_m_s: float, surface: str = 'sine', seed: int = 0, force_n: float = 2.0):
     sliding = SimulatedSlide(speed_m_s, force_n, 2.0)
     return simulate_slide_streams(scene, surface, 1, sliding, np.random.default_rng(seed))['signal'][0, :, 0]
@@ -168,20 +124,6 @@ def test_too_strong_a_vibration_is_clipped_as_by_the_converter() -> None:
     scene = scene_from('t', {'surfaces': {'deep': [{'kind': 'grating', 'pitch_m': 2e-3, 'depth_m': 5e-3}]}})
     signal = recorded(scene, 0.2, 'deep')
     assert (signal.min(), signal.max()) == (-32768, 32767)
-
-
-def test_blocks_of_any_length_join_without_a_trace() -> None:
-    n_points = 1200
-    x_m = 0.1 * np.arange(n_points) / TSF85_RATE_HZ
-    path = Trajectory(x_m, 0 * x_m, np.full(n_points, 2.0))
-    scene = scene_of()
-    whole = Tsf85Model(scene, scene.surface('rough'), np.random.default_rng(3)).advance(path)
-    pieces = Tsf85Model(scene, scene.surface('rough'), np.random.default_rng(3))
-    ends = np.cumsum([0, 7, 5, 100, 1, 287, 200]) * OVERSAMPLING
-    joined = [pieces.advance(path.at(np.arange(a, b))) for a, b in itertools.pairwise(ends)]
-    # The blur sums as many harmonics as a block needs: not to the last bit the same.
-    assert np.allclose(np.concatenate([dynamic for dynamic, _ in joined]), whole[0], atol=1)
-    assert np.array_equal(np.concatenate([images for _, images in joined]), whole[1])
 
 
 def test_the_image_rises_where_and_as_hard_as_the_finger_presses() -> None:

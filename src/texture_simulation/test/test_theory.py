@@ -172,3 +172,19 @@ def test_the_level_of_a_sample_varies_slowly_by_the_strength_of_its_variation():
     levels = np.log(height[1.0].reshape(200, 100).std(axis=1))  # of 5 mm each
     assert 0.15 < levels.std() < 0.6
     assert np.corrcoef(levels[1:], levels[:-1])[0, 1] > 0.5  # from one to the next it hardly changes
+
+
+@pytest.mark.parametrize('sensor', SENSORS)
+def test_a_path_in_blocks_is_measured_like_the_whole(sensor: str) -> None:
+    scene = scene_from('blocks', {'sensor': sensor, 'surfaces': {'rough': [ROUGH]}})
+    kind = SENSORS[sensor]
+    steps = round(0.5 * kind.path_rate_hz / kind.step_points)
+    x_m = 0.05 / kind.path_rate_hz * np.arange(steps * kind.step_points)
+    path = Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, 2.0))
+    whole, pieces = (kind.make(scene, scene.surface('rough'), np.random.default_rng(3)) for _ in range(2))
+    ends = kind.step_points * np.array([0, 1, steps // 7, steps // 2, steps])
+    parts = [pieces.streams(path.at(slice(a, b))) for a, b in itertools.pairwise(ends.tolist())]
+    for topic, samples in whole.streams(path).items():
+        joined = np.concatenate([part[topic] for part in parts])
+        # The blur sums as many harmonics as a block needs: not to the last bit the same.
+        np.testing.assert_allclose(joined, samples, atol=0.05 * samples.std())

@@ -22,7 +22,6 @@ from texture_simulation.devices.ur import (
     RtdeSession,
     SafetyMode,
     ScriptCommand,
-    ScriptSession,
     SpeedMove,
     UrControllerParams,
 )
@@ -319,12 +318,3 @@ def test_a_surface_that_drops_is_not_touched_any_more_until_it_is_back(served):
         dashboard.receive(b'emulate drop ' + drop + b'\n')
         forces.append(float(plane.force_n(pressed, np.zeros(3))[2]))
     assert forces == [pytest.approx(2.0), 0.0, pytest.approx(2.0)]
-
-
-def test_a_script_starts_when_its_last_line_is_there(served):
-    script = ScriptSession(served)
-    script.receive(b'def rtde_control():\n  if True:\n')
-    script.receive(b'  end\nend\n')
-    for _ in range(50):
-        served.tick()
-    assert served.playing

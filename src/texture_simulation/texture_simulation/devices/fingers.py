@@ -764,18 +764,15 @@ class Tsf85Encoder:
         The finger that senses, 0 or 1.
     long_stamps
         64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
-    stamped
-        Whether there are stamps at all.
     """
 
-    def __init__(self, finger: int = 0, long_stamps: bool = True, stamped: bool = True) -> None:
+    def __init__(self, finger: int = 0, long_stamps: bool = True) -> None:
         self._finger = finger
         self._plugged = (True,) * FINGERS
         self._long_stamps = long_stamps
-        self._stamped = stamped
         self._stamp_type = '>u8' if long_stamps else '>u2'
         self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
-        self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize) if stamped else slice(4, 4)
+        self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize)
 
     def plug(self, plugged: Sequence[bool]) -> None:
         """Send items of the fingers that are plugged in alone, one flag a finger."""
@@ -783,7 +780,7 @@ class Tsf85Encoder:
         self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
 
     def _resting_packet(self) -> bytes:
-        items = b'\x70' + bytes(8 if self._long_stamps else 2) if self._stamped else b''
+        items = b'\x70' + bytes(8 if self._long_stamps else 2)
         for finger in self._present:
             head = finger << 2
             items += bytes([0x20 | head, 0, 0])
@@ -811,8 +808,7 @@ class Tsf85Encoder:
         """
         rows = np.tile(self._template, (len(dynamic), 1))
         stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
-        if self._stamped:
-            rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
+        rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
         for finger, counts in self._by_finger(dynamic.T):
             at = self._stamp_at.stop + self._present.index(finger) * 17 + 1
             rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
