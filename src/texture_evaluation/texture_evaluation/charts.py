@@ -76,6 +76,7 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '', points: 
     Figure
         To be drawn into.
     """
+    # Not pyplot, which would keep every figure and ask for a display.
     with mpl.rc_context({**STYLE, 'font.size': points, 'axes.titlesize': points + 1.0}):
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)

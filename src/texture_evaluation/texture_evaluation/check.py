@@ -52,6 +52,7 @@ def _at_rest(slide: LabelledSlide, topic: str) -> Array:
     approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
     touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
     batches = slide.signals[topic]
+    # The rest ends where the approach does; without an approach nobody knows what was rest.
     until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
     rest = [one.samples for one in batches if one.end_ns <= until_ns]
     return np.concatenate(rest).astype(np.float64) if rest else np.empty((0, len(batches[0].channels)))
@@ -91,6 +92,7 @@ def check_finger(
     faults = [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
     correction = file_beside(model, CORRECTION)
     if not faults:
+        # Of a finger that is as trained a correction would make another one.
         removed = correct and correction.exists()
         if removed:
             correction.unlink()

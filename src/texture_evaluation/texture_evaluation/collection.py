@@ -110,6 +110,7 @@ class PlacePlan:
         """Return the next touch."""
         number, params = len(self._middles), self._params
         found = self._candidates(CANDIDATES)
+        # The constructor has seen that some fit; on a narrow patch few of a draw do.
         while not found:
             found = self._candidates(CANDIDATES)
         best = max(found, key=lambda one: min((math.dist(one[3], other) for other in self._middles), default=0.0))
@@ -142,7 +143,7 @@ class PlacePlan:
 
 
 def _between(low: float, high: float, share: float) -> float:
-    return float(low * (high / low) ** share)
+    return float(low * (high / low) ** share)  # equal ratios apart, not equal steps
 
 
 # --------------------
@@ -276,10 +277,12 @@ def collect(
                     return ended(CollectionError.MOTION_FAILED, last)
                 continue
             slides, failures = slides + 1, 0
+            # Each judgement trains once for each place; the first and the last possible end are always judged.
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
             accuracy = evaluate_all(slides)
             tell(accuracy.sentence, slides)
+            # The first surface of a folder has nothing to be told from.
             met = accuracy.bound >= params.bound if accuracy.others else True
             if slides >= params.places and met:
                 return ended(CollectionError.NONE, accuracy.sentence)

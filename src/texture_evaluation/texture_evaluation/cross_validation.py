@@ -86,6 +86,7 @@ def interval(counts: Array) -> list[float]:
     if right in (0.0, answers):
         edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
         return [edge, 1.0] if right else [0.0, 1.0 - edge]
+    # Always the same resamples: the figures of a page do not change from run to run.
     drawn = np.random.default_rng(0).integers(len(counts), size=(RESAMPLES, len(counts)))
     sums = counts[drawn].sum(axis=1)
     edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
@@ -175,6 +176,7 @@ class ChronologicalSplit:
                 raise InvalidData(
                     f"'{label}' has a single slide; a chronological split needs two or more slides of each surface"
                 )
+            # A surface that is on one side only would be an impossible test, or none.
             count = min(max(round(self.train_size * len(order)), 1), len(order) - 1)
             tests[rows] = np.isin(slides[rows], order[count:])
         yield np.flatnonzero(~tests), np.flatnonzero(tests)
@@ -333,6 +335,7 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
         np.stack([_counts(result, slides, of_windows=of_windows) for result in (first, second)])
         for of_windows in (False, True)
     )
+    # A slide may be tested in several folds, and half right is not recognised.
     recognised = right[..., 0] > 0.5 * right[..., 1]
     only_first, only_second = (int((recognised[a] & ~recognised[b]).sum()) for a, b in ((0, 1), (1, 0)))
     p_value = mcnemar(only_first, only_second)
@@ -360,6 +363,7 @@ def compare_all(results: Sequence[CrossValidation]) -> list[PairedComparison]:
     order = np.argsort([one.p_value for one in compared], kind='stable')
     adjusted, least = [1.0] * len(compared), 0.0
     for rank, index in enumerate(order.tolist()):
+        # A larger p value never gets a smaller adjusted one.
         least = max(least, min(1.0, (len(compared) - rank) * compared[index].p_value))
         adjusted[index] = least
     return [replace(one, p_value_adjusted=p_value) for one, p_value in zip(compared, adjusted, strict=True)]
@@ -401,6 +405,7 @@ def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool)
 def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
     """Return second minus first share, and its interval; `counts` is (2, n_slides, 2)."""
     shares = counts.sum(axis=1)
+    # Both recipes on the same resampled slides: what is hard for both widens no interval.
     rows = np.random.default_rng(0).integers(counts.shape[1], size=(RESAMPLES, counts.shape[1]))
     sums = counts[:, rows].sum(axis=2)
     drawn = sums[..., 0] / sums[..., 1]
@@ -610,6 +615,7 @@ def _of_other_slides(
     if not np.isin(wholes[test], wholes[train]).any():
         yield train, test
         return
+    # Every other slide by its number: sensors drift, and both halves span the whole time.
     order: dict[str, dict[int, int]] = {}  # of the numbers of each surface
     for slide in sorted(dataset, key=lambda slide: slide.number):
         order.setdefault(slide.surface, {}).setdefault(slide.number, len(order[slide.surface]))
@@ -635,7 +641,7 @@ def refuse_untrained(labels: AnyArray, splits: Sequence[tuple[NDArray[np.intp], 
     """
     sides = [(set(labels[train].tolist()), set(labels[test].tolist())) for train, test in splits]
     if any(len(trained) < 2 for trained, _ in sides):
-        return
+        return  # the training says it better: it names the fold
     possible = {label for trained, tested in sides for label in trained & tested}
     untrained = sorted({label for _, tested in sides for label in tested} - possible)
     if untrained:
@@ -798,7 +804,7 @@ def _fold_there(
 ) -> tuple[FoldResult, set[str]]:
     """Return a fold, computed where the slides are read, and the names of all slides that have windows."""
     features = _KEPT.get(key) or FoldFeatures.of(recipe, source())
-    _KEPT.clear()
+    _KEPT.clear()  # those of one recipe alone: they bound the memory of a worker
     _KEPT[key] = features
     train, test, name = fold
     result, _ = _fold(recipe, features.trained.of_slides(train), features.tested.of_slides(test), train, name)
@@ -809,6 +815,7 @@ def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str,
     """Return what a model says of each slide, by its name, window by window as on the robot."""
     results = {}
     for slide in dict.fromkeys(features.groups.tolist()):
+        # The empty last vector closes the evidence as on the robot.
         *windows, end = features.vectors(slide)
         evidence = EvidenceAccumulator(model)
         estimates = [evidence.update(vector) for vector in windows]
@@ -821,7 +828,7 @@ def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str,
 def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> str:
     left_out = np.unique(groups[test_rows])
     if len(left_out) != 1 or len(test_rows) < 2:
-        return str(number)
+        return str(number)  # the name of a single slide says nothing of the fold
     return f'{left_out[0]:g}' if np.issubdtype(left_out.dtype, np.number) else str(left_out[0])
 
 
@@ -829,7 +836,7 @@ def _fold(
     recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: AnyArray, name: str
 ) -> tuple[FoldResult, set[str]]:
     """Return what a fold gave, and the names of its test slides that have windows."""
-    start = time.process_time()
+    start = time.process_time()  # not the wall clock: other folds share the machine
     try:
         model = train(recipe, trained)
     except InvalidData as error:

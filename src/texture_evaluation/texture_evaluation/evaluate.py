@@ -179,6 +179,7 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
     used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
         _check_features(model, slide, vector)
+        # A window without a usable value adds no evidence, and counts nowhere.
         if estimate.windows > before and not vector.last:
             used.append(vector.values)
             received.append(estimate)

@@ -54,6 +54,7 @@ class SlideResult:
         """Return the estimate after so much sliding; None if the slide has less or the first window is longer."""
         if not self.estimates or self.estimates[-1].evidence_s < seconds - TOLERANCE_S:
             return None
+        # Windows may be longer than the time asked for.
         received = [estimate for estimate in self.estimates if estimate.evidence_s <= seconds + TOLERANCE_S]
         return received[-1] if received else None
 
@@ -113,8 +114,9 @@ def calibration_error(results: Sequence[SlideResult]) -> float:
     if not reported:
         return 0.0
     confidence, right = np.array(reported, dtype=np.float64).T
+    # A confidence of 1 belongs to the last bin.
     bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
-    gaps = np.bincount(bins, confidence - right)
+    gaps = np.bincount(bins, confidence - right)  # sums: the weights of the bins are in them
     return float(np.abs(gaps).sum() / len(right))
 
 
@@ -213,6 +215,7 @@ def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
         Share recognised, 0 to 1.
     """
     shortest = min((result.estimates[-1].evidence_s for result in results), default=0.0)
+    # Sums of hops differ in the last digits from slide to slide.
     times = sorted({round(e.evidence_s, 6) for result in results for e in result.decisions})
     times = [seconds for seconds in times if seconds <= shortest + TOLERANCE_S]
     points = [(seconds, accuracy) for seconds in times if (accuracy := accuracy_at(results, seconds)) is not None]

@@ -15,27 +15,9 @@ import yaml
 
 from texture_core.config import writing
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation import search
 from texture_estimation.recipe import Recipe, load_recipe, with_channels
 from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe, read_grades
-from texture_estimation.search import (
-    ClassificationTask,
-    Cut,
-    Finalist,
-    Generation,
-    HalfScore,
-    LabelledWindows,
-    PairSearchResult,
-    RecipeSpace,
-    RoughnessTask,
-    SearchParams,
-    SearchResult,
-    SearchSlides,
-    beside,
-    joined_recipe,
-    optimise,
-    optimise_pairs,
-    space_for,
-)
 from texture_evaluation.charts import COLOURS, chart, line_styles, pareto_front
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowParams
@@ -47,7 +29,7 @@ from texture_recordings.dataset import SlideDataset
 NAMED = 10  # lines of more searches than this are not named
 
 
-def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, path: str | Path) -> Path:
+def convergence_chart(searches: Mapping[str, Sequence[search.Generation]], title: str, path: str | Path) -> Path:
     """Draw the fitness of the best individual over the generations, a line for each search.
 
     Parameters
@@ -106,7 +88,7 @@ def search_front_chart(fronts: Mapping[str, Sequence[tuple[float, float]]], titl
     return Path(path)
 
 
-Tell = Callable[[str, Generation], None]
+Tell = Callable[[str, search.Generation], None]
 
 
 @dataclass(frozen=True)
@@ -150,20 +132,20 @@ def _named_windows(dataset: SlideDataset, plan: FeatureSet) -> Iterator[CutWindo
         yield from (replace(event, exploration_id=slide.name) for event in events if isinstance(event, CutWindow))
 
 
-def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> Cut:
+def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> search.Cut:
     """Return what gives the windows of all slides, by window parameters; each length is cut once."""
 
     @cache
-    def cut(windows: WindowParams) -> LabelledWindows:
+    def cut(windows: WindowParams) -> search.LabelledWindows:
         plan = replace(feature_set, windows=windows, _layouts={})
-        return LabelledWindows.from_events(_named_windows(dataset, plan), feature_set.window_names)
+        return search.LabelledWindows.from_events(_named_windows(dataset, plan), feature_set.window_names)
 
     return cut
 
 
 def optimise_from_bags(
     wanted: Wanted,
-    params: SearchParams,
+    params: search.SearchParams,
     out: str | Path,
     *,
     resume: bool = False,
@@ -204,26 +186,28 @@ def optimise_from_bags(
     space = _space(wanted)
     feature_set = space.base.feature_set
     dataset = SlideDataset.from_bags(wanted.bags, wanted.slides, topics=feature_set.topics)
-    search_slides = SearchSlides(cut_of(dataset, feature_set), params.halves, params.seed)
+    search_slides = search.SearchSlides(cut_of(dataset, feature_set), params.halves, params.seed)
     checkpoint = checkpoint_of(target)
     if resume and not written_checkpoints(target):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
-    found: SearchResult | PairSearchResult
+    found: search.SearchResult | search.PairSearchResult
     if wanted.per_pair:
-        found = optimise_pairs(
+        found = search.optimise_pairs(
             space, search_slides, params, tell=lambda pair, said: tell(' – '.join(pair), said), **options
         )
     else:
-        task = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
-        found = optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
+        task = search.RoughnessTask(read_grades(wanted.grades)) if wanted.grades else search.ClassificationTask()
+        found = search.optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
     written = write_recipes(found, space.base, wanted.recipe, params, target)
     chart = _draw(found, wanted.recipe, params, target.with_suffix('.png'))
     return Written((*written.files, chart), written.lines)
 
 
-def _draw(found: SearchResult | PairSearchResult, recipe: str, params: SearchParams, chart: Path) -> Path:
-    if isinstance(found, PairSearchResult):
+def _draw(
+    found: search.SearchResult | search.PairSearchResult, recipe: str, params: search.SearchParams, chart: Path
+) -> Path:
+    if isinstance(found, search.PairSearchResult):
         histories = {' – '.join(pair): one.history for pair, one in found.by_pair.items()}
         return convergence_chart(histories, f'{recipe}: a search for each pair', chart)
     if params.objective == 'front':
@@ -232,7 +216,7 @@ def _draw(found: SearchResult | PairSearchResult, recipe: str, params: SearchPar
     return convergence_chart({recipe: found.history}, f'{recipe}: the search', chart)
 
 
-def _space(wanted: Wanted) -> RecipeSpace:
+def _space(wanted: Wanted) -> search.RecipeSpace:
     recipe: Recipe | RoughnessRecipe
     if wanted.grades:
         recipe = load_roughness_recipe(wanted.recipe)
@@ -240,14 +224,16 @@ def _space(wanted: Wanted) -> RecipeSpace:
     else:
         recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
         learner = recipe.learner_name
-    of_pairs = space_for('pairs_of', recipe.name) if wanted.per_pair else None
-    name = wanted.search or of_pairs or space_for('recipes', recipe.name) or space_for('learners', learner)
+    of_pairs = search.space_for('pairs_of', recipe.name) if wanted.per_pair else None
+    name = (
+        wanted.search or of_pairs or search.space_for('recipes', recipe.name) or search.space_for('learners', learner)
+    )
     if not name:
         raise InvalidParameter(
             f"recipe '{recipe.name}' has no search space of its own, nor has '{learner}'; "
             'say with --search FILE what is to be varied'
         )
-    return RecipeSpace.load(name, recipe)
+    return search.RecipeSpace.load(name, recipe)
 
 
 # --------------------
@@ -281,7 +267,11 @@ def written_checkpoints(out: str | Path) -> list[Path]:
 
 
 def write_recipes(
-    found: SearchResult | PairSearchResult, base: Any, tuned: str, params: SearchParams, target: Path
+    found: search.SearchResult | search.PairSearchResult,
+    base: Any,
+    tuned: str,
+    params: search.SearchParams,
+    target: Path,
 ) -> Written:
     """Write the best recipe, with the others of a front beside it; of pairs, theirs and the one that joins them.
 
@@ -318,25 +308,27 @@ def write_recipes(
     for path, finalist in files.items():
         _write(finalist.recipe, path, origin, _scores(finalist))
     written = Written(tuple(files), tuple(f'{path}: {_scores(finalist)}' for path, finalist in files.items()))
-    if isinstance(found, PairSearchResult):
+    if isinstance(found, search.PairSearchResult):
         return _with_joined(written, found, base, origin, target)
     return Written((*written.files, checkpoint_of(target)), written.lines)
 
 
-def _with_joined(written: Written, pairs: PairSearchResult, base: Recipe, origin: str, target: Path) -> Written:
+def _with_joined(written: Written, pairs: search.PairSearchResult, base: Recipe, origin: str, target: Path) -> Written:
     """Write the recipe that joins those of the pairs, or say why there is none."""
     together = f'all pairs together, most pairs won: {_shares(pairs.scores)}'
     try:
-        joined = joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
+        joined = search.joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
     except InvalidParameter as error:
         return Written(written.files, (*written.lines, together, f'no recipe of all pairs was written: {error}'))
     _write(joined, target, origin, together)
     return Written((target, *written.files), (*written.lines, f'{target}: {together}'))
 
 
-def _files(found: SearchResult | PairSearchResult, target: Path, *, front: bool) -> Mapping[Path, Finalist]:
-    if isinstance(found, PairSearchResult):
-        return {beside(target, pair): one.best for pair, one in found.by_pair.items()}
+def _files(
+    found: search.SearchResult | search.PairSearchResult, target: Path, *, front: bool
+) -> Mapping[Path, search.Finalist]:
+    if isinstance(found, search.PairSearchResult):
+        return {search.beside(target, pair): one.best for pair, one in found.by_pair.items()}
     others = [one for one in found.finalists if front and one is not found.best]
     numbered = {target.with_name(f'{target.stem}-{n}{target.suffix}'): one for n, one in enumerate(others, 2)}
     return {target: found.best} | numbered
@@ -348,10 +340,10 @@ def _write(recipe: Any, path: Path, origin: str, scores: str) -> None:
         path.write_text(f'# {origin}\n# {scores}.\n{content}', encoding='utf-8')
 
 
-def _scores(finalist: Finalist) -> str:
+def _scores(finalist: search.Finalist) -> str:
     return f'fitness {100 * finalist.fitness:.1f} %: {_shares(finalist.scores)} over {len(finalist.scores)} halves'
 
 
-def _shares(scores: Sequence[HalfScore]) -> str:
+def _shares(scores: Sequence[search.HalfScore]) -> str:
     learning, test = 100.0 * np.mean(scores, axis=0)
     return f'training {learning:.1f} %, tested {test:.1f} %'

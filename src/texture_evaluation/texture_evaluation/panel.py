@@ -201,7 +201,7 @@ def intraclass_correlation(table: Array) -> tuple[float, float]:
 
     Source: Shrout & Fleiss 1979, two-way random effects.
     """
-    table = table[~np.isnan(table).any(axis=1)]
+    table = table[~np.isnan(table).any(axis=1)]  # the analysis of variance needs a full table
     targets, raters = table.shape
     if min(targets, raters) < 2:
         return math.nan, math.nan
@@ -214,7 +214,7 @@ def intraclass_correlation(table: Array) -> tuple[float, float]:
     signal, bias = between_targets - rest, (between_raters - rest) / targets
     single = between_targets + (raters - 1) * rest + raters * bias
     joint = between_targets + bias
-    if not single > 0 or not joint > 0:
+    if not single > 0 or not joint > 0:  # without variance between the targets there is nothing to agree on
         return math.nan, math.nan
     return float(signal / single), float(signal / joint)
 
@@ -235,7 +235,7 @@ def one_against_rest(grades: Array) -> tuple[float, float]:
             continue
         rest = np.nanmean(others[:, shared], axis=0)
         errors.append(float(np.abs(own[shared] - rest).mean()))
-        if own[shared].std() > 0 and rest.std() > 0:
+        if own[shared].std() > 0 and rest.std() > 0:  # who gives one grade to all correlates with nobody
             correlations.append(float(np.corrcoef(own[shared], rest)[0, 1]))
     return _mean(errors), _mean(correlations)
 

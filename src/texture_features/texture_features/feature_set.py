@@ -19,72 +19,40 @@ from texture_core.errors import InvalidParameter, UnknownName
 from texture_core.types import Array, FeatureVector, Window
 from texture_features.correction import CORRECTED, Correction, read_correction
 from texture_features.feature import Feature, WindowBatch
-from texture_features.features.spectral import (
-    LogBands,
-    LowFftBins,
-    MeanLogBands,
-    PacinianPower,
-    PeakToMedianPower,
-    PowerAutocorrelation,
-    ShortTimeFourier,
-    SpectralExponent,
-)
-from texture_features.features.taxels import (
-    ChannelMeanStatistics,
-    DifferenceCorrelation,
-    LoadLevel,
-    LogShares,
-    MeanSpatialBands,
-    RelativeChanges,
-    SpatialBandPower,
-    SpatialBands,
-    SpatialVariation,
-)
-from texture_features.features.temporal import (
-    ChannelMean,
-    Force,
-    Friction,
-    Hjorth,
-    LogDifferenceVariance,
-    LogVariance,
-    Moments,
-    SlideOnset,
-    Speed,
-    TemporalVariation,
-)
+from texture_features.features import spectral, taxels, temporal
 from texture_features.windows import CutWindow, SlideEnd, Stretched, WindowEvent, WindowParams, check_axes, topic_of
 
 # --------------------
 # The features that a recipe can name.
 
 FEATURES: Mapping[str, type[Feature]] = {
-    'log_bands': LogBands,  # Welch 1967
-    'mean_log_bands': MeanLogBands,
-    'low_fft_bins': LowFftBins,
-    'hjorth': Hjorth,  # Hjorth 1970; Kaboli et al. 2015
-    'short_time_fourier': ShortTimeFourier,
-    'moments': Moments,
-    'power_autocorrelation': PowerAutocorrelation,
-    'mean': ChannelMean,
-    'log_variance': LogVariance,
-    'log_difference_variance': LogDifferenceVariance,
-    'pacinian_power': PacinianPower,  # Bensmaia & Hollins 2005
-    'spectral_exponent': SpectralExponent,  # Toscani & Metzger 2022
-    'temporal_variation': TemporalVariation,  # Lieber & Bensmaia 2019
-    'spatial_variation': SpatialVariation,  # Lieber & Bensmaia 2019
-    'spatial_band_power': SpatialBandPower,
-    'peak_to_median_power': PeakToMedianPower,
-    'spatial_bands': SpatialBands,
-    'mean_spatial_bands': MeanSpatialBands,
-    'mean_statistics': ChannelMeanStatistics,
-    'log_shares': LogShares,  # Aitchison 1986, with signs
-    'relative_changes': RelativeChanges,
-    'difference_correlation': DifferenceCorrelation,
-    'load_level': LoadLevel,
-    'speed': Speed,
-    'force': Force,
-    'friction': Friction,  # Roberge et al., future work
-    'slide_onset': SlideOnset,
+    'log_bands': spectral.LogBands,  # Welch 1967
+    'mean_log_bands': spectral.MeanLogBands,
+    'low_fft_bins': spectral.LowFftBins,
+    'hjorth': temporal.Hjorth,  # Hjorth 1970; Kaboli et al. 2015
+    'short_time_fourier': spectral.ShortTimeFourier,
+    'moments': temporal.Moments,
+    'power_autocorrelation': spectral.PowerAutocorrelation,
+    'mean': temporal.ChannelMean,
+    'log_variance': temporal.LogVariance,
+    'log_difference_variance': temporal.LogDifferenceVariance,
+    'pacinian_power': spectral.PacinianPower,  # Bensmaia & Hollins 2005
+    'spectral_exponent': spectral.SpectralExponent,  # Toscani & Metzger 2022
+    'temporal_variation': temporal.TemporalVariation,  # Lieber & Bensmaia 2019
+    'spatial_variation': taxels.SpatialVariation,  # Lieber & Bensmaia 2019
+    'spatial_band_power': taxels.SpatialBandPower,
+    'peak_to_median_power': spectral.PeakToMedianPower,
+    'spatial_bands': taxels.SpatialBands,
+    'mean_spatial_bands': taxels.MeanSpatialBands,
+    'mean_statistics': taxels.ChannelMeanStatistics,
+    'log_shares': taxels.LogShares,  # Aitchison 1986, with signs
+    'relative_changes': taxels.RelativeChanges,
+    'difference_correlation': taxels.DifferenceCorrelation,
+    'load_level': taxels.LoadLevel,
+    'speed': temporal.Speed,
+    'force': temporal.Force,
+    'friction': temporal.Friction,  # Roberge et al., future work
+    'slide_onset': temporal.SlideOnset,
 }
 
 
@@ -184,7 +152,7 @@ InputLayout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of 
 
 
 MOTION = ('speed_m_s', 'force_n', 'tangential_force_n', 'elapsed_s')  # of a window, whatever its input
-MOTION_FEATURES = (Speed, Force, Friction, SlideOnset)
+MOTION_FEATURES = (temporal.Speed, temporal.Force, temporal.Friction, temporal.SlideOnset)
 JOINT = '+'  # between the topics of a joint input
 AGAIN = '#'  # between a topic and the name of a further description of it
 RAW, SUBTRACTED = 'raw', 'tared'

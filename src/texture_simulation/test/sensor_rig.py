@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,31 @@ from texture_core.errors import DeviceError
 from texture_core.types import NANOSECONDS, AnyArray, Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.sensor import SensorParams
-from texture_simulation.devices.fingers import DEVICES, EmulatedDevice
+from texture_simulation.devices.fingers import (
+    EmulatedAnySkin,
+    EmulatedBioTac,
+    EmulatedDaq,
+    EmulatedDevice,
+    EmulatedPapillArray,
+    EmulatedPvdf,
+    EmulatedTsf85,
+)
 
 DAQ = '{channels: [' + ', '.join(f'{{name: c{i}, unit: count}}' for i in range(8)) + ']}'
 Feed = Callable[[Any, int, int], None]
+DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
+    'tsf85': EmulatedTsf85,
+    'tsf85_pair': EmulatedTsf85,
+    'tsf85_3x4': EmulatedTsf85,
+    'biotac': EmulatedBioTac,
+    'biotac_sp': EmulatedBioTac,
+    'biotac_hand': partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')),
+    'daq': EmulatedDaq,
+    'pvdf': EmulatedPvdf,
+    'anyskin': EmulatedAnySkin,
+    'papillarray': EmulatedPapillArray,
+    'papillarray_pair': partial(EmulatedPapillArray, arrays=2),
+}
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,8 @@ def drives(n: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 )
 def test_whatever_happens_no_energy_comes_from_nowhere(name: str, friction: StickSlip) -> None:
     speed, force = drives(4000)[name]
-    assert friction.passive_step_s >= 2.5e-4
+    # Up to damping over stiffness of the skin the integrator provably never adds energy.
+    assert friction.skin_n_s_m / friction.skin_n_m >= 2.5e-4
     tip = drag(friction, speed, force, 2.5e-4)
     assert np.isfinite(pull_n(friction, tip, speed)).all()
     assert np.abs(tip.bend_m).max() <= 1.2 * friction.static / friction.bristle_1_m or name == 'anything'

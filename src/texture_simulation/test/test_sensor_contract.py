@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sensor_rig import CASES, Rig
+from sensor_rig import CASES, DEVICES, Rig
 
 from texture_core.errors import DeviceError
 from texture_core.types import lost_samples
 from texture_drivers.catalogue import SENSORS
-from texture_simulation.devices.fingers import DEVICES, ByteFaults, FrameFaults
+from texture_simulation.devices.fingers import ByteFaults, FrameFaults
 
 pytestmark = pytest.mark.realtime
 

@@ -21,28 +21,10 @@ from texture_drivers import daq, pvdf
 from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
 from texture_drivers.tsf85 import RATE_HZ
-from texture_simulation import sensor_models
-from texture_simulation.devices.fingers import (
-    FINGERS,
-    ByteFaults,
-    EmulatedAnySkin,
-    EmulatedBioTac,
-    EmulatedDaq,
-    EmulatedDevice,
-    EmulatedPapillArray,
-    EmulatedPvdf,
-    EmulatedTsf85,
-)
+from texture_simulation import sensor_models as models
+from texture_simulation.devices import fingers
 from texture_simulation.path import FingerTrack
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.sensor_models import (
-    BioTacHand,
-    BioTacModel,
-    SensorModel,
-    Tsf85Model,
-    Tsf85Pair,
-    points_per_frame,
-)
 from texture_simulation.surfaces import Surface
 
 # --------------------
@@ -119,8 +101,8 @@ class LiveSensor:
 
     def __init__(
         self,
-        model: SensorModel | Tsf85Pair | BioTacHand,
-        device: EmulatedDevice,
+        model: models.SensorModel | models.Tsf85Pair | models.BioTacHand,
+        device: fingers.EmulatedDevice,
         send: Callable[[Any], None],
         skip: Callable[[int], None],
         pace: tuple[float, int],
@@ -205,9 +187,13 @@ def live_tsf85(
     LiveSensor
         Not started: its first `advance` is the beginning of its time.
     """
-    model = Tsf85Pair(scene, surface, rng) if pair else Tsf85Model(scene, surface, rng, layout=TSF85S[layout])
-    device = EmulatedTsf85(link, rng, 0 if pair else finger, long_stamps)
-    pace = RATE_HZ, sensor_models.TSF85_OVERSAMPLING
+    model: models.Tsf85Model | models.Tsf85Pair
+    if pair:
+        model = models.Tsf85Pair(scene, surface, rng)
+    else:
+        model = models.Tsf85Model(scene, surface, rng, layout=TSF85S[layout])
+    device = fingers.EmulatedTsf85(link, rng, 0 if pair else finger, long_stamps)
+    pace = RATE_HZ, models.TSF85_OVERSAMPLING
     return LiveSensor(model, device, lambda measured: device.advance(*measured), device.skip, pace)
 
 
@@ -216,44 +202,44 @@ def live_biotac(
 ) -> LiveSensor:
     """Return a BioTac alone on its board, or a board with BioTacs on three fingers: all are served with each frame."""
     layout = BIOTACS['biotac']
-    pace = layout.frame_rate_hz, points_per_frame(layout)
+    pace = layout.frame_rate_hz, models.points_per_frame(layout)
     if hand:
-        device = EmulatedBioTac(link, rng, sensor_models.SERIALS)
-        return LiveSensor(BioTacHand(scene, surface, rng, layout), device, device.advance, device.skip, pace)
-    device = EmulatedBioTac(link, rng)
-    model = BioTacModel(scene, surface, rng, layout=layout)
+        device = fingers.EmulatedBioTac(link, rng, models.SERIALS)
+        return LiveSensor(models.BioTacHand(scene, surface, rng, layout), device, device.advance, device.skip, pace)
+    device = fingers.EmulatedBioTac(link, rng)
+    model = models.BioTacModel(scene, surface, rng, layout=layout)
     return LiveSensor(model, device, lambda counts: device.advance(counts[:, :, None]), device.skip, pace)
 
 
 def live_daq(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 3."""
-    model, device, rate_hz = sensor_models.DaqModel(scene, surface, rng), EmulatedDaq(link, rng), daq.RATE_HZ
-    pace = rate_hz, sensor_models.DAQ_OVERSAMPLING
-    return LiveSensor(model, device, device.sample, lambda samples: device.skip(samples / rate_hz), pace)
+    model, device = models.DaqModel(scene, surface, rng), fingers.EmulatedDaq(link, rng)
+    pace = daq.RATE_HZ, models.DAQ_OVERSAMPLING
+    return LiveSensor(model, device, device.sample, lambda samples: device.skip(samples / daq.RATE_HZ), pace)
 
 
 def live_pvdf(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 5."""
-    model, device, rate_hz = sensor_models.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng), pvdf.FILM_RATE_HZ
-    pace = rate_hz, sensor_models.PVDF_OVERSAMPLING
+    model, device = models.PvdfModel(scene, surface, rng), fingers.EmulatedPvdf(link, rng)
+    pace = pvdf.FILM_RATE_HZ, models.PVDF_OVERSAMPLING
 
     def skip(samples: int) -> None:
-        device.skip(samples / rate_hz)
+        device.skip(samples / pvdf.FILM_RATE_HZ)
 
     return LiveSensor(model, device, lambda both: device.sample(*both), skip, pace)
 
 
 def live_anyskin(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return an AnySkin."""
-    model, device = sensor_models.AnySkinModel(scene, surface, rng), EmulatedAnySkin(link, rng)
-    pace = sensor_models.ANYSKIN_RATE_HZ, sensor_models.ANYSKIN_OVERSAMPLING
+    model, device = models.AnySkinModel(scene, surface, rng), fingers.EmulatedAnySkin(link, rng)
+    pace = models.ANYSKIN_RATE_HZ, models.ANYSKIN_OVERSAMPLING
     return LiveSensor(model, device, device.sample, device.skip, pace)
 
 
 def live_papillarray(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return a PapillArray alone on its hub."""
-    model, device = sensor_models.PapillArrayModel(scene, surface, rng), EmulatedPapillArray(link, rng)
-    pace = sensor_models.PAPILLARRAY_PATH_RATE_HZ, 1
+    model, device = models.PapillArrayModel(scene, surface, rng), fingers.EmulatedPapillArray(link, rng)
+    pace = models.PAPILLARRAY_PATH_RATE_HZ, 1
     return LiveSensor(model, device, lambda pillars: device.sample(pillars[:, None]), device.skip, pace)
 
 
@@ -375,7 +361,7 @@ class Emulator:
         self.stop()
 
     @property
-    def device(self) -> EmulatedDevice:
+    def device(self) -> fingers.EmulatedDevice:
         """The device of the sensor on the emulator; those beside it are left out."""
         return self._sensors[0].device
 
@@ -428,12 +414,12 @@ class Emulator:
     def unplug_finger(self, finger: int) -> None:
         """Pull the plug of one finger of a TSF-85 out of its hub; -1 plugs all in."""
         device = self.device
-        if isinstance(device, EmulatedTsf85):
-            self._in_thread(partial(device.plug_fingers, [finger != other for other in range(FINGERS)]))
+        if isinstance(device, fingers.EmulatedTsf85):
+            self._in_thread(partial(device.plug_fingers, [finger != other for other in range(fingers.FINGERS)]))
 
     def flip_bits(self, probability: float) -> None:
         """Make the line of the sensor a bad one; 0 makes it a good one again."""
-        self.device.faults = ByteFaults(flip=probability)
+        self.device.faults = fingers.ByteFaults(flip=probability)
 
     @property
     def counts(self) -> Mapping[str, int]:

@@ -128,11 +128,6 @@ class StickSlip(Stribeck):
                 'out work that was never put in; lower it'
             )
 
-    @property
-    def passive_step_s(self) -> float:
-        """Up to this step the default integrator provably never adds energy: damping over stiffness of the skin."""
-        return self.skin_n_s_m / self.skin_n_m
-
 
 # --------------------
 # LuGre friction: the surfaces touch with bristles that bend before they slide (Canudas de Wit et al. 1995).

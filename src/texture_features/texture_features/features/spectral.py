@@ -12,17 +12,9 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
+from texture_features import spectra
 from texture_features.feature import WindowBatch, floor_param, mean_weights, power
 from texture_features.features.temporal import squares
-from texture_features.spectra import (
-    WelchPower,
-    at_reference_speed,
-    densities_of,
-    force_normalised,
-    mean_over_segments,
-    overlapping,
-    welch_spectrum,
-)
 
 # --------------------
 # Power in equal frequency bands: the mean over the window.
@@ -62,8 +54,8 @@ class LogBands:
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        return np.log(mean_over_segments(densities) + self.floor)
+        densities = spectra.densities_of(windows, 2 * self.bands, self._step, self.bands)
+        return np.log(spectra.mean_over_segments(densities) + self.floor)
 
 
 # --------------------
@@ -108,7 +100,7 @@ class LowFftBins:
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
-        densities, _ = welch_spectrum(windows, self.points, rate_of_change=False)
+        densities, _ = spectra.welch_spectrum(windows, self.points, rate_of_change=False)
         return np.log(densities[..., : self._count] + self.floor)
 
 
@@ -134,9 +126,9 @@ class MeanLogBands(LogBands):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of log(density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
+        densities = spectra.densities_of(windows, 2 * self.bands, self._step, self.bands)
         logs = densities + self.floor
-        return mean_over_segments(np.log(logs, out=logs))
+        return spectra.mean_over_segments(np.log(logs, out=logs))
 
 
 # --------------------
@@ -146,7 +138,7 @@ OCTAVES_PER_DB = 0.1 / np.log10(2.0)  # of power
 
 
 @dataclass(frozen=True)
-class PacinianPower(WelchPower):
+class PacinianPower(spectra.WelchPower):
     """Logarithm of Σ (amplitude / threshold amplitude)² over the lines of the spectrum.
 
     The threshold is that of the Pacinian channel in two straight lines: it falls by 12 dB an octave up to `best_hz`
@@ -183,12 +175,12 @@ class PacinianPower(WelchPower):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the log power."""
-        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
-        octaves = np.log2(at_reference_speed(hertz, windows, self.at_speed_m_s) / self.best_hz)
+        densities, hertz = spectra.welch_spectrum(windows, self.points, self.rate_of_change)
+        octaves = np.log2(spectra.at_reference_speed(hertz, windows, self.at_speed_m_s) / self.best_hz)
         below, above = OCTAVES_PER_DB * self.slope_below_db, OCTAVES_PER_DB * self.slope_above_db
         weights = np.exp2(np.minimum(below * octaves, -above * octaves))  # 1 / threshold²
         power = np.add.reduce(densities * weights, axis=-1, keepdims=True) * hertz[0]
-        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)
+        return spectra.force_normalised(np.log(power + self.floor), windows, self.force_exponent)
 
 
 # --------------------
@@ -289,7 +281,7 @@ class PowerAutocorrelation:
         if count < 1:
             return np.zeros((*powers.shape[:-2], len(self.names)))
         # The axis of lags in front, where picking some copies whole blocks: a third of the time of doing so behind.
-        later = overlapping(powers, count, 1).swapaxes(0, -2)[self._lags].swapaxes(0, -2)
+        later = spectra.overlapping(powers, count, 1).swapaxes(0, -2)[self._lags].swapaxes(0, -2)
         products = (later @ powers[..., :count, None])[..., 0] / count
         mean = (powers[..., :-1] @ mean_weights(n_steps))[..., None]
         autocorrelations = np.log(
@@ -341,7 +333,7 @@ class ShortTimeFourier:
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density of each part + floor), part by part."""
         step = max(1, round(2 * self.bands * (1.0 - self.overlap)))
-        densities = densities_of(windows, 2 * self.bands, step, self.bands)
+        densities = spectra.densities_of(windows, 2 * self.bands, step, self.bands)
         means = _averaging(self.parts, densities.shape[-2]) @ densities
         return np.log(means + self.floor).reshape(*means.shape[:-2], -1)
 
@@ -406,8 +398,8 @@ class SpectralExponent:
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return s."""
-        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
-        measured = at_reference_speed(hertz, windows, self.at_speed_m_s)
+        densities, hertz = spectra.welch_spectrum(windows, self.points, self.rate_of_change)
+        measured = spectra.at_reference_speed(hertz, windows, self.at_speed_m_s)
         within = (measured >= self.low_hz) * (
             measured <= self.high_hz
         ) + 0.0 * measured  # NaN where the speed is unknown

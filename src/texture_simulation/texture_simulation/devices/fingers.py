@@ -9,8 +9,7 @@ import os
 import re
 import struct
 import tty
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -911,21 +910,3 @@ class EmulatedTsf85(EmulatedDevice):
             self.started = is_start and not self.ignored_starts
             self.ignored_starts -= is_start and self.ignored_starts > 0
         self._received = received[-TSF85_KEPT_BYTES:] if data else self._received
-
-
-# --------------------
-# The emulated device of each sensor; a sensor without one reads no device.
-
-DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
-    'tsf85': EmulatedTsf85,
-    'tsf85_pair': EmulatedTsf85,
-    'tsf85_3x4': EmulatedTsf85,
-    'biotac': EmulatedBioTac,
-    'biotac_sp': EmulatedBioTac,
-    'biotac_hand': partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')),
-    'daq': EmulatedDaq,
-    'pvdf': EmulatedPvdf,
-    'anyskin': EmulatedAnySkin,
-    'papillarray': EmulatedPapillArray,
-    'papillarray_pair': partial(EmulatedPapillArray, arrays=2),
-}
