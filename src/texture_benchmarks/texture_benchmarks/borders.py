@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.disturbances import ROWS, TRAINED, disturbed, simulate
+from texture_benchmarks.places import NEW_PLACES, PATCH_M, SCENE, slides_at
+from texture_benchmarks.places import PLACES as PLACES_TRAINED
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked
 from texture_core.types import NANOSECONDS
 from texture_estimation.recipe import FAST_TOPIC, Recipe, load_recipe
@@ -23,6 +25,7 @@ from texture_evaluation.metrics import TIMES_S, SlideResult
 from texture_evaluation.train import training_examples
 from texture_features.feature_set import read_recipe
 from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_simulation.scene import load_scene
 
 SAME, PLACE, DAY, FINGER = 'same track', 'other place', 'other day', 'other finger'
 BORDERS = (PLACE, DAY, FINGER, SAME)
@@ -34,7 +37,7 @@ PEERS: Mapping[str, Mapping[str, Any]] = {
     '1-NN on log bands': {'sklearn': {'estimator': 'sklearn.neighbors:KNeighborsClassifier', 'n_neighbors': 1}},
 }
 PLACES = ('any-place', 'any-place-and-taxels')
-VIBRATION = (*PLACES, 'default', 'fast', 'vibration-and-taxels', *PEERS)
+VIBRATION = (*PLACES, 'default', 'onset', 'fast', 'vibration-and-taxels', *PEERS)
 TAXELS = ('taxels-any-day', 'taxels', 'fast', *PEERS)  # `fast` and the peers read the taxels as channels of a vibration
 ARRAY = ('any-speed', 'taxels-signal', *PEERS)
 SOUND = ('default', *PEERS)
@@ -173,12 +176,26 @@ def _simulated(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     yield BorderTrial('simulated halves', ('fast', *PEERS), trained, across_places(halves.select('7-9'), trained))
 
 
+def _simulated_places(options: BenchmarkOptions) -> Iterator[BorderTrial]:
+    """Yield six places of each surface trained, the same and new places tested."""
+    scene, rng = load_scene(SCENE), np.random.default_rng(options.seed)
+    places_m = rng.uniform(0.0, PATCH_M, (2, len(scene.surfaces), PLACES_TRAINED + NEW_PLACES))
+    directions = rng.uniform(-np.pi, np.pi, places_m.shape[1:])
+    once, again = (slides_at(scene, places_m, directions, rng) for _ in range(2))
+    once, again = (
+        SlideDataset(tuple(replace(one, place=f'at {one.number}') for one in slides)) for slides in (once, again)
+    )
+    trained = once.select(f'1-{PLACES_TRAINED}')
+    yield BorderTrial('simulated places', ('default', 'fast', *PEERS), trained, across_places(again, trained))
+
+
 SETS: Mapping[str, Callable[[BenchmarkOptions], Iterator[BorderTrial]]] = {
     'biotac20': _biotac20,
     'fingersense': fingersense,
     'ntp21': _ntp21,
     'fabricslide': _fabricslide,
     'lmt29': _lmt29,
+    'simulated': _simulated_places,
 }
 
 
@@ -225,14 +242,16 @@ def result_of(found: Mapping[Cell, Sequence[SlideAnswer]], options: BenchmarkOpt
 
 DATA_SETS = (
     f'{DATA["biotac20"]}; {DATA["ntp21"]}; fabricslide: four complete fabrics, 16 capacitive taxels; fingersense: four '
-    'fabrics on dates of May and June 2021, 16 taxels at a nominal 50 Hz; lmt29: sound of 29 textures, by hand'
+    'fabrics on dates of May and June 2021, 16 taxels at a nominal 50 Hz; lmt29: sound of 29 textures, by hand; '
+    f'simulated scene {SCENE}'
 )
 SPLIT = (
     f'biotac20: one half, or three quarters, of the path of slides {EARLIER} trained, slides {LATER} tested, the other '
     f'finger by a random smooth response of {RESPONSE_DB:g} dB on the same half; ntp21: one half and one force out, '
     'slides of 20 and 40 mm/s; fabricslide: one half and one repeat out; fingersense: one date out of '
     f'{", ".join(DATES)}, trained on the others, same days by every other slide; lmt29: recordings 1-4 '
-    f'trained, 5 and 6 tested. Of slides over taxels at most {LONGEST_S:g} s from the middle'
+    'trained, 5 and 6 tested; simulated: six places trained, the same and eight new ones tested. Of slides over taxels '
+    f'at most {LONGEST_S:g} s from the middle'
 )
 
 

@@ -123,10 +123,10 @@ def _new_places(scene: Scene, rng: np.random.Generator) -> tuple[Array, Array]:
     turned = rng.uniform(-np.pi, np.pi, (len(scene.surfaces), PLACES + NEW_PLACES))
     track = ASTRAY_M * rng.standard_normal((2, len(scene.surfaces), PLACES))
     recipe = load_recipe(RECIPE)
-    tested = _slides(scene, scattered[..., PLACES:], turned[:, PLACES:], rng).features(recipe.feature_set)
+    tested = slides_at(scene, scattered[..., PLACES:], turned[:, PLACES:], rng).features(recipe.feature_set)
     found = []
     for places, directions in ((track, 0.0 * turned[:, :PLACES]), (scattered[..., :PLACES], turned[:, :PLACES])):
-        slides = _slides(scene, places, directions, rng)
+        slides = slides_at(scene, places, directions, rng)
         if places is not track:  # as in the bags of `texture collect`
             slides = SlideDataset(tuple(replace(one, place=f'at {one.number}') for one in slides))
         results = predict_slides(train(recipe, training_examples(recipe, slides)), tested).values()
@@ -139,7 +139,7 @@ def _new_places(scene: Scene, rng: np.random.Generator) -> tuple[Array, Array]:
     return found[0], found[1]
 
 
-def _slides(scene: Scene, places_m: Array, directions_rad: Array, rng: np.random.Generator) -> SlideDataset:
+def slides_at(scene: Scene, places_m: Array, directions_rad: Array, rng: np.random.Generator) -> SlideDataset:
     """Return a slide over each surface at each place, (2, n_surfaces, n_places), in each direction."""
     stream, count = SENSORS[scene.sensor].fast, places_m.shape[-1]
     made = [

@@ -143,10 +143,10 @@ class DecisionParams(TrainingParams):
         high=0.5,
     )
     max_known_error_rate: float = param(
-        1.0,
-        'Largest fraction of held-out slides that may be known under a wrong label, at each length of a slide: the '
-        'confidence below which a slide is unknown rises until it is kept; 1: no limit. It needs a '
-        'false_rejection_rate above 0.',
+        0.033,
+        'Largest fraction of slides at held-out places, in held-out sessions or with held-out fingers that may be '
+        'known under a wrong label, at each length of a slide: the confidence below which a slide is unknown rises '
+        'until it is kept; 1: no limit. It needs a false_rejection_rate above 0, and two places, sessions or fingers.',
         low=0.0,
         high=1.0,
     )

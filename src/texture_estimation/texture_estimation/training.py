@@ -604,7 +604,9 @@ def fit_open_set(
         return StoppingRule(), None, ConfidenceFloor()
     if detector is None:
         return fit_stopping_rule(courses, decisions.max_error_rate, by_novelty=False), None, ConfidenceFloor()
-    floor = fit_confidence_floor(courses, decisions.low_confidence_rejection_rate, decisions.max_known_error_rate)
+    # Slides over one track cannot show how rarely a label is wrong elsewhere.
+    most = decisions.max_known_error_rate if held_out_parts(examples) is not None else 1.0
+    floor = fit_confidence_floor(courses, decisions.low_confidence_rejection_rate, most)
     courses = [
         replace(course, known=course.known & floor.reached_by(course.confidences, course.effective_windows))
         for course in courses
