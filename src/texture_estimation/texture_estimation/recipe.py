@@ -143,7 +143,7 @@ class DecisionParams(TrainingParams):
         high=0.5,
     )
     max_known_error_rate: float = param(
-        0.033,
+        0.015,
         'Largest fraction of slides at held-out places, in held-out sessions or with held-out fingers that may be '
         'known under a wrong label, at each length of a slide: the confidence below which a slide is unknown rises '
         'until it is kept; 1: no limit. It needs a false_rejection_rate above 0, and two places, sessions or fingers.',
