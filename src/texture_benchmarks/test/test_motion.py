@@ -14,7 +14,7 @@ from texture_benchmarks.motion import (
     simulate_force_controlled_slide,
 )
 from texture_benchmarks.study import BenchmarkOptions
-from texture_exploration.arms.simulated import SimulatedSurface
+from texture_exploration.arms.simulated import SimulatedSurface, SurfaceShape
 from texture_exploration.force_control import StiffnessEstimate
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -24,7 +24,7 @@ TILT = math.radians(10)
 
 def slide(stiffness, **surface):
     """Return overshoot, root mean square and speed error of a slide with 1 N, as shares."""
-    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=stiffness, **surface))
+    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=stiffness), shape=SurfaceShape(**surface))
     assert trial.success, trial.message
     return trial.overshoot, trial.force_rms, trial.speed_error
 

@@ -13,7 +13,7 @@ import threading
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from texture_exploration.arms.arm import Arm, ArmState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
-from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.simulated import PLANE, RATE_HZ, SimulatedArm, SimulatedArmParams, SurfaceShape
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import PERIOD_S, Exploration, ExplorationOutcome, Explorer
 from texture_exploration.force_control import ForceLoopParams, stability_chart, stability_limit_gain
@@ -90,6 +90,7 @@ def simulate_force_controlled_slide(
     request: ExplorationRequest = SLIDE,
     touch: TouchParams = SIMULATED_TOUCH,
     injection: Injection | None = None,
+    shape: SurfaceShape = PLANE,
 ) -> ForceControlMetrics:
     """Explore once with a simulated arm, under the real exploration loop; evaluated by the true force."""
     log: list[tuple[Phase, ArmState]] = []
@@ -99,7 +100,7 @@ def simulate_force_controlled_slide(
     def clock() -> int:
         return now_ns
 
-    moving = SimulatedArm(arm, clock, own_thread=False)
+    moving = SimulatedArm(arm, clock, own_thread=False, shape=shape)
     moving.connect()
     motion = MOTIONS[request.motion](request, moving.state().position, touch, SIMULATED_LIMITS)
     exploration = Exploration(
@@ -172,13 +173,13 @@ def radius_error_m(places: Array, radius_m: float) -> float:
     return float(np.abs(np.hypot(*(places - middle).T) - radius_m).max())
 
 
-# Surfaces to try force control on, each as changes of the arm's parameters.
-SURFACES: Mapping[str, Mapping[str, Any]] = {
-    'flat': {},
-    'rising 10°': {'tilt_rad': math.radians(10)},
-    'falling 10°': {'tilt_rad': math.radians(-10)},
-    'bump of 2 mm': {'bump_m': 0.002},
-    'sticky': {'adhesion_n': 0.5, 'stick_slip_n': 0.05},
+# Surfaces to try force control on.
+SURFACES: Mapping[str, SurfaceShape] = {
+    'flat': PLANE,
+    'rising 10°': SurfaceShape(tilt_rad=math.radians(10)),
+    'falling 10°': SurfaceShape(tilt_rad=math.radians(-10)),
+    'bump of 2 mm': SurfaceShape(bump_m=0.002),
+    'sticky': SurfaceShape(adhesion_n=0.5, stick_slip_n=0.05),
 }
 
 
@@ -190,7 +191,7 @@ DRIFT_N_S = 0.5
 class Hazard:
     """What is under the finger or happens to its force sensor; stiffnesses that it is tried on, N/m."""
 
-    surface: Mapping[str, Any] = field(default_factory=dict)
+    surface: SurfaceShape = PLANE
     injection: Injection | None = None
     stiffnesses_n_m: tuple[float, ...] = (200.0, 2000.0, 5000.0, 20000.0)
 
@@ -198,14 +199,14 @@ class Hazard:
 FREEZE = Injection(Phase.SLIDE, SimulatedArm.freeze_force)
 HAZARDS: Mapping[str, Hazard] = {
     'none': Hazard(),
-    'step down 12 mm': Hazard({'step_m': -0.012}),
-    'step up 1 mm': Hazard({'step_m': 0.001}, stiffnesses_n_m=(200.0, 2000.0)),
-    'edge: the surface ends': Hazard({'edge_m': 0.03}),
-    'soft layer of 1 mm on 20 kN/m': Hazard({'layer_m': 0.001}, stiffnesses_n_m=(200.0, 500.0, 1000.0)),
+    'step down 12 mm': Hazard(SurfaceShape(step_m=-0.012)),
+    'step up 1 mm': Hazard(SurfaceShape(step_m=0.001), stiffnesses_n_m=(200.0, 2000.0)),
+    'edge: the surface ends': Hazard(SurfaceShape(edge_m=0.03)),
+    'soft layer of 1 mm on 20 kN/m': Hazard(SurfaceShape(layer_m=0.001), stiffnesses_n_m=(200.0, 500.0, 1000.0)),
     'force frozen in the approach': Hazard(injection=replace(FREEZE, phase=Phase.APPROACH)),
     'force frozen while pressing': Hazard(injection=replace(FREEZE, phase=Phase.CONTACT)),
     'force frozen in the slide': Hazard(injection=FREEZE),
-    'force frozen in the slide, rising 10°': Hazard({'tilt_rad': 0.1745}, FREEZE),
+    'force frozen in the slide, rising 10°': Hazard(SurfaceShape(tilt_rad=0.1745), FREEZE),
     'force drifts up by 0.5 N/s': Hazard(injection=Injection(Phase.SLIDE, lambda arm: arm.drift_force(DRIFT_N_S))),
     'force drifts down by 0.5 N/s': Hazard(injection=Injection(Phase.SLIDE, lambda arm: arm.drift_force(-DRIFT_N_S))),
 }
@@ -217,7 +218,9 @@ def hazard_trials(name: str, stiffnesses_n_m: Sequence[float], lags_s: Sequence[
     return {
         lag_s: {
             k: simulate_force_controlled_slide(
-                replace(ARM, stiffness_n_m=k, undeclared_lag_s=lag_s, **hazard.surface), injection=hazard.injection
+                replace(ARM, stiffness_n_m=k, undeclared_lag_s=lag_s),
+                injection=hazard.injection,
+                shape=hazard.surface,
             )
             for k in stiffnesses_n_m
         }
@@ -499,8 +502,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     fine = STIFFNESSES_N_M if options.quick else FINE_STIFFNESSES_N_M
     lags_s, most = (LAGS_S[::3], 2) if options.quick else (LAGS_S, None)
     surfaces = {
-        name: {k: simulate_force_controlled_slide(replace(ARM, stiffness_n_m=k, **changes)) for k in fine}
-        for name, changes in SURFACES.items()
+        name: {k: simulate_force_controlled_slide(replace(ARM, stiffness_n_m=k), shape=shape) for k in fine}
+        for name, shape in SURFACES.items()
     }
     lags = hazard_trials('none', fine, lags_s)
     hazards = {name: hazard_trials(name, hazard.stiffnesses_n_m[:most], lags_s) for name, hazard in HAZARDS.items()}
@@ -556,9 +559,10 @@ def _rows(trials: Trials) -> dict[str, Any]:
 
 def bump_speed_m_s(stiffness_n_m: float) -> float:
     """Return the highest of `SPEEDS_M_S` at which a bump of 2 mm is followed as well as asked, without a force mode."""
-    arm = replace(ARM, stiffness_n_m=stiffness_n_m, **SURFACES['bump of 2 mm'])
+    arm, shape = replace(ARM, stiffness_n_m=stiffness_n_m), SURFACES['bump of 2 mm']
     for speed_m_s in SPEEDS_M_S:
-        if simulate_force_controlled_slide(arm, replace(SLIDE, speed_m_s=speed_m_s)).force_rms <= TARGETS['force_rms']:
+        trial = simulate_force_controlled_slide(arm, replace(SLIDE, speed_m_s=speed_m_s), shape=shape)
+        if trial.force_rms <= TARGETS['force_rms']:
             return speed_m_s
     return 0.0
 

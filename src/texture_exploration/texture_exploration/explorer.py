@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timezone
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -449,8 +449,7 @@ EDGES = (np.min, np.max)
 LARGEST_TURN_RAD = math.radians(15.0)  # against the pose before: beyond, a touch is more likely wrong than the pose
 
 
-@dataclass(frozen=True)
-class SurfaceFit:
+class SurfaceFit(NamedTuple):
     """A plane through touches: `pose` as `SurfaceFrame` takes it, (6,); distances of the touches from the plane in m.
 
     `residual_m` is their root mean square and `largest_m` the largest; both are 0 for three touches, which always lie
@@ -776,11 +775,9 @@ class Explorer:
             if self._lift_ends.is_set():
                 raise MotionAborted('it was stopped')
             now_ns, state = self._clock(), self.arm.state()
-            command = rise.step(now_ns, state)
+            command = rise.timed_step(now_ns, state)
             if command is None:
                 return
-            if rise.elapsed_s(now_ns) > rise.timeout_s:
-                raise MotionAborted(f'waited {rise.timeout_s:.1f} s for {rise.goal}')
             self.arm.command(command)
             pace()
 

@@ -20,6 +20,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -483,6 +484,7 @@ LATE_IMPACT = (
 INTEGRAL_LAGS = 20.0  # the integral part takes at least so many lags: a faster one adds to the overshoot
 TRACK = 400  # heights that are remembered: 1.6 s at 250 Hz
 FORCE_LAG_S = 0.03  # a force that is later than 'loop_delay_s' by more than this is not pressed by
+FORCE_SPEED_M_S = 0.05  # the highest normal speed under force control
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
 
 
@@ -525,13 +527,6 @@ class ForceLoopParams:
         unit='s',
         low=0.05,
         high=100.0,
-    )
-    force_speed_m_s: float = param(
-        0.05,
-        'Highest normal speed under force control; a higher speed corrects force errors faster.',
-        unit='m/s',
-        low=0.001,
-        high=0.25,
     )
     max_impact_n: float = param(
         0.15,
@@ -660,8 +655,7 @@ class ForceController:
         return limited
 
 
-@dataclass(frozen=True)
-class ContactState:
+class ContactState(NamedTuple):
     """State of the contact: height of the finger, distance travelled along the surface, force, when it was measured."""
 
     time_ns: int
@@ -841,11 +835,11 @@ class ForceLoop:
         """Return how fast the finger may come down: slowly where the surface may be."""
         params = self._params
         reaction_s = self._reaction_s(params)
-        slow_m_s = min(params.force_speed_m_s, self._closing_m / reaction_s)
+        slow_m_s = min(FORCE_SPEED_M_S, self._closing_m / reaction_s)
         if self._surface_m is None:
             return slow_m_s
         above_m = height_m - self._surface_m - NEAR_M
-        return min(params.force_speed_m_s, max(slow_m_s, above_m / (4 * reaction_s)))
+        return min(FORCE_SPEED_M_S, max(slow_m_s, above_m / (4 * reaction_s)))
 
     @property
     def _closing_m(self) -> float:
@@ -888,7 +882,7 @@ class ForceLoop:
     def _new_controller(self) -> ForceController:
         params = self._params
         gain = params.force_gain_m_s_n or params.default_gain(params.max_stiffness_n_m, self._period_s)
-        return ForceController(gain, params.integral_s, params.force_speed_m_s)
+        return ForceController(gain, params.integral_s, FORCE_SPEED_M_S)
 
     def _choose_gain(self) -> None:
         estimated_n_m = self.stiffness.value_n_m

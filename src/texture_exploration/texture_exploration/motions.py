@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -95,8 +96,7 @@ def plan_surface_slide(
 CIRCULAR_DEFAULTS = {'speed_m_s': 0.1, 'force_n': 1.0, 'radius_m': 0.02, 'turns': 2.0}  # ETS: "a radius of about 2" cm
 
 
-@dataclass(frozen=True)
-class CircularPath:
+class CircularPath(NamedTuple):
     """A circle, counter-clockwise as seen from above; `start_rad` is where on it the path begins."""
 
     radius_m: float
@@ -370,8 +370,7 @@ def _check_stroke(request: ExplorationRequest, home: Vector, limits: SafetyLimit
 LINEAR_SLIDE_DEFAULTS = {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1}
 
 
-@dataclass(frozen=True)
-class StraightPath:
+class StraightPath(NamedTuple):
     """A straight path."""
 
     length_m: float

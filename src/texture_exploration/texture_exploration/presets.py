@@ -14,8 +14,7 @@ import itertools
 import math
 import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from texture_core.config import find, find_file, load_yaml, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter
@@ -29,8 +28,7 @@ LARGEST = 1e6  # number of a request; a larger one may not even be a float
 SHORTHANDS = ('direction_deg', 'slide_s')
 
 
-@dataclass(frozen=True)
-class Preset:
+class Preset(NamedTuple):
     """What a preset file says.
 
     Parameters

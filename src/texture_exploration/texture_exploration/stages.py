@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from texture_core.config import param
 from texture_core.errors import ExplorationError, MotionAborted
@@ -751,6 +751,13 @@ class Stage:
         """
         raise NotImplementedError
 
+    def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Return what to do now; MotionAborted also if the stage takes too long."""
+        command = self.step(time_ns, arm)
+        if command is not None and self.elapsed_s(time_ns) > self.timeout_s:
+            raise MotionAborted(f'waited {self.timeout_s:.1f} s for {self.goal}; the force is {arm.force_n:.2f} N')
+        return command
+
 
 class GoHomeStage(Stage):
     """Rise to the height of the start, then go above the surface to where the motion begins."""
@@ -878,8 +885,7 @@ class SettleForceStage(Stage):
         return ArmCommand(force_n=self._first_n + (self._force_n - self._first_n) * rise)
 
 
-@dataclass(frozen=True)
-class Along:
+class Along(NamedTuple):
     """What the stages along a path share: who steers, how fast, how hard, and who watches the contact."""
 
     follower: Follower
@@ -1421,15 +1427,12 @@ class LiftFirst:
             self._stage = stage
             stage.begin(time_ns, arm)
         try:
-            command = stage.step(time_ns, arm)
-            if command is not None and stage.elapsed_s(time_ns) > stage.timeout_s:
-                raise MotionAborted(f'waited {stage.timeout_s:.1f} s for {stage.goal}')
+            return stage.timed_step(time_ns, arm)
         except MotionAborted as trouble:
             self._give_way(stage, trouble)
             return None
         finally:
             self._free = stage.free if isinstance(stage, Rise) else self._free
-        return command
 
     def _give_way(self, stage: Stage, trouble: MotionAborted) -> None:
         """End in the way that is left: back, further up, by the lift of the motion, or where the finger is."""
@@ -1535,10 +1538,7 @@ class StagedMotion:
         if stage is None:
             return None
         try:
-            command = stage.step(time_ns, arm)
-            if command is not None and stage.elapsed_s(time_ns) > stage.timeout_s:
-                waited = f'waited {stage.timeout_s:.1f} s for {stage.goal}'
-                raise MotionAborted(f'{waited}; the force is {arm.force_n:.2f} N')
+            return stage.timed_step(time_ns, arm)
         except MotionAborted as error:
             if stage is self._lift:
                 before = f'{self._abort_reason}; ' if self._abort_reason else ''
@@ -1548,7 +1548,6 @@ class StagedMotion:
                 self.error = self.error or error.error
                 self.abort(str(error))
             return None
-        return command
 
     def _sought(self, error: MotionAborted, stage: Stage) -> bool:
         """Put the stages ahead that bring a lost contact back; return whether there are any."""

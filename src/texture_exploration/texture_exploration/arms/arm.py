@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import math
+import subprocess
+import sys
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from texture_core.config import param
-from texture_core.errors import CommandRefused, DeviceError
+from texture_core.errors import DeviceError
 from texture_core.types import Array, rotation_matrix
 from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
 
@@ -68,6 +71,9 @@ class ArmCommand:
     tangential_m_s: tuple[float, float] = (0.0, 0.0)
     normal_m_s: float = 0.0
     force_n: float | None = None
+
+
+STANDSTILL = ArmCommand()
 
 
 class ForceReading(enum.Enum):
@@ -169,79 +175,6 @@ class Arm:
     def move_surface(self, pose: Sequence[float]) -> None:
         """Let go, and take over another pose of the surface, (6,); it holds from the next connection on."""
         raise NotImplementedError
-
-
-# --------------------
-# What an arm or a hand does not carry out, whoever commands it.
-
-
-@dataclass(frozen=True)
-class CommandLimits:
-    """Limits of every single command; a base of the parameters of each arm.
-
-    The explorer has tighter limits of its own for what may be asked for. These hold also for programs that use an arm
-    without the explorer, and for a motion with an error in its arithmetic.
-    """
-
-    command_speed_m_s: float = param(
-        1.0,
-        'Highest tangential speed that one command may ask for; faster commands are refused.',
-        unit='m/s',
-        low=0.001,
-        high=2.0,
-    )
-    command_normal_m_s: float = param(
-        0.5,
-        'Highest normal speed that one command may ask for; faster commands are refused.',
-        unit='m/s',
-        low=0.001,
-        high=1.0,
-    )
-    command_force_n: float = param(
-        50.0,
-        'Highest normal force that one command may ask for; larger forces are refused.',
-        unit='N',
-        low=0.1,
-        high=200.0,
-    )
-
-    def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:
-        """Return if the command may be carried out.
-
-        Parameters
-        ----------
-        command
-            What the arm was asked for.
-        stop
-            Called before the error is raised: brings the arm to a standstill, as the command before may still hold.
-
-        Raises
-        ------
-        CommandRefused
-            If a number is not finite or out of its range, with the range.
-        """
-        reason = self._excess(command)
-        if not reason:
-            return
-        if stop is not None:
-            stop()
-        raise CommandRefused(f'the command was refused and the arm stopped: {reason}')
-
-    def _excess(self, command: ArmCommand) -> str:
-        # Written so that NaN is too much too.
-        speed = math.hypot(*command.tangential_m_s)
-        if not speed <= self.command_speed_m_s:
-            return _range('the speed along the surface', speed, 0.0, self.command_speed_m_s, 'm/s')
-        if not abs(command.normal_m_s) <= self.command_normal_m_s:
-            highest = self.command_normal_m_s
-            return _range('the speed along the normal', command.normal_m_s, -highest, highest, 'm/s')
-        if command.force_n is not None and not 0.0 <= command.force_n <= self.command_force_n:
-            return _range('the force', command.force_n, 0.0, self.command_force_n, 'N')
-        return ''
-
-
-def _range(what: str, value: float, low: float, high: float, unit: str) -> str:
-    return f'{what} is {value:g} {unit}; allowed is {low:g} to {high:g} {unit}'
 
 
 # --------------------
@@ -446,6 +379,49 @@ class CommandedVelocity:
 
 
 # --------------------
+# A process that stops the robot when the process that commanded it is gone.
+
+DONE = b'.'
+LEAVE_S = 2.0
+
+
+class GuardProcess:
+    """A process at a pipe whose other end only the commanding process holds.
+
+    The kernel closes that end however the process ends, also by SIGKILL; whoever ends in order says so first.
+
+    Parameters
+    ----------
+    module, arguments
+        What it runs.
+    start
+        What starts it, such as in a control group of its own.
+    """
+
+    def __init__(self, module: str, *arguments: str, start: Sequence[str] = ()) -> None:
+        # A session of its own: what ends all processes of a terminal or a launch file must not end the guard first.
+        self._process = subprocess.Popen(
+            [*start, sys.executable, '-m', module, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    @property
+    def pid(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    def dismiss(self) -> None:
+        """End the guard: the robot stands or has let go, or the line to it is gone."""
+        with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended
+            self._process.communicate(DONE, timeout=LEAVE_S)
+        self._process.kill()
+        self._process.wait()
+
+
+# --------------------
 # Find out whether the finger is in free air, from the force while it rises.
 
 UNSTEADY = (
@@ -475,6 +451,8 @@ class ZeroingParams:
 
 
 SMOOTHING_S = 0.02  # time constant over which the force is averaged: noise is no contact
+RISE_M_S = 0.02  # of an arm that looks for free air before it presses, as its force sensor is not zeroed
+MAX_RISES = 5.0  # it rises at most by so many times what proves free air
 
 
 class FreeAir:
@@ -499,6 +477,7 @@ class FreeAir:
         self._time_ns = 0
         self._start: Vector | None = None  # from where the rise counts
         self._start_n = math.nan
+        self._sought_from_m: float | None = None
         self.proven = False
 
     def presume_contact(self) -> None:
@@ -532,6 +511,15 @@ class FreeAir:
         elif not self.proven:
             self._rise(start, position)
         return self.proven
+
+    def seek(self, height_m: float | None) -> bool:
+        """Return whether the finger has risen in search of free air for too long; None if it does not search."""
+        if height_m is None:
+            self._sought_from_m = None
+            return False
+        if self._sought_from_m is None:
+            self._sought_from_m = height_m
+        return height_m - self._sought_from_m > MAX_RISES * self._rise_m
 
     def _smooth(self, time_ns: int, force_n: float) -> None:
         passed_s, self._time_ns = (time_ns - self._time_ns) * 1e-9, time_ns
@@ -573,6 +561,8 @@ class ForceZero:
 
     Attributes
     ----------
+    air : FreeAir
+        Whether nothing touches the finger.
     zeroed : bool
         Whether there is a zero.
     offset_n : (3,)
@@ -582,17 +572,12 @@ class ForceZero:
     """
 
     def __init__(self, rise_m: float, steady_n: float) -> None:
-        self._air = FreeAir(rise_m, steady_n)
+        self.air = FreeAir(rise_m, steady_n)
         self._readings: deque[Array] = deque(maxlen=READINGS)
         self._rest_ns: int | None = None
         self.zeroed = False
         self.offset_n: Array = np.zeros(3)
         self.zeroings = 0
-
-    @property
-    def in_free_air(self) -> bool:
-        """Whether nothing touches the finger, as far as is proven."""
-        return self._air.proven
 
     def forget(self) -> None:
         """The sensor or the arm was lost for a while: nothing is known any more."""
@@ -601,7 +586,7 @@ class ForceZero:
 
     def presume_contact(self) -> None:
         """The finger presses, or was told to: the next zero needs another rise."""
-        self._air.presume_contact()
+        self.air.presume_contact()
         self._rest_ns = None
         self._readings.clear()
 
@@ -621,7 +606,7 @@ class ForceZero:
         moving
             Whether the arm is commanded to move.
         """
-        if not self._air.update(time_ns, position, normal_n) or moving:
+        if not self.air.update(time_ns, position, normal_n) or moving:
             self._rest_ns = None
             self._readings.clear()
             return

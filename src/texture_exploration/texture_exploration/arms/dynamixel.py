@@ -9,21 +9,19 @@ import importlib
 import math
 import os
 import signal
-import subprocess
 import sys
 import termios
 import threading
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import serial
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.arm import ArmCommand, CommandLimits
+from texture_exploration.arms.arm import DONE, STANDSTILL, ArmCommand, GuardProcess
 from texture_exploration.arms.hand import (
     FingerSet,
     Fingertip,
@@ -34,6 +32,7 @@ from texture_exploration.arms.hand import (
     goes_on,
     load_profile,
 )
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
@@ -62,8 +61,7 @@ REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/rebo
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
 
-@dataclass(frozen=True)
-class MotorState:
+class MotorState(NamedTuple):
     """What a motor measures."""
 
     current_a: float
@@ -75,42 +73,19 @@ class NoAnswer(DeviceError):
     """A motor that fell silent while it was told something."""
 
 
-class _Lock:
-    """A lock on a serial device, held by a descriptor of its own, from its making until it is closed.
+def _locked(device: str) -> int:
+    """Return a descriptor that holds a lock on a device; OSError if another program has it.
 
     Two programs on one bus would take each other's answers, and let each other's motors go. The SDK empties the input
     buffer as it opens the port, answers to another program included; so the lock is taken before.
-
-    Parameters
-    ----------
-    device
-        Path of the device.
-
-    Raises
-    ------
-    OSError
-        If the device cannot be opened, or another program has the lock.
     """
-
-    def __init__(self, device: str) -> None:
-        self._descriptor: int | None = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            self.close()
-            raise
-
-    def __enter__(self) -> _Lock:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Release the lock; again without effect."""
-        descriptor, self._descriptor = self._descriptor, None
-        if descriptor is not None:
-            os.close(descriptor)
+    descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
 
 
 class DynamixelBus:
@@ -139,11 +114,12 @@ class DynamixelBus:
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
+        self._lock: int | None = None
         self._profile = profile
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
         with self._line(), contextlib.ExitStack() as on_error:
-            self._lock = on_error.enter_context(_Lock(device))
+            self._lock = _locked(device)
             on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
             if opened:
@@ -162,7 +138,9 @@ class DynamixelBus:
         """Close the port; never raises."""
         with contextlib.suppress(*LINE_FAULTS):
             self._port.closePort()
-        self._lock.close()
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     def start(self) -> None:
         """Find and check the motors, set mode and gains; only when all is well, let them hold where they are.
@@ -501,17 +479,12 @@ def signed(value: int, size: int) -> int:
 # --------------------
 # A process that switches the torque of the motors off when the process that commanded them is gone.
 #
-# It waits at a pipe whose other end only the commanding process holds. The kernel closes that end however the process
-# ends, also by SIGKILL; whoever ends in order says so first.
-
-DONE = b'.'
 SYNC_WRITE, BROADCAST = 0x83, 0xFE
 REPEATS = 5  # nobody answers a sync write; one may meet what was still on the line
 PAUSE_S = 0.02
-LEAVE_S = 2.0
 
 
-class TorqueGuard:
+class TorqueGuard(GuardProcess):
     """The guard of one hand; start it before the torque is switched on.
 
     Parameters
@@ -523,22 +496,7 @@ class TorqueGuard:
     """
 
     def __init__(self, device: str, baud: int, packet: bytes) -> None:
-        command = [sys.executable, '-m', __name__, device, str(baud), packet.hex()]
-        # A session of its own: what ends all processes of a terminal or a launch file must not end the guard first.
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-
-    def dismiss(self) -> None:
-        """End the guard: the torque has been switched off, or the line is gone."""
-        with contextlib.suppress(OSError):  # of a guard that has ended
-            self._process.communicate(DONE, timeout=LEAVE_S)
-        self._process.kill()
-        self._process.wait()
+        super().__init__(__name__, device, str(baud), packet.hex())
 
 
 def torque_off_packet(address: int, motors: Iterable[int]) -> bytes:
@@ -590,7 +548,6 @@ LONGEST_STEP_S = 0.05
 RATE_CYCLES = 40  # the rate is measured over so many
 SLOW_SHARE = 0.7  # of the rate of the profile; a bus that makes less is told
 LATENCY_FILE = '/sys/class/tty/{}/device/latency_timer'  # of adapters by FTDI, ms
-STANDSTILL = ArmCommand()
 LIMITS = CommandLimits()
 NOT_CONNECTED = 'the hand is not connected; connect it first'
 

@@ -7,12 +7,13 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, get_type_hints
 
 from texture_core.config import find_file, load_yaml, unknown_name
 from texture_core.errors import DeviceError, InvalidParameter, TextureError
-from texture_exploration.arms.arm import ArmCommand, CommandLimits, Vector
+from texture_exploration.arms.arm import ArmCommand, Vector
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # Dynamixel models by number: what a count of current is, and how much torque a current makes.
@@ -100,8 +101,7 @@ def differs(model: int, current_a: float, torque_nm_a: float) -> str:
 # What every hand can do: hold with some fingers, and move others as arms move theirs.
 
 
-@dataclass(frozen=True)
-class Fingertip:
+class Fingertip(NamedTuple):
     """Position, velocity and force of one fingertip, in the frame of its own patch of the object; see `ArmState`."""
 
     position: Vector
@@ -109,8 +109,7 @@ class Fingertip:
     force_n: float
 
 
-@dataclass(frozen=True)
-class HandState:
+class HandState(NamedTuple):
     """All fingertips at one time of CLOCK_MONOTONIC; `fault` says why the hand cannot move, '' if it can."""
 
     time_ns: int
@@ -118,8 +117,7 @@ class HandState:
     fault: str = ''
 
 
-@dataclass(frozen=True)
-class FingerSet:
+class FingerSet(NamedTuple):
     """Which fingers hold the object, and which slide on it."""
 
     hold: tuple[str, ...]
@@ -181,8 +179,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 SIZES = (1, 2, 4)  # bytes of a register
 
 
-@dataclass(frozen=True)
-class Joint:
+class Joint(NamedTuple):
     """One motor of a finger: the fingertip moves `lever_m` per rad, linearised around the pose at the start."""
 
     id: int
@@ -281,27 +278,17 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
         for finger in (*one.hold, *one.slide):
             if finger not in fingers:
                 raise InvalidParameter(f'{where}: {unknown_name(finger, fingers, "finger")}')
-    scales = content['scales']
+    given, kinds = {**content, **content['scales']}, get_type_hints(Profile)
     profile = Profile(
         name=name,
         models=tuple(content['models']),
-        baud=int(content['baud']),
-        rate_hz=float(content['rate_hz']),
-        operating_mode=int(content['operating_mode']),
         gains={register: int(value) for register, value in content['gains'].items()},
-        position_rad=float(scales['position_rad']),
-        zero=int(scales['zero']),
-        velocity_rad_s=float(scales['velocity_rad_s']),
-        current_a=float(scales['current_a']),
-        torque_nm_a=float(content['torque_nm_a']),
-        idle_a=float(content['idle_a']),
-        move_a=float(content['move_a']),
         table={register: (int(place[0]), int(place[1])) for register, place in content['table'].items()},
         fingers=fingers,
         finger_sets=sets,
-        start_height_m=float(content['start_height_m']),
         hold_pose=tuple(content.get('hold_pose', ())),
         watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
+        **{number: kind(given[number]) for number, kind in kinds.items() if number in RANGES},
     )
     _check_numbers(profile, where)
     _check_models(profile, where)

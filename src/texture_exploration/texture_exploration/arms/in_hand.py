@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from texture_core.config import find, param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
-from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, CommandLimits, Vector
+from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
 from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
+from texture_exploration.safety import CommandLimits
 
 HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_SHARE = 0.5  # one that presses less has lost it

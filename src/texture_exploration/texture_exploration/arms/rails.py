@@ -17,7 +17,8 @@ import serial
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
-from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, CommandLimits, Vector
+from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # Numbers of the rails and of the line to their microcontroller: the machine of Hu et al. 2014, frames of our own.

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.types import Array, quaternion_matrix
 from texture_exploration.arms.arm import (
+    RISE_M_S,
+    STANDSTILL,
     UNSTEADY,
     ArmCommand,
     ArmState,
     CommandedVelocity,
-    CommandLimits,
     ForceReading,
     ForceZero,
     SurfaceArm,
@@ -33,7 +34,7 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
-from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, Listening
+from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, CommandLimits, Listening
 
 # --------------------
 # What can be chosen about an arm that is driven by ROS controllers.
@@ -131,14 +132,6 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         low=0.01,
         high=2.0,
     )
-    follow_m: float = param(
-        0.002,
-        'Commanded distance over which the arm must have followed, or its controller counts as lost; a larger '
-        'value notices it later.',
-        unit='m',
-        low=0.0005,
-        high=0.1,
-    )
     tool_mass_kg: float = param(
         0.0,
         'Mass of the tool whose weight is removed from the measured force; 0 if the sensor does so itself.',
@@ -170,16 +163,6 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         high=60.0,
     )
 
-    @property
-    def activated(self) -> tuple[str, ...]:
-        """Controllers that command the arm while it is connected."""
-        return tuple(self.activate_controllers.split())
-
-    @property
-    def deactivated(self) -> tuple[str, ...]:
-        """Controllers that command the arm otherwise."""
-        return tuple(self.deactivate_controllers.split())
-
     def __post_init__(self) -> None:
         if self.twist_frame_id not in ('', self.base_frame_id, self.tool_frame_id):
             raise InvalidParameter(
@@ -192,8 +175,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
 # What an arm driven by ROS controllers exchanges with them, without ROS.
 
 
-@dataclass(frozen=True)
-class PoseSample:
+class PoseSample(NamedTuple):
     """A measured pose: `position_m` in the frame `frame_id`, `rotation` as the quaternion x, y, z, w.
 
     `stamp_ns` is the time of its header, on the clock of the sender; 0 if there is none. `age_ns` is its age by that
@@ -207,8 +189,7 @@ class PoseSample:
     age_ns: int = 0
 
 
-@dataclass(frozen=True)
-class ForceSample:
+class ForceSample(NamedTuple):
     """A measured force, N, in the frame `frame_id`; `stamp_ns` and `age_ns` as of a pose."""
 
     stamp_ns: int
@@ -251,8 +232,9 @@ class ControllerTopics(Protocol):
 # --------------------
 # Whether the controllers of an arm still work: pose and force are fresh, somebody listens, the arm follows.
 
+FOLLOW_M = 0.002  # commanded, over which the arm must have followed
 FOLLOW_NS = 300_000_000  # an arm with lag needs time to set off
-LONGEST_NS = 3_000_000_000  # what is slower than `follow_m` in this time is no motion: a force being held
+LONGEST_NS = 3_000_000_000  # what is slower than `FOLLOW_M` in this time is no motion: a force being held
 FOLLOWED_SHARE = 0.1  # a controller may limit speed and acceleration to its own
 STOOD_SHARE = 0.3  # an arm that went less in any direction stood still, and may be told to lift
 
@@ -263,19 +245,13 @@ class FollowWatch:
     The comparison begins again when the commanded velocity turns back: a late arm still goes the old way for its lag,
     which is no sign of a lost controller.
 
-    Parameters
-    ----------
-    follow_m
-        Commanded distance after which it counts, m.
-
     Attributes
     ----------
     stood : bool
         Whether an arm that did not follow stood still, and did not go another way.
     """
 
-    def __init__(self, follow_m: float) -> None:
-        self._follow_m = follow_m
+    def __init__(self) -> None:
         self.stood = True
         self._begin: tuple[int, Array] | None = None
         self._asked_m: Array = np.zeros(3)
@@ -309,7 +285,7 @@ class FollowWatch:
         self._asked_m = self._asked_m + velocity * held_s
         begin_ns, start = self._begin
         asked_m = float(np.linalg.norm(self._asked_m))
-        if asked_m < self._follow_m or now_ns - begin_ns < FOLLOW_NS:
+        if asked_m < FOLLOW_M or now_ns - begin_ns < FOLLOW_NS:
             if now_ns - begin_ns > LONGEST_NS:
                 self.restart()
             return ''
@@ -320,37 +296,6 @@ class FollowWatch:
         if gone_m >= FOLLOWED_SHARE * asked_m:
             return ''
         return f'the arm went {1e3 * gone_m:.1f} mm of the {1e3 * asked_m:.1f} mm commanded in {took_s:.1f} s'
-
-
-def stale(
-    params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int, listening: Listening = WITHOUT_GAPS
-) -> str:
-    """Return in a sentence that pose or force are older than the parameters allow, '' if they are not.
-
-    Parameters
-    ----------
-    params
-        Names of the topics and the longest allowed age.
-    now_ns
-        The time, ns.
-    pose_ns, force_ns
-        When pose and force came last, ns.
-    listening
-        When this process stood still itself: what it could not take then is not what did not come.
-
-    Returns
-    -------
-    str
-        A sentence without a full stop, or ''.
-    """
-    for what, topic, time_ns in (('pose', params.pose_topic, pose_ns), ('force', params.wrench_topic, force_ns)):
-        age_s = listening.silence_s(time_ns, now_ns)
-        if age_s > params.deadman_s:
-            return (
-                f"no {what} has come on '{topic}' for {1e3 * age_s:.0f} ms, so zero velocity was commanded; check that "
-                'its broadcaster is active'
-            )
-    return ''
 
 
 # --------------------
@@ -498,6 +443,19 @@ class ToolState:
         """In a sentence, that the newest pose or force came too late after its stamp; '' if not."""
         return self._late['pose'] or self._late['force']
 
+    def stale(self, now_ns: int) -> str:
+        """Return in a sentence that pose or force are older than the parameters allow, '' if they are not."""
+        params = self._params
+        measured = (('pose', params.pose_topic, self.pose_ns), ('force', params.wrench_topic, self.force_ns))
+        for what, topic, time_ns in measured:
+            age_s = self.listening.silence_s(time_ns, now_ns)
+            if age_s > params.deadman_s:
+                return (
+                    f"no {what} has come on '{topic}' for {1e3 * age_s:.0f} ms, so zero velocity was commanded; check "
+                    'that its broadcaster is active'
+                )
+        return ''
+
     def _at_surface(self, to_base: Array, force_n: Array) -> Vector:
         return self._frame.direction((to_base @ force_n).tolist())
 
@@ -528,11 +486,8 @@ class ToolState:
 # The force is controlled by the velocity loop of the suite, or by a compliance controller if one is named. This file
 # knows no ROS: the topics are behind `texture_exploration.arms.ros_controllers.ControllerTopics`.
 
-STANDSTILL = ArmCommand()
 HALTING_NS = 500_000_000  # so long zero velocity is repeated; afterwards others may command the controller
 GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
-RISE_M_S = 0.02
-MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
 POLL_S = 0.005
 NOT_CONNECTED = 'the arm is not connected; connect it first'
 
@@ -592,6 +547,7 @@ class RosControllersArm(SurfaceArm):
         self._clock = clock
         self._open_topics = open_topics
         self._own_thread = own_thread
+        self._switches = params.activate_controllers.split(), params.deactivate_controllers.split()
         self.force_reading = ForceReading.MEASURED if params.force_is_quantised else ForceReading.NOISY
         self._topics: ControllerTopics | None = None
         self._thread: threading.Thread | None = None
@@ -601,7 +557,6 @@ class RosControllersArm(SurfaceArm):
         self._command: tuple[ArmCommand, int] | None = None  # and when it came
         self._commanded: Vector = REST
         self._moved_ns = self._sent_ns = 0
-        self._rise_from_m: float | None = None
         self._pressing = False  # a compliance controller was commanded a force
         self._switched = False  # controllers were switched for this connection
         self._hand_over_fault = ''
@@ -767,9 +722,9 @@ class RosControllersArm(SurfaceArm):
         loop = replace(params, loop_delay_s=min(0.1, params.loop_delay_s + params.force_smoothing_s))
         self._tool = ToolState(params)
         self._velocity = CommandedVelocity(loop, 1.0 / params.rate_hz)
-        self._follow = FollowWatch(params.follow_m)
+        self._follow = FollowWatch()
         self._state = self._tool.state('')
-        self._place = self._command = self._rise_from_m = None
+        self._place = self._command = None
         self._commanded = REST
         self._moved_ns = self._sent_ns = self._gone_ns = 0
         self._pressing = self._zeroed = False
@@ -777,7 +732,7 @@ class RosControllersArm(SurfaceArm):
 
     def _take_over(self, topics: ControllerTopics) -> None:
         if self._params.controller_manager:
-            topics.switch_controllers(self._params.activated, self._params.deactivated)
+            topics.switch_controllers(*self._switches)
             self._switched, self._hand_over_fault = True, ''
 
     def _give_back(self, topics: ControllerTopics) -> None:
@@ -786,7 +741,7 @@ class RosControllersArm(SurfaceArm):
             return
         self._switched = False
         try:
-            topics.switch_controllers(self._params.deactivated, self._params.activated)
+            topics.switch_controllers(*reversed(self._switches))
         except DeviceError as error:
             self._hand_over_fault = f'the controllers were not switched back: {error}'
 
@@ -862,12 +817,7 @@ class RosControllersArm(SurfaceArm):
 
     def _fault(self, now_ns: int) -> str:
         tool = self._tool
-        return (
-            self._lost
-            or tool.misplaced
-            or tool.late
-            or stale(self._params, now_ns, tool.pose_ns, tool.force_ns, tool.listening)
-        )
+        return self._lost or tool.misplaced or tool.late or tool.stale(now_ns)
 
     def _due(self, now_ns: int) -> ArmCommand | None:
         """Return the command that holds now, None if none does."""
@@ -883,13 +833,11 @@ class RosControllersArm(SurfaceArm):
         """Return the command, or what comes before it as long as the force sensor is not zeroed."""
         zero, height_m = self._tool.zero, self._state.position[2]
         if command.force_n is None or zero.zeroed:
-            self._rise_from_m = None
+            zero.air.seek(None)
             return command
-        if zero.in_free_air:
+        if zero.air.proven:
             return None  # at rest it is zeroed
-        if self._rise_from_m is None:
-            self._rise_from_m = height_m
-        if height_m - self._rise_from_m > MAX_RISES * self._params.zero_rise_m:
+        if zero.air.seek(height_m):
             self._lost = UNSTEADY
             return None
         return ArmCommand(normal_m_s=RISE_M_S)

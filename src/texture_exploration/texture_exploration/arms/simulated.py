@@ -16,15 +16,16 @@ from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
 from texture_exploration.arms.arm import (
+    STANDSTILL,
     Arm,
     ArmCommand,
     ArmState,
     CommandedVelocity,
-    CommandLimits,
     ForceReading,
     Vector,
 )
 from texture_exploration.force_control import ForceLoopParams
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # What lies under the simulated finger: an elastic surface with a tilt, a bump, a step, an edge or a soft layer.
@@ -35,86 +36,59 @@ BASE_STIFFNESS_N_M = 20000.0  # below a soft layer, and of a wall: as of wood un
 
 
 @dataclass(frozen=True)
-class SimulatedSurfaceParams:
-    """Parameters of the surface under a simulated finger: shape, layers, stickiness."""
+class SurfaceShape:
+    """What force control is tried on; programs choose it, a plane is the default."""
 
-    tilt_rad: float = param(
-        0.0,
-        'Angle by which the surface rises along x; a larger angle is steeper.',
-        unit='rad',
-        low=-0.5,
-        high=0.5,
-    )
-    bump_m: float = param(
-        0.0, 'Height of a round bump on the path along x; 0 removes the bump.', unit='m', low=-0.01, high=0.01
-    )
-    step_m: float = param(
-        0.0, 'Height of a step of the surface along x; 0 removes the step.', unit='m', low=-0.1, high=0.01
-    )
-    step_from_m: float = param(0.03, 'X coordinate of the step.', unit='m', low=-2.0, high=2.0)
-    edge_m: float = param(2.0, 'X coordinate at which the surface ends.', unit='m', low=-2.0, high=2.0)
-    layer_m: float = param(
-        0.0, 'Thickness of a soft layer on the surface; 0 removes the layer.', unit='m', low=0.0, high=0.02
-    )
-    wall_m: float = param(
-        2.0,
-        'X coordinate of a wall of 20 kN/m across the way of the finger.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    adhesion_n: float = param(
-        0.0,
-        'Largest pulling force with which the surface adheres to the finger; 0 removes adhesion.',
-        unit='N',
-        low=0.0,
-        high=10.0,
-    )
-    stick_slip_n: float = param(
-        0.0,
-        'Amplitude of the force while the finger sticks and slips every 2 mm; 0 removes stick-slip.',
-        unit='N',
-        low=0.0,
-        high=5.0,
-    )
+    tilt_rad: float = 0.0  # by which it rises along x
+    bump_m: float = 0.0  # height of a round bump on the path along x
+    step_m: float = 0.0  # height of a step along x
+    step_from_m: float = 0.03
+    edge_m: float = math.inf  # x where it ends
+    layer_m: float = 0.0  # thickness of a soft layer on a hard base
+    wall_m: float = math.inf  # x of a wall across the way of the finger
+    adhesion_n: float = 0.0  # largest pulling force with which it holds the finger
+    stick_slip_n: float = 0.0  # amplitude of the force while the finger sticks and slips
+
+
+PLANE = SurfaceShape()
 
 
 class SimulatedSurface:
     """Height and force; remembers whether the finger sticks."""
 
-    def __init__(self, params: SimulatedSurfaceParams, stiffness_n_m: float) -> None:
-        self._params = params
+    def __init__(self, shape: SurfaceShape, stiffness_n_m: float) -> None:
+        self._shape = shape
         self._stiffness_n_m = stiffness_n_m
         self._sticking = False
 
     def height_m(self, x_m: float) -> float:
         """Return the height of the untouched surface at x."""
-        params = self._params
+        shape = self._shape
         share = (x_m - BUMP_FROM_M) / BUMP_LENGTH_M
         bump = 0.5 - 0.5 * math.cos(2 * math.pi * share) if 0 < share < 1 else 0.0
-        step = params.step_m if x_m >= params.step_from_m else 0.0
-        return x_m * math.tan(params.tilt_rad) + params.bump_m * bump + step
+        step = shape.step_m if x_m >= shape.step_from_m else 0.0
+        return x_m * math.tan(shape.tilt_rad) + shape.bump_m * bump + step
 
     def force_n(self, x_m: float, z_m: float) -> float:
         """Return the force of a finger at (x, z), positive when pressing: a spring that may stick."""
-        if x_m >= self._params.edge_m:
+        if x_m >= self._shape.edge_m:
             self._sticking = False
             return 0.0
         depth = self.height_m(x_m) - z_m
         press = self._press_n(depth)
         # A sticky surface comes along with the finger until it tears off.
-        self._sticking = depth > 0 or (self._sticking and press > -self._params.adhesion_n)
+        self._sticking = depth > 0 or (self._sticking and press > -self._shape.adhesion_n)
         if not self._sticking:
             return 0.0
-        return press + self._params.stick_slip_n * (2 * ((x_m / STICK_M) % 1.0) - 1)
+        return press + self._shape.stick_slip_n * (2 * ((x_m / STICK_M) % 1.0) - 1)
 
     def wall_n(self, x_m: float) -> float:
         """Return the force with which a wall pushes the finger back along x."""
-        return -BASE_STIFFNESS_N_M * max(0.0, x_m - self._params.wall_m)
+        return -BASE_STIFFNESS_N_M * max(0.0, x_m - self._shape.wall_m)
 
     def _press_n(self, depth_m: float) -> float:
         """Return the force of the spring, or of the soft layer and what is below it."""
-        layer_m = self._params.layer_m
+        layer_m = self._shape.layer_m
         if not layer_m or depth_m <= layer_m:
             return self._stiffness_n_m * depth_m
         return self._stiffness_n_m * layer_m + BASE_STIFFNESS_N_M * (depth_m - layer_m)
@@ -157,13 +131,12 @@ class DelayedVelocity:
 
 RATE_HZ = 250.0
 RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, but costs next to nothing
-STANDSTILL = ArmCommand()
 STEEPEST = 1.0  # slope that the arm's own force mode follows
 
 
 @dataclass(frozen=True)
-class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams, CommandLimits):
-    """Parameters of the simulated arm and of the surface under it."""
+class SimulatedArmParams(ForceLoopParams, CommandLimits):
+    """Parameters of the simulated arm and of its contact with the surface."""
 
     force_mode: bool = param(
         True,
@@ -222,11 +195,13 @@ class SimulatedArm(Arm):
     Parameters
     ----------
     params
-        The arm and its surface.
+        The arm and its contact.
     clock
         CLOCK_MONOTONIC in ns.
     own_thread
         Move by itself at 250 Hz once connected. If False, whoever owns the arm calls `step`.
+    shape
+        Of the surface under the finger.
 
     Raises
     ------
@@ -241,6 +216,7 @@ class SimulatedArm(Arm):
         params: SimulatedArmParams = SimulatedArmParams(),
         clock: Callable[[], int] = time.monotonic_ns,
         own_thread: bool = True,
+        shape: SurfaceShape = PLANE,
     ) -> None:
         self._params = params
         self._clock = clock
@@ -260,7 +236,7 @@ class SimulatedArm(Arm):
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_port)
-        self._surface = SimulatedSurface(params, params.stiffness_n_m)
+        self._surface = SimulatedSurface(shape, params.stiffness_n_m)
         # The force control is told `loop_delay_s` alone; the rest it has to find out.
         self._velocity = None if params.force_mode else CommandedVelocity(params, 1 / RATE_HZ)
         self._delayed = DelayedVelocity(params.loop_delay_s + params.undeclared_lag_s, clock())

@@ -6,7 +6,6 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
-import math
 import signal
 import socket
 import struct
@@ -16,15 +15,16 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_exploration.arms.arm import (
+    STANDSTILL,
     UNSTEADY,
     ArmCommand,
     ArmState,
-    CommandLimits,
     ForceReading,
     SurfaceArm,
     SurfacePoseParams,
@@ -32,6 +32,7 @@ from texture_exploration.arms.arm import (
     ZeroingParams,
     tangential_force_n,
 )
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # A TCP connection to a controller, with a time limit on every answer.
@@ -104,16 +105,13 @@ class TcpConnection:
 
 
 # --------------------
-# Messages between the arm and its worker process: datagrams on a socket pair, one message each.
+# Messages between the arm and its worker process: datagrams on a socket pair, a letter and JSON in each.
 
-COMMAND, STOP, RECOVER, REPORT, FAILURE = (bytes([number]) for number in range(1, 6))
-COMMAND_FORMAT = struct.Struct('<q4d')
-REPORT_FORMAT = struct.Struct('<q10di4?5I')
+COMMAND, STOP, RECOVER, REPORT, FAILURE = b'c', b's', b'v', b'r', b'f'
 LARGEST = 4096
 
 
-@dataclass(frozen=True)
-class UrCommand:
+class UrCommand(NamedTuple):
     """Command to the arm in the base frame: a velocity, (3,), and perhaps a force that presses on the surface.
 
     `time_ns` is when it was commanded, of CLOCK_MONOTONIC: a wish that waited for the worker is old.
@@ -123,20 +121,8 @@ class UrCommand:
     velocity_m_s: Vector
     force_n: float | None
 
-    def to_bytes(self) -> bytes:
-        """Return the message."""
-        force = math.nan if self.force_n is None else self.force_n
-        return COMMAND + COMMAND_FORMAT.pack(self.time_ns, *self.velocity_m_s, force)
 
-    @classmethod
-    def from_bytes(cls, data: bytes) -> UrCommand:
-        """Return what a message says."""
-        time_ns, vx, vy, vz, force = COMMAND_FORMAT.unpack(data[1:])
-        return cls(time_ns, (vx, vy, vz), None if math.isnan(force) else force)
-
-
-@dataclass(frozen=True)
-class Counts:
+class Counts(NamedTuple):
     """What was counted since the arm was connected.
 
     `late`: gaps of more than 20 ms in what the controller sends. `refused`: commands that it did not take. `zeroed`:
@@ -151,8 +137,7 @@ class Counts:
     slowest_acknowledgement_ms: int = 0
 
 
-@dataclass(frozen=True)
-class UrReport:
+class UrReport(NamedTuple):
     """What the controller measured last, in the base frame, and how it is.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
@@ -172,25 +157,15 @@ class UrReport:
     zeroed: bool
     counts: Counts
 
-    def to_bytes(self) -> bytes:
-        """Return the message."""
-        vectors = (*self.position_m, *self.velocity_m_s, *self.force_n, self.watchdog_s)
-        status = (self.safety_mode, self.playing, self.silent, self.unsteady, self.zeroed, *astuple(self.counts))
-        return REPORT + REPORT_FORMAT.pack(self.time_ns, *vectors, *status)
 
-    @classmethod
-    def from_bytes(cls, data: bytes) -> UrReport:
-        """Return what a message says."""
-        numbers = REPORT_FORMAT.unpack(data[1:])
-        position, velocity, force = numbers[1:4], numbers[4:7], numbers[7:10]
-        watchdog_s, safety_mode, playing, silent, unsteady, zeroed = numbers[10:16]
-        status = (safety_mode, playing, silent, unsteady, zeroed, Counts(*numbers[16:]))
-        return cls(numbers[0], position, velocity, force, watchdog_s, *status)
+def encoded(kind: bytes, content: UrCommand | UrReport) -> bytes:
+    """Return a message."""
+    return kind + json.dumps(content).encode()
 
 
-def failure_message(text: str) -> bytes:
-    """Return the message that the worker gives up, and why."""
-    return FAILURE + text.encode()[: LARGEST - 1]
+def command_of(data: bytes) -> UrCommand:
+    """Return the command in a message."""
+    return UrCommand(*json.loads(data[1:]))
 
 
 # --------------------
@@ -215,13 +190,6 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
         unit='m/s²',
         low=0.1,
         high=10.0,
-    )
-    force_speed_m_s: float = param(
-        0.05,
-        'Highest normal speed under force control; a higher speed corrects force errors faster.',
-        unit='m/s',
-        low=0.001,
-        high=0.25,
     )
     command_timeout_s: float = param(
         0.2,
@@ -367,7 +335,8 @@ class WorkerLink:
         while data := self._receive():
             kind = data[:1]
             if kind == REPORT:
-                self.report = UrReport.from_bytes(data)
+                *measured, counts = json.loads(data[1:])
+                self.report = UrReport._make([*measured, Counts(*counts)])
                 self._state_received.set()
             elif kind == FAILURE:
                 self._failure = data[1:].decode()
@@ -629,52 +598,29 @@ def _safety(dashboard: DashboardClient) -> str:
 
 SAMPLE_PERIOD_S = 0.05
 UR_PROGRAM_STOPPING_S = 2.0
+WATCHDOG_S = 0.5  # beside its period, until it has ended a program
 
 
-def check_program(
-    ip: str,
-    version: tuple[int, int],
-    timeout_s: float,
-    *,
-    take_over: bool,
-    pause_is_ours: bool,
-    patience_s: float,
-    upper_range: bool = False,
-) -> None:
+def check_program(params: UrArmParams, version: tuple[int, int], *, pause_is_ours: bool) -> None:
     """Return if no program runs or pauses on the controller, or none that anybody needs.
 
     A stop by the safety system may pause the program of the connection before: `pause_is_ours`. A control script of
-    ours whose process was killed is ended by its watchdog within `patience_s`; one that has none yet is known by its
-    name and by nobody writing the register that it obeys: one of the upper range if `upper_range`.
-
-    Parameters
-    ----------
-    ip
-        Address of the controller.
-    version
-        Version of the controller, as `check_ready` gives it.
-    timeout_s
-        Longest time to wait for one answer.
-    take_over
-        Whether a program of others is stopped.
-    pause_is_ours
-        Whether a paused program is one that this connection started before.
-    patience_s
-        How long a running program may take to end by itself.
-    upper_range
-        Whether the registers of the upper range are used.
+    ours whose process was killed is ended by its watchdog; one that has none yet is known by its name and by nobody
+    writing the register that it obeys.
 
     Raises
     ------
     DeviceError
         If there is one and `take_over` does not allow to stop it.
     """
-    end_s = time.monotonic() + patience_s
+    ip, timeout_s = params.ip, params.probe_timeout_s
+    end_s = time.monotonic() + max(params.acknowledge_s, 1.0 / params.watchdog_hz) + WATCHDOG_S
     while program := _program(ip, version, timeout_s):
-        if take_over or (pause_is_ours and program.upper().startswith('PAUSED')):
+        if params.take_over or (pause_is_ours and program.upper().startswith('PAUSED')):
             break
         if time.monotonic() > end_s:
-            if _is_orphan(ip, program, timeout_s, COMMAND_REGISTERS[upper_range]):
+            register = COMMAND_REGISTERS[params.upper_range_registers]
+            if CONTROL_SCRIPT in program and claims_register(ip, register, timeout_s):
                 break
             raise DeviceError(
                 f"another program is on the controller at {ip} ('{program}'), and connecting would stop it; stop it on "
@@ -696,10 +642,6 @@ def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
 
 
-def _is_orphan(ip: str, program: str, timeout_s: float, register: str) -> bool:
-    return CONTROL_SCRIPT in program and claims_register(ip, register, timeout_s)
-
-
 def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
     """Stop it by the dashboard; without one ur-rtde has to."""
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
@@ -716,10 +658,8 @@ def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
 
 
 BASE_FRAME_ID = 'base'  # as ur_robot_driver and UR's own description call it, without a prefix
-STANDSTILL = ArmCommand()
 RECOVERY_S = 6.0
 POLL_S = 0.01
-WATCHDOG_S = 0.5  # beside its period, until it has ended a program
 
 
 class UrArm(SurfaceArm):
@@ -767,15 +707,7 @@ class UrArm(SurfaceArm):
             )
         params = self._params
         version = check_ready(params.ip, params.probe_timeout_s, params.unlock_protective_stop)
-        check_program(
-            params.ip,
-            version,
-            params.probe_timeout_s,
-            take_over=params.take_over,
-            pause_is_ours=self._paused,
-            patience_s=max(params.acknowledge_s, 1.0 / params.watchdog_hz) + WATCHDOG_S,
-            upper_range=params.upper_range_registers,
-        )
+        check_program(params, version, pause_is_ours=self._paused)
         link = WorkerLink(params)
         try:
             link.wait_for_report()
@@ -835,7 +767,7 @@ class UrArm(SurfaceArm):
             return
         normal_m_s = command.normal_m_s if command.force_n is None else 0.0
         velocity = self._frame.to_base((*command.tangential_m_s, normal_m_s))
-        self._connected().send(UrCommand(time.monotonic_ns(), velocity, command.force_n).to_bytes())
+        self._connected().send(encoded(COMMAND, UrCommand(time.monotonic_ns(), velocity, command.force_n)))
 
     def stop(self) -> None:
         """Let the worker stop the arm."""
@@ -879,7 +811,7 @@ class UrArm(SurfaceArm):
     @property
     def counts(self) -> Mapping[str, int]:
         """Totals of this connection; see `texture_exploration.arms.ur.Counts`."""
-        return dataclasses.asdict(self._report().counts)
+        return self._report().counts._asdict()
 
     def _connected(self) -> WorkerLink:
         if self._link is None:

@@ -16,27 +16,30 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
 from texture_core.config import from_mapping
-from texture_exploration.arms.arm import FreeAir, SurfaceFrame, Vector
+from texture_exploration.arms.arm import CALM_NS, RISE_M_S, FreeAir, SurfaceFrame, Vector
 from texture_exploration.arms.ur import (
     COMMAND,
+    FAILURE,
     FORCE_DEVIATION_M,
     FORCE_DEVIATION_RAD,
     FORCE_FRAME_FIXED,
     LARGEST,
     PROGRAM_PLAYING,
     RECOVER,
+    REPORT,
     STOP,
     STOP_DECELERATION_M_S2,
     Counts,
     UrArmParams,
     UrCommand,
     UrReport,
-    failure_message,
+    command_of,
+    encoded,
 )
+from texture_exploration.force_control import FORCE_SPEED_M_S
 
 # --------------------
 # The watchdog of the controller: it stops the arm when it hears nothing, and it waits while a command is carried out.
@@ -137,10 +140,7 @@ class Watchdog:
 # are not acknowledged: a second one would overwrite the first before it is read. So each cycle sends one of them, and
 # what must hold is said again and again.
 
-RISE_M_S = 0.02
-CALM_NS = 100_000_000  # at rest, before the force sensor is zeroed
 TURN_NS = 100_000_000  # in which an arm has turned back
-MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
 
 
 class Mode(enum.Enum):
@@ -184,7 +184,6 @@ class UrCommandStream:
         self._up = self._frame.to_base((0.0, 0.0, RISE_M_S))
         self._air = FreeAir(params.zero_rise_m, params.zero_steady_n)
         self._measured_ns = self._rest_ns = 0
-        self._rise_from_m: float | None = None
         self._height_m = 0.0
         self._mode = Mode.STANDSTILL
         self._braking = False
@@ -229,22 +228,20 @@ class UrCommandStream:
         self._mode = Mode.STANDSTILL
         self._braking = False
         self.trusted = self.unsteady = False
-        self._rise_from_m = None
+        self._air.seek(None)
         self._air.presume_contact()
 
     def _lifted_first(self, ur_command: UrCommand | None) -> UrCommand | None:
         """Return the wish, or to rise and to stand still before it if it needs a force sensor that is not zeroed."""
         if ur_command is None or ur_command.force_n is None or self.trusted:
-            self._rise_from_m = None
+            self._air.seek(None)
             return ur_command
         if self.unsteady:
             return None
         if self._air.proven:
             return ur_command if self._mode is Mode.STANDSTILL else None
-        if self._rise_from_m is None:
-            self._rise_from_m = self._height_m
-        self.unsteady = self._height_m - self._rise_from_m > MAX_RISES * self._params.zero_rise_m
-        return replace(ur_command, velocity_m_s=self._up, force_n=None)
+        self.unsteady = self._air.seek(self._height_m)
+        return ur_command._replace(velocity_m_s=self._up, force_n=None)
 
     def _change(self, mode: Mode) -> bool:
         """Leave the present mode; return whether the new one has begun."""
@@ -325,7 +322,7 @@ class UrCommandStream:
             return self._speed(ur_command)
         normal_only = [0, 0, 1, 0, 0, 0]
         wrench = [0.0, 0.0, -(ur_command.force_n or 0.0), 0.0, 0.0, 0.0]
-        limits = [*(FORCE_DEVIATION_M,) * 2, self._params.force_speed_m_s, *(FORCE_DEVIATION_RAD,) * 3]
+        limits = [*(FORCE_DEVIATION_M,) * 2, FORCE_SPEED_M_S, *(FORCE_DEVIATION_RAD,) * 3]
         frame = list(self._params.surface_pose)
         return bool(self._control.forceMode(frame, normal_only, wrench, FORCE_FRAME_FIXED, limits))
 
@@ -427,11 +424,11 @@ class Observer:
             silent=self.silent,
             unsteady=self.unsteady,
             zeroed=self.zeroed,
-            counts=replace(self.counts, late=self._late),
+            counts=self.counts._replace(late=self._late),
         )
         self.newest = report
         try:
-            self._channel.send(report.to_bytes(), socket.MSG_DONTWAIT)
+            self._channel.send(encoded(REPORT, report), socket.MSG_DONTWAIT)
         except BlockingIOError:
             pass  # a parent that does not read has no use for old states
         except OSError:
@@ -502,6 +499,7 @@ class Worker:
     def _update_observer(self) -> None:
         """Pass on to the observer what it reports beside the measurements."""
         commands, watchdog = self._commands, self._watchdog
+        # After the cycle and not at once: a force that is told as zeroed is one of after the zeroing.
         self._observer.unsteady, self._observer.zeroed = commands.unsteady, commands.trusted
         self._observer.watchdog_s = watchdog.moving_s
         self._observer.counts = Counts(
@@ -557,7 +555,7 @@ class Worker:
     def _handle(self, data: bytes) -> None:
         kind = data[:1]
         if kind == COMMAND:
-            self._ur_command = UrCommand.from_bytes(data)
+            self._ur_command = command_of(data)
         elif kind == STOP:
             self._ur_command = None
         elif kind == RECOVER:
@@ -617,7 +615,7 @@ def main() -> None:
         traceback.print_exc()
         reason = f'the process that talks to the controller failed ({error!r}) and stopped the arm; connect again'
     if reason:
-        channel.send(failure_message(reason))
+        channel.send(FAILURE + reason.encode()[: LARGEST - 1])
     # To end the interfaces of ur-rtde takes seconds of sleep; the end of the process closes their connections too.
     os._exit(0)
 

@@ -168,18 +168,12 @@ RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds o
 
 
 @dataclass(frozen=True)
-class ArmParams:
-    """Parameters that select the arm of the explorer."""
+class ExplorerParams:
+    """Which arm it is, and who takes control of it."""
 
     arm: str = param(
         'simulated', "Arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."
     )
-
-
-@dataclass(frozen=True)
-class StartParams:
-    """Who takes control of the arm."""
-
     autostart: bool = param(
         True,
         'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
@@ -201,7 +195,8 @@ class ExplorerNode(PatientLifecycleNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
         self._early_stopping = declare(self, EarlyStoppingParams, changeable=True)
-        self._explorer = self._make_explorer()
+        params = declare(self, ExplorerParams)
+        self._explorer = self._make_explorer(params.arm)
         self._frames = FrameBroadcaster(self, declare(self, FrameParams))
         self._broadcast_surface()
         self._follow_parameters()
@@ -235,8 +230,7 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
-        start = declare(self, StartParams)
-        self._active, self._autostart, self._lift_at_start = False, start.autostart, start.lift_at_start
+        self._active, self._autostart, self._lift_at_start = False, params.autostart, params.lift_at_start
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()
@@ -309,8 +303,8 @@ class ExplorerNode(PatientLifecycleNode):
             outcome = current.outcome if current.ended.is_set() else STILL_MOVING
             self._log_end(current.exploration_id, outcome)
 
-    def _make_explorer(self) -> Explorer:
-        arm_class = find(ARMS, declare(self, ArmParams).arm, 'arm')
+    def _make_explorer(self, arm_name: str) -> Explorer:
+        arm_class = find(ARMS, arm_name, 'arm')
         arm = arm_class(declare(self, arm_class.Params))
         touch = declare(self, TouchParams, changeable=True)
         limits = declare(self, SafetyLimits, changeable=True)

@@ -30,7 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import DeviceError
 from texture_core.ros import to_ns
-from texture_exploration.arms.arm import Vector
+from texture_exploration.arms.arm import DONE, LEAVE_S, GuardProcess, Vector
 from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersParams
 
 # --------------------
@@ -92,12 +92,11 @@ def has_ended(info: Any) -> bool:
 # ends in order says so first.
 
 TWIST_GUARD_NODE = 'arm_guard'
-DONE, MOVING, RESTING = b'.', b'm', b'r'
+MOVING, RESTING = b'm', b'r'
 REPEATED_S = 0.5
 PERIOD_S = 0.01
 ANSWER_S = 0.05
 SILENT_S = 0.5  # a guard that has not answered for so long would not stop the arm either
-LEAVE_S = 2.0
 SCOPE = ('systemd-run', '--user', '--scope', '--quiet', '--collect')
 NO_SCOPE = (
     'systemd-run --user --scope is not available: the guard of the arm shares the control group of this process, and '
@@ -115,7 +114,7 @@ def scope() -> tuple[str, ...]:
     return ()
 
 
-class TwistGuard:
+class TwistGuard(GuardProcess):
     """The guard of one topic; nothing may be commanded to those whom it does not reach, or once it has ended.
 
     Parameters
@@ -131,18 +130,9 @@ class TwistGuard:
     def __init__(
         self, heartbeat_s: float, topic: str, frame_id: str, wrench_topic: str = '', wrench_frame_id: str = ''
     ) -> None:
-        # A session and, if possible, a control group of its own: what ends all processes of a terminal, a launch file
-        # or a service must not end the guard first.
-        self._process = subprocess.Popen(
-            [
-                *(*scope(), sys.executable, '-m', __name__, str(heartbeat_s)),
-                *(topic, frame_id, wrench_topic, wrench_frame_id),
-            ],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        # In a control group of its own, if possible: what ends all processes of a service must not end the guard first.
+        topics = (topic, frame_id, wrench_topic, wrench_frame_id)
+        super().__init__(__name__, str(heartbeat_s), *topics, start=scope())
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._out, self._in = self._process.stdin.fileno(), self._process.stdout.fileno()
@@ -150,11 +140,6 @@ class TwistGuard:
             os.set_blocking(pipe, False)
         self._reached = 0
         self._heard_s = 0.0
-
-    @property
-    def pid(self) -> int:
-        """Of the process."""
-        return self._process.pid
 
     @property
     def reached(self) -> int:
@@ -177,13 +162,6 @@ class TwistGuard:
         with contextlib.suppress(OSError):  # a full pipe or a dead guard, which `fault` tells
             os.write(self._out, MOVING if moving else RESTING)
 
-    def dismiss(self) -> None:
-        """End the guard: zero velocity has been commanded."""
-        with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended
-            self._process.communicate(DONE, timeout=LEAVE_S)
-        self._process.kill()
-        self._process.wait()
-
     def _hear(self) -> None:
         with contextlib.suppress(BlockingIOError):
             while told := os.read(self._in, 4096).split():
@@ -202,13 +180,9 @@ def main() -> None:
     wrenches = node.create_publisher(WrenchStamped, wrench_topic, 1) if wrench_topic else None
 
     def command_standstill() -> None:
-        message = TwistStamped()
-        message.header.stamp, message.header.frame_id = node.get_clock().now().to_msg(), frame_id
-        publisher.publish(message)
+        publisher.publish(_stamped(TwistStamped, node, frame_id))
         if wrenches is not None:
-            wrench = WrenchStamped()
-            wrench.header.stamp, wrench.header.frame_id = message.header.stamp, wrench_frame_id
-            wrenches.publish(wrench)
+            wrenches.publish(_stamped(WrenchStamped, node, wrench_frame_id))
 
     os.set_blocking(sys.stdout.fileno(), False)
     if not guarded(publisher, float(heartbeat_s), command_standstill):
@@ -218,6 +192,12 @@ def main() -> None:
             time.sleep(PERIOD_S)
     node.destroy_node()  # else ROS shows it for 20 s as another commander
     rclpy.shutdown()
+
+
+def _stamped(kind: Any, node: Node, frame_id: str) -> Any:
+    message = kind()
+    message.header.stamp, message.header.frame_id = node.get_clock().now().to_msg(), frame_id
+    return message
 
 
 def guarded(publisher: Any, heartbeat_s: float, command_standstill: Any) -> bool:
@@ -349,9 +329,7 @@ class RosTopics:
 
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity."""
-        message = TwistStamped()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        message.header.frame_id = self._frame_id
+        message = _stamped(TwistStamped, self._node, self._frame_id)
         linear = message.twist.linear
         linear.x, linear.y, linear.z = velocity_m_s
         self._twists.publish(message)
@@ -360,9 +338,7 @@ class RosTopics:
         """Command a force of the tool on its surroundings in the base frame."""
         if self._wrenches is None:
             return
-        message = WrenchStamped()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        message.header.frame_id = self._params.base_frame_id
+        message = _stamped(WrenchStamped, self._node, self._params.base_frame_id)
         force = message.wrench.force
         force.x, force.y, force.z = force_n
         self._wrenches.publish(message)
