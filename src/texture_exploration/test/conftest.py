@@ -2,12 +2,13 @@
 """A table to explore on: time, arm and surface stepped by hand, so that every run is the same."""
 
 import importlib.util
+import threading
 
 import pytest
 
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.explorer import Exploration, no_signal_watch
+from texture_exploration.arms.simulated import PLANE, SimulatedArm, SimulatedArmParams
+from texture_exploration.explorer import Exploration, Explorer, no_signal_watch
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import TouchParams
@@ -18,7 +19,6 @@ ROS_TESTS = [
     'test_explore_preset.py',
     'test_ros_controllers_process.py',
     'test_services_page.py',
-    'test_signal_watch_node.py',
 ]
 collect_ignore = [] if importlib.util.find_spec('rclpy') else ROS_TESTS
 
@@ -30,9 +30,9 @@ LINEAR = ExplorationRequest('linear_slide')
 class Table:
     """An arm over a surface, and what the exploration on it reported."""
 
-    def __init__(self, arm=ARM, touch=TOUCH, limits=LIMITS):
+    def __init__(self, arm=ARM, touch=TOUCH, limits=LIMITS, shape=PLANE):
         self.now_ns = 1_000_000_000
-        self.arm = SimulatedArm(arm, clock=lambda: self.now_ns, own_thread=False)
+        self.arm = SimulatedArm(arm, clock=lambda: self.now_ns, own_thread=False, shape=shape)
         self.arm.connect()
         self.home = self.arm.state().position
         self.touch, self.limits = touch, limits
@@ -85,6 +85,26 @@ class Table:
         """Return the first state of a phase and where the finger was."""
         at = [state.phase for state in self.states].index(phase)
         return self.states[at], self.places[at]
+
+
+@pytest.fixture
+def explorer(monkeypatch):
+    """Return an explorer over a table: a real thread on simulated time, which rests while `table.gate` is shut."""
+    table = Table(SimulatedArmParams(start_height_m=0.002))
+    table.gate = threading.Event()
+    table.gate.set()
+
+    def pace():
+        assert table.gate.wait(60.0)
+        table.pace()
+
+    monkeypatch.setattr('texture_exploration.explorer.Pacer', lambda *_: pace)
+    made = Explorer(table.arm, TOUCH, LIMITS, table.on_state, clock=lambda: table.now_ns)
+    made.table = table
+    made.connect()
+    yield made
+    table.gate.set()
+    made.close()
 
 
 @pytest.fixture

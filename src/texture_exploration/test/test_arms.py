@@ -50,14 +50,20 @@ DEVICES = {
 }  # what must be there for an arm, and the parameters that lead to it
 
 
-@pytest.fixture(params=ARMS)
-def arm(request):
-    arm_class = ARMS[request.param]
+@pytest.fixture(scope='module', params=ARMS)
+def device(request):
+    """Return the class of an arm and the parameters that lead to its device, which is started once."""
     with DEVICES.get(request.param, lambda: contextlib.nullcontext({}))() as values:
-        arm = arm_class(arm_class.Params(**values))
-        arm.connect()
-        yield arm
-        arm.close()
+        yield ARMS[request.param], values
+
+
+@pytest.fixture
+def arm(device):
+    arm_class, values = device
+    arm = arm_class(arm_class.Params(**values))
+    arm.connect()
+    yield arm
+    arm.close()
 
 
 def wait_for(condition, deadline_s=5.0):
@@ -114,7 +120,7 @@ def test_closing_twice_and_connecting_again_is_no_fault(arm):
 
 
 @pytest.mark.parametrize(
-    'arm', [name for name, arm in ARMS.items() if arm.move_surface is not Arm.move_surface], indirect=True
+    'device', [name for name, arm in ARMS.items() if arm.move_surface is not Arm.move_surface], indirect=True
 )
 def test_an_arm_with_a_base_frame_measures_from_where_the_surface_was_moved(arm):
     assert arm.base_frame_id

@@ -6,7 +6,8 @@ import math
 import pytest
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.arm import ArmCommand, CommandLimits
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.safety import CommandLimits
 
 LIMITS = CommandLimits()
 REFUSED = {

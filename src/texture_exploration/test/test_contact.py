@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from texture_core.types import NANOSECONDS, ExplorationRequest, Phase, TactileSignal
-from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.arms.simulated import SimulatedArmParams, SurfaceShape
 from texture_exploration.stages import TouchParams
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)
-DROP = SimulatedArmParams(step_m=-0.012, step_from_m=0.06)
+DROP = SurfaceShape(step_m=-0.012, step_from_m=0.06)
 EDGE_IN_SLIDE_M = 0.06
 RATE_HZ = 1000.0
 WINDOWS = WindowParams(length_s=0.1, hop_s=0.02)
@@ -55,10 +55,10 @@ def make_logged_table(make_table):
     return make
 
 
-@pytest.mark.parametrize('arm', [DROP, SimulatedArmParams(edge_m=EDGE_IN_SLIDE_M)], ids=['a drop', 'an edge'])
+@pytest.mark.parametrize('shape', [DROP, SurfaceShape(edge_m=EDGE_IN_SLIDE_M)], ids=['a drop', 'an edge'])
 @pytest.mark.parametrize('force_mode', [True, False])
-def test_a_surface_that_is_lost_in_the_slide_aborts_with_its_reason(make_logged_table, arm, force_mode):
-    table = make_logged_table(replace(arm, force_mode=force_mode, start_height_m=0.002))
+def test_a_surface_that_is_lost_in_the_slide_aborts_with_its_reason(make_logged_table, shape, force_mode):
+    table = make_logged_table(SimulatedArmParams(force_mode=force_mode, start_height_m=0.002), shape=shape)
     outcome = table.explore(REQUEST)
     assert not outcome.success
     assert outcome.message.startswith('the contact with the surface was lost for 1')
@@ -66,7 +66,7 @@ def test_a_surface_that_is_lost_in_the_slide_aborts_with_its_reason(make_logged_
 
 
 def test_no_state_without_contact_guarantees_anything_and_no_window_is_cut_from_air(make_logged_table):
-    table = make_logged_table(DROP)
+    table = make_logged_table(shape=DROP)
     table.explore(REQUEST)
     assert min(state.force_n for state in sliding(table)) < 0.1
     assert all(state.steady_s == 0.0 for state in sliding(table) if state.force_n < 0.1)
@@ -95,7 +95,7 @@ def test_a_rough_surface_that_the_finger_bounces_over_is_slid_on(make_logged_tab
 
 
 def test_a_lost_contact_is_sought_again_if_asked(make_logged_table):
-    table = make_logged_table(DROP, TouchParams(seek_lost_contact=True))
+    table = make_logged_table(touch=TouchParams(seek_lost_contact=True), shape=DROP)
     outcome = table.explore(REQUEST)
     assert outcome.success, outcome.message
     assert [phase for phase in table.phases if phase is Phase.SLIDE] == [Phase.SLIDE, Phase.SLIDE]
@@ -104,7 +104,7 @@ def test_a_lost_contact_is_sought_again_if_asked(make_logged_table):
 
 
 def test_seeking_a_surface_that_has_ended_gives_up(make_table):
-    table = make_table(SimulatedArmParams(edge_m=EDGE_IN_SLIDE_M), TouchParams(seek_lost_contact=True))
+    table = make_table(touch=TouchParams(seek_lost_contact=True), shape=SurfaceShape(edge_m=EDGE_IN_SLIDE_M))
     outcome = table.explore(REQUEST)
     assert not outcome.success
     assert outcome.message.startswith(('no surface within', 'the finger left the workspace: z'))
@@ -119,7 +119,7 @@ def test_seeking_a_surface_that_has_ended_gives_up(make_table):
     ],
 )
 def test_a_surface_that_ends_counts_only_if_the_slide_was_whole(make_table, edge_m, success):
-    table = make_table(SimulatedArmParams(edge_m=edge_m))
+    table = make_table(shape=SurfaceShape(edge_m=edge_m))
     outcome = table.explore(REQUEST)
     assert (outcome.success, table.arm.state().force_n) == (success, 0.0)
     if not success:
@@ -132,14 +132,14 @@ def test_contact_lost_on_the_last_step_of_the_slide_is_no_success(make_table):
     last_m = max(
         place[0] for state, place in zip(whole.states, whole.places, strict=True) if state.phase is Phase.SLIDE
     )
-    table = make_table(SimulatedArmParams(edge_m=last_m - 0.0002))
+    table = make_table(shape=SurfaceShape(edge_m=last_m - 0.0002))
     outcome = table.explore(REQUEST)
     assert not outcome.success
     assert 'the contact with the surface was lost' in outcome.message
 
 
 def test_finishing_while_the_contact_is_lost_is_no_success(make_table):
-    table = make_table(DROP)
+    table = make_table(shape=DROP)
     on_state = table.on_state
 
     def finish_in_the_air(state):
@@ -156,7 +156,8 @@ def test_finishing_while_the_contact_is_lost_is_no_success(make_table):
 @pytest.mark.parametrize('tilt_rad', [-0.1745, 0.1745])
 @pytest.mark.parametrize('force_mode', [True, False])
 def test_a_surface_that_tilts_by_ten_degrees_is_not_lost(make_table, tilt_rad, force_mode):
-    table = make_table(SimulatedArmParams(tilt_rad=tilt_rad, force_mode=force_mode, start_height_m=0.005))
+    arm = SimulatedArmParams(force_mode=force_mode, start_height_m=0.005)
+    table = make_table(arm, shape=SurfaceShape(tilt_rad=tilt_rad))
     outcome = table.explore(replace(REQUEST, distance_m=0.05))
     assert outcome.success, outcome.message
 
@@ -192,7 +193,7 @@ def test_a_force_at_the_edge_of_its_tolerance_is_a_success(make_table):
     ids=lambda request_: request_.motion,
 )
 def test_circles_and_strokes_that_leave_the_surface_abort_too(make_table, request_):
-    table = make_table(SimulatedArmParams(edge_m=0.017))
+    table = make_table(shape=SurfaceShape(edge_m=0.017))
     outcome = table.explore(request_)
     assert not outcome.success
     assert 'the contact with the surface was lost' in outcome.message

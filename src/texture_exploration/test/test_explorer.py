@@ -5,27 +5,15 @@ import pytest
 
 from texture_core.errors import DeviceError, MotionRefused, UnknownName
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits, SurfacePatch
 from texture_exploration.stages import TouchParams
 
-pytestmark = pytest.mark.realtime
-
 QUICK = ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.02)
 SLOW = ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1)
-DEADLINE_S = 20.0
-
-
-@pytest.fixture
-def explorer():
-    arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
-    # A busy machine may hold the threads up; this is about who may begin, not about time.
-    explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), lambda state: None)
-    explorer.connect()
-    yield explorer
-    explorer.close()
+DEADLINE_S = 60.0
 
 
 def test_explorations_follow_each_other(explorer):
@@ -37,6 +25,7 @@ def test_explorations_follow_each_other(explorer):
 
 
 def test_a_second_exploration_at_once_is_refused(explorer):
+    explorer.table.gate.clear()
     explorer.begin('one', SLOW)
     with pytest.raises(MotionRefused, match="'one' is still running"):
         explorer.begin('two', QUICK)
@@ -49,8 +38,10 @@ def test_an_unknown_motion_is_refused_with_the_nearest_name(explorer):
 
 
 def test_stopping_lifts_the_finger(explorer):
+    explorer.table.gate.clear()
     exploration = explorer.begin('one', SLOW)
     assert explorer.stop('enough')
+    explorer.table.gate.set()
     assert exploration.ended.wait(DEADLINE_S)
     assert (exploration.outcome.message, explorer.counts['aborted']) == ('enough', 1)
     assert not explorer.stop('again')
@@ -68,6 +59,7 @@ def test_recovering_frees_a_failed_arm_but_not_in_the_middle_of_an_exploration(e
     explorer.arm.fail('protective stop')
     explorer.recover()
     assert explorer.fault() == ''
+    explorer.table.gate.clear()
     explorer.begin('one', SLOW)
     with pytest.raises(MotionRefused, match="'one' is still running"):
         explorer.recover()
@@ -79,17 +71,21 @@ def test_an_arm_recovers_in_its_own_way_if_it_knows_one(explorer):
             self.recovered = True
             self.connect()
 
-    wise = Explorer(Wise(), TouchParams(), SafetyLimits(state_timeout_s=2.0), lambda state: None)
-    wise.connect()
-    wise.arm.fail('protective stop')
-    wise.recover()
-    assert wise.arm.recovered
-    assert wise.fault() == ''
-    wise.close()
+    explorer.arm.__class__ = Wise
+    explorer.arm.fail('protective stop')
+    explorer.recover()
+    assert explorer.arm.recovered
+    assert explorer.fault() == ''
 
 
 def test_closing_while_it_moves_lifts_the_finger_and_ends_the_thread(explorer):
+    """It closes at the first state of the slide, so that there is something to lift from."""
+    explorer.table.when[Phase.SLIDE] = explorer.table.gate.clear
     exploration = explorer.begin('one', SLOW)
+    while explorer.table.gate.is_set():
+        assert not exploration.ended.wait(0.001)
+    explorer.stop('the end')
+    explorer.table.gate.set()
     explorer.close()
     assert exploration.state.phase is Phase.ABORTED
     assert explorer.arm.state().position[2] > 0.001
@@ -120,22 +116,18 @@ PATCH = SurfacePatch(-0.03, 0.05, -0.02, 0.02)
 THERE = replace(QUICK, use_start=True, start_x_m=0.0, start_y_m=-0.02)
 
 
-def test_an_exploration_begins_at_its_start_on_the_patch_and_lifts_there():
-    states = []
-    arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
-    explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), states.append)
+def test_an_exploration_begins_at_its_start_on_the_patch_and_lifts_there(explorer):
     explorer.patch = PATCH
-    explorer.connect()
     exploration = explorer.begin('one', THERE)
     assert exploration.ended.wait(DEADLINE_S)
     assert exploration.outcome.success, exploration.outcome.message
+    states = explorer.table.states
     touched = next(state for state in states if state.phase is Phase.CONTACT)
     assert (touched.x_m, touched.y_m) == pytest.approx((0.0, -0.02), abs=0.001)
     travelling = [state for state in states if state.phase is Phase.APPROACH and abs(state.y_m) < 0.019]
     assert min(state.z_m for state in travelling) > 0.0015  # in free air
     end = explorer.arm.state().position
     assert end[0] > 0.02 and end[2] > 0.0015
-    explorer.close()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams, SurfaceShape
 from texture_exploration.safety import ForceWatch, SafetyLimits
 from texture_exploration.stages import TouchParams
 
@@ -16,9 +16,10 @@ ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n
 TILT = 0.1745
 
 
-def explore(make_table, arm, happens, phase, request=REQUEST):
+def explore(make_table, arm, happens, phase, *, request=REQUEST, tilt_rad=0.0):
     """Explore while something happens in a phase; return the table, the outcome, when it was, and the peak force."""
-    table = make_table(arm, TouchParams(approach_stiffness_n_m=arm.max_stiffness_n_m))
+    touch = TouchParams(approach_stiffness_n_m=arm.max_stiffness_n_m)
+    table = make_table(arm, touch, shape=SurfaceShape(tilt_rad=tilt_rad))
     happened, peak, go_on = [], [0.0], table.pace
 
     def pace():
@@ -44,8 +45,9 @@ def lifted_ns(table):
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
 @pytest.mark.parametrize('phase', [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE])
 def test_a_frozen_force_is_noticed_within_100_ms_and_the_finger_is_lifted(make_table, phase, stiffness, tilt_rad):
-    arm = replace(ARM, stiffness_n_m=stiffness, tilt_rad=tilt_rad)
-    table, outcome, frozen_ns, peak_n = explore(make_table, arm, SimulatedArm.freeze_force, phase)
+    arm = replace(ARM, stiffness_n_m=stiffness)
+    freeze = SimulatedArm.freeze_force
+    table, outcome, frozen_ns, peak_n = explore(make_table, arm, freeze, phase, tilt_rad=tilt_rad)
     assert not outcome.success
     assert outcome.message.startswith('the measured force is frozen: it has been')
     assert (lifted_ns(table) - frozen_ns) * 1e-9 <= 0.1
@@ -67,8 +69,8 @@ def test_a_force_that_freezes_far_from_the_wanted_one_is_noticed_without_noise_t
 @pytest.mark.parametrize('tilt_rad', [0.0, TILT, -TILT])
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
 def test_an_arm_without_noise_whose_force_stays_the_same_is_believed(make_table, force_mode, tilt_rad, stiffness):
-    arm = replace(ARM, stiffness_n_m=stiffness, tilt_rad=tilt_rad, force_mode=force_mode, force_noise_n=0.0)
-    table = make_table(arm, TouchParams(approach_stiffness_n_m=20000.0))
+    arm = replace(ARM, stiffness_n_m=stiffness, force_mode=force_mode, force_noise_n=0.0)
+    table = make_table(arm, TouchParams(approach_stiffness_n_m=20000.0), shape=SurfaceShape(tilt_rad=tilt_rad))
     outcome = table.explore(REQUEST)
     assert outcome.success, outcome.message
 
@@ -78,7 +80,7 @@ def test_an_arm_without_noise_whose_force_stays_the_same_is_believed(make_table,
 def test_a_force_that_drifts_over_the_slide_is_no_success(make_table, rate_n_s, force_mode):
     arm = replace(ARM, force_mode=force_mode)
     _, outcome, _, peak_n = explore(
-        make_table, arm, lambda arm: arm.drift_force(rate_n_s), Phase.SLIDE, replace(REQUEST, distance_m=0.1)
+        make_table, arm, lambda arm: arm.drift_force(rate_n_s), Phase.SLIDE, request=replace(REQUEST, distance_m=0.1)
     )
     assert not outcome.success
     assert outcome.message.startswith(

@@ -1,15 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every motion of the catalogue keeps to."""
+"""What every motion of the catalogue keeps to, then what each of them is."""
 
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
+from texture_core.errors import MotionRefused
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.motions import MOTIONS
+from texture_exploration.arms.arm import ArmState
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.motions import CROSS_SLIDE_DEFAULTS as DEFAULTS
+from texture_exploration.motions import (
+    MOTIONS,
+    CircularPath,
+    StraightPath,
+    circular,
+    cross_slide,
+    in_hand_random,
+    in_hand_sliding,
+    linear_slide,
+    random_strokes,
+)
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import PathFollower, TouchParams, ramp_s, ramps_m, smooth
 
+LIMITS = SafetyLimits()
 ORDER = [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.DONE]
+
+
+def sliding(table):
+    return [(s, p) for s, p in zip(table.states, table.places, strict=True) if s.phase is Phase.SLIDE]
 
 
 @pytest.mark.parametrize('name', MOTIONS)
@@ -22,8 +44,7 @@ def test_a_motion_with_all_defaults_slides_and_ends_lifted(table, name):
 @pytest.mark.parametrize('name', MOTIONS)
 def test_the_finger_keeps_its_speed_and_its_direction_is_where_it_goes(table, name):
     table.explore(ExplorationRequest(name))
-    slide = [(s, p) for s, p in zip(table.states, table.places, strict=True) if s.phase is Phase.SLIDE]
-    steps = [(a, b, (b[0].stamp_ns - a[0].stamp_ns) * 1e-9) for a, b in pairwise(slide)]
+    steps = [(a, b, (b[0].stamp_ns - a[0].stamp_ns) * 1e-9) for a, b in pairwise(sliding(table))]
     guaranteed = [step for step in steps if step[2] <= step[0][0].steady_s]
     assert len(guaranteed) > 0.7 * len(steps)
     for (state, place), (_, next_place), seconds in guaranteed:
@@ -39,3 +60,404 @@ def test_a_motion_that_is_aborted_in_the_approach_only_lifts(table, name):
     assert not table.explore(ExplorationRequest(name)).success
     assert [phase for phase in table.phases if phase is not Phase.LIFT] == [Phase.APPROACH, Phase.ABORTED]
     assert table.arm.state().position[2] >= table.home[2] - 0.001
+
+
+# --------------------
+# Linear slides.
+
+
+def slide_of(table):
+    """Return the duration and the length of the slide."""
+    (begin, start), (end, stop) = table.first(Phase.SLIDE), table.first(Phase.LIFT)
+    return (end.stamp_ns - begin.stamp_ns) * 1e-9, math.dist(start[:2], stop[:2])
+
+
+@pytest.mark.parametrize(('speed', 'distance'), [(0.02, 0.02), (0.05, 0.1), (0.1, 0.08)])
+def test_the_slide_has_the_length_and_the_speed_that_were_asked(table, speed, distance):
+    table.explore(ExplorationRequest('linear_slide', speed_m_s=speed, distance_m=distance))
+    duration, length = slide_of(table)
+    assert length == pytest.approx(distance, abs=0.001)
+    assert length / duration == pytest.approx(speed, rel=0.02)
+
+
+def test_while_sliding_speed_and_force_are_those_that_were_asked(table):
+    table.explore(ExplorationRequest('linear_slide', speed_m_s=0.1, force_n=2.5))
+    sliding = [state for state in table.states if state.phase is Phase.SLIDE]
+    assert [state.speed_m_s for state in sliding] == pytest.approx([0.1] * len(sliding), rel=0.02)
+    assert [state.force_n for state in sliding] == pytest.approx([2.5] * len(sliding), rel=0.1)
+
+
+def test_the_finger_goes_where_it_was_pointed(table):
+    table.explore(ExplorationRequest('linear_slide', direction_rad=math.pi / 2))
+    x, y, _ = table.arm.state().position
+    assert abs(x) < 1e-9
+    assert y > 0.1
+    assert table.first(Phase.SLIDE)[0].direction_rad == math.pi / 2
+
+
+def test_what_a_slide_guarantees_it_keeps(table):
+    table.explore()
+    end_ns = table.first(Phase.LIFT)[0].stamp_ns
+    sliding = [state for state in table.states if state.phase is Phase.SLIDE]
+    guaranteed = [state.stamp_ns + int(state.steady_s * 1e9) for state in sliding]
+    assert max(guaranteed) <= end_ns
+    assert sliding[0].steady_s == pytest.approx(0.1)
+    assert not any(state.steady_s for state in table.states if state.phase is not Phase.SLIDE)
+
+
+def test_the_second_slide_begins_where_the_first_began(table):
+    table.explore()
+    first = table.first(Phase.SLIDE)[1]
+    table.states, table.places = [], []
+    assert table.explore().success
+    assert math.dist(first, table.first(Phase.SLIDE)[1]) < 0.002
+
+
+def test_speed_is_gained_smoothly_and_within_the_acceleration_limit(make_table):
+    table = make_table(touch=TouchParams(acceleration_m_s2=0.5))
+    table.explore(ExplorationRequest('linear_slide', speed_m_s=0.1))
+    pushing = [state for state in table.states if state.phase is Phase.CONTACT and state.speed_m_s > 0]
+    gained = [b.speed_m_s - a.speed_m_s for a, b in pairwise(pushing)]
+    took = [(b.stamp_ns - a.stamp_ns) * 1e-9 for a, b in pairwise(pushing)]
+    assert max(dv / dt for dv, dt in zip(gained, took, strict=True)) < 0.5 * 1.05
+    assert gained[0] < 0.5 * max(gained)
+
+
+def linear_refusal(**numbers):
+    request = ExplorationRequest('linear_slide', **numbers)
+    with pytest.raises(MotionRefused) as refused:
+        linear_slide(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+    return str(refused.value)
+
+
+def test_a_refusal_names_the_allowed_range():
+    assert linear_refusal(speed_m_s=2.0) == 'linear_slide: speed_m_s is 2; allowed is 0.002 to 0.25 m/s'
+    assert linear_refusal(force_n=-1.0) == 'linear_slide: force_n is -1; allowed is 0.1 to 6 N'
+
+
+def test_a_default_that_is_refused_is_called_one():
+    request, slow = ExplorationRequest('linear_slide'), SafetyLimits(max_speed_m_s=0.02)
+    with pytest.raises(MotionRefused, match=r'speed_m_s is 0\.05 \(the default of the motion\); allowed is 0\.002 to'):
+        linear_slide(request, (0.0, 0.0, 0.01), TouchParams(), slow)
+
+
+def test_a_distance_beyond_both_limits_is_refused_with_the_smaller_one_at_once():
+    assert 'distance_m is 2, which' in linear_refusal(distance_m=2.0, speed_m_s=0.05)
+    assert 'at most 0.192 m' in linear_refusal(distance_m=2.0, speed_m_s=0.05)
+
+
+def test_numbers_that_are_none_are_refused():
+    assert 'distance_m is nan' in linear_refusal(distance_m=math.nan)
+    assert 'direction_rad is inf' in linear_refusal(direction_rad=math.inf)
+
+
+def test_a_slide_out_of_the_workspace_is_refused_with_the_longest_possible_one():
+    # 0.2 m of room, less the ramp of 0.1 s and the steady 0.05 s at 0.05 m/s.
+    assert 'at most 0.192 m' in linear_refusal(speed_m_s=0.05, distance_m=0.195, force_n=1.0, direction_rad=math.pi)
+
+
+def test_a_number_of_another_motion_is_refused():
+    assert linear_refusal(radius_m=0.02, turns=2.0) == 'linear_slide knows no radius_m and no turns; leave it at 0'
+
+
+# --------------------
+# Circles.
+
+
+class LateArm(SimulatedArm):
+    """An arm that takes two more steps of 5 ms to follow."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        self._coming = []
+
+    def step(self, dt_s):
+        self._coming.append(self._last_command)
+        newest = self._last_command
+        self._last_command = self._coming.pop(0) if len(self._coming) > 2 else self._coming[0]
+        super().step(dt_s)
+        self._last_command = newest
+
+
+@pytest.mark.parametrize('arm_class', [SimulatedArm, LateArm])
+@pytest.mark.parametrize('speed', [0.05, 0.1, 0.15])
+def test_the_radius_is_kept_within_a_millimetre(table, speed, arm_class):
+    table.arm = arm_class(SimulatedArmParams(), clock=lambda: table.now_ns, own_thread=False)
+    assert table.explore(ExplorationRequest('circular', speed_m_s=speed, turns=3.0)).success
+    radii = [math.hypot(x, y) for _, (x, y, _) in sliding(table)]
+    assert max(abs(radius - 0.02) for radius in radii) < 0.001
+    states = [state for state, _ in sliding(table)]
+    assert [state.speed_m_s for state in states] == pytest.approx([speed] * len(states), rel=0.02)
+    assert [state.force_n for state in states] == pytest.approx([1.0] * len(states), rel=0.1)
+
+
+@pytest.mark.parametrize('degrees', [0, 30, 45, 90])
+def test_the_slide_begins_at_the_start_angle_and_makes_its_turns(table, degrees):
+    table.explore(ExplorationRequest('circular', turns=1.5, direction_rad=math.radians(degrees)))
+    (first, (x, y, _)), (last, _) = sliding(table)[0], sliding(table)[-1]
+    assert math.remainder(math.atan2(y, x) - math.radians(degrees), 2 * math.pi) == pytest.approx(0.0, abs=0.1)
+    assert (last.stamp_ns - first.stamp_ns) * 1e-9 == pytest.approx(1.5 * 2 * math.pi * 0.02 / 0.1, abs=0.03)
+
+
+def test_the_path_is_a_circle_and_its_direction_the_tangent():
+    circle = CircularPath(0.02, 1.0, 0.0)
+    assert circle.length_m == pytest.approx(0.04 * math.pi)
+    assert circle.place(circle.length_m / 4) == pytest.approx((-0.02, 0.02))
+    assert math.cos(circle.direction_rad(circle.length_m / 4)) == pytest.approx(-1.0)
+
+
+def circular_refusal(limits=LIMITS, **numbers):
+    with pytest.raises(MotionRefused) as refused:
+        circular(ExplorationRequest('circular', **numbers), (0.0, 0.0, 0.01), TouchParams(), limits)
+    return str(refused.value)
+
+
+def test_what_cannot_be_done_is_refused_with_what_can():
+    assert circular_refusal(radius_m=0.5) == 'circular: radius_m is 0.5; allowed is 0.005 to 0.1 m'
+    assert circular_refusal(distance_m=0.1) == 'circular knows no distance_m; leave it at 0'
+    assert 'at most 0.158 m/s' in circular_refusal(radius_m=0.005, speed_m_s=0.2)
+    assert 'at most 0.05 m' in circular_refusal(SafetyLimits(x_low_m=-0.05), radius_m=0.08)
+
+
+def test_an_offset_of_the_force_before_it_is_zeroed_is_no_touch(table):
+    table.arm.push(1.3)
+    table.pace()
+    table.when[Phase.APPROACH] = lambda: table.arm.push(0.0)
+    assert table.explore(ExplorationRequest('circular')).success
+
+
+def test_something_in_the_way_to_the_start_is_met(table):
+    table.when[Phase.APPROACH] = lambda: table.arm.push(1.3)
+    assert 'met something on the way' in table.explore(ExplorationRequest('circular')).message
+
+
+# --------------------
+# Cross slides.
+
+
+CROSS = ExplorationRequest('cross_slide')
+LEG_S = DEFAULTS['distance_m'] / DEFAULTS['speed_m_s']
+
+
+def guaranteed(table, direction_rad):
+    """Return for how long a direction was guaranteed, s, and the states that did so."""
+    states = [
+        s for s, _ in sliding(table) if s.steady_s > 0 and math.isclose(s.direction_rad, direction_rad, abs_tol=1e-6)
+    ]
+    return (states[-1].stamp_ns - states[0].stamp_ns) * 1e-9 + states[-1].steady_s, states
+
+
+@pytest.mark.parametrize('heading', [0.0, 0.5 * math.pi])
+def test_each_leg_is_guaranteed_for_its_whole_length(table, heading):
+    assert table.explore(ExplorationRequest('cross_slide', direction_rad=heading)).success
+    for direction in (heading, math.remainder(heading + 0.5 * math.pi, 2 * math.pi)):
+        lasted_s, states = guaranteed(table, direction)
+        assert lasted_s == pytest.approx(LEG_S, abs=0.05)
+        assert max(b.stamp_ns - a.stamp_ns for a, b in pairwise(states)) < 50_000_000
+
+
+def test_nothing_is_guaranteed_between_the_legs(table):
+    table.explore(CROSS)
+    between = [s for s, _ in sliding(table) if 0.01 < s.direction_rad < 0.5 * math.pi - 0.01]
+    assert len(between) >= 3
+    assert all(state.steady_s == 0 for state in between)
+    spans = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table) if s.steady_s > 0]
+    assert not any(begin <= state.stamp_ns < end for state in between for begin, end in spans)
+
+
+def test_the_second_leg_is_straight_and_at_right_angles_to_the_first(table):
+    table.explore(CROSS)
+    first = [p for s, p in sliding(table) if s.steady_s > 0 and s.direction_rad == 0.0]
+    second = [p for s, p in sliding(table) if s.steady_s > 0 and s.direction_rad > 1.0]
+    assert max(abs(y - table.home[1]) for _, y, _ in first) < 2e-4
+    assert max(x for x, _, _ in second) - min(x for x, _, _ in second) < 2e-4
+    assert second[-1][1] - second[0][1] == pytest.approx(DEFAULTS['distance_m'], abs=0.003)
+
+
+def test_the_corner_exceeds_no_acceleration_and_keeps_the_speed(table):
+    table.explore(ExplorationRequest('cross_slide', speed_m_s=0.1, distance_m=0.05))
+    states = [s for s, _ in sliding(table)]
+    velocities = [(s.stamp_ns, s.speed_m_s, s.direction_rad) for s in states]
+    assert min(speed for _, speed, _ in velocities) > 0.09
+    vectors = [(t, v * math.cos(a), v * math.sin(a)) for t, v, a in velocities]
+    steps = [math.hypot(b[1] - a[1], b[2] - a[2]) / ((b[0] - a[0]) * 1e-9) for a, b in pairwise(vectors)]
+    assert max(steps) < 1.2 * TouchParams().acceleration_m_s2
+
+
+@pytest.mark.parametrize('heading', [0.0, 0.5, math.pi])
+def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(heading):
+    home = (0.1, 0.1, 0.01)
+    request = ExplorationRequest('cross_slide', distance_m=0.4, direction_rad=heading)
+    with pytest.raises(MotionRefused, match='the length of each of two legs') as refused:
+        cross_slide(request, home, TouchParams(), SafetyLimits())
+    allowed = float(str(refused.value).split()[-2])
+    assert 0.0 < allowed < 0.3
+    fitting = ExplorationRequest('cross_slide', distance_m=allowed, direction_rad=heading)
+    cross_slide(fitting, home, TouchParams(), SafetyLimits())
+
+
+@pytest.mark.parametrize('direction', [0.0, 0.5 * math.pi], ids=['first leg', 'second leg'])
+def test_a_stop_on_either_leg_lifts_and_aborts(table, direction):
+    def stop_on(state):
+        if state.phase is Phase.SLIDE and state.steady_s > 0 and abs(state.direction_rad - direction) < 0.01:
+            table.exploration.stop('enough')
+
+    keep = table.on_state
+    table.on_state = lambda state: (keep(state), stop_on(state))
+    outcome = table.explore(CROSS)
+    assert not outcome.success and outcome.message == 'enough'
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+    assert table.arm.state().force_n == 0
+
+
+# --------------------
+# Strokes in a hand.
+
+
+RUB = ExplorationRequest('in_hand_sliding')
+
+
+def test_two_seconds_of_sliding_stay_within_the_stroke(table):
+    assert table.explore(RUB).success
+    states = [state for state, _ in sliding(table)]
+    assert (states[-1].stamp_ns - states[0].stamp_ns) * 1e-9 == pytest.approx(2.0, abs=0.05)
+    along = [place[0] for place in table.places]
+    assert min(along) == pytest.approx(0.0, abs=0.0005)
+    assert max(along) == pytest.approx(0.02, abs=0.0005)
+
+
+def test_nothing_is_guaranteed_for_a_turn(table):
+    table.explore(RUB)
+    guaranteed = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
+    slow = [s.stamp_ns for s, _ in sliding(table) if abs(s.speed_m_s - 0.02) > 0.0005]
+    assert len(slow) >= 5
+    assert not any(begin <= stamp < end for stamp in slow for begin, end in guaranteed if end > begin)
+
+
+def guaranteed_speeds(table, request):
+    """Explore, and return the true speeds at all times for which a steady one was guaranteed, m/s."""
+    speeds, pace = [], table.pace
+
+    def watched():
+        pace()
+        speeds.append((table.now_ns, math.hypot(*table.arm.state().velocity[:2])))
+
+    table.pace = watched
+    assert table.explore(request).success
+    guaranteed = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
+    return [speed for stamp, speed in speeds if any(begin <= stamp < end for begin, end in guaranteed)]
+
+
+@pytest.mark.parametrize('lag_s', [0.008, 0.02, 0.05])
+def test_after_a_turn_a_late_arm_is_steady_only_when_it_has_turned(make_table, lag_s):
+    table = make_table(SimulatedArmParams(force_mode=False, loop_delay_s=lag_s, start_height_m=0.002))
+    speeds = guaranteed_speeds(table, RUB)
+    assert len(speeds) > 100
+    begun_within = abs(speeds[0] / 0.02 - 1)
+    assert begun_within <= table.touch.speed_tolerance
+    assert max(abs(speed / 0.02 - 1) for speed in speeds[1:]) <= 0.02
+
+
+def test_no_turn_exceeds_the_acceleration(table):
+    table.explore(ExplorationRequest('in_hand_sliding', speed_m_s=0.1, distance_m=0.08))
+    velocities = [(s.stamp_ns, p) for s, p in sliding(table)]
+    speeds = [(b[1][0] - a[1][0]) / ((b[0] - a[0]) * 1e-9) for a, b in pairwise(velocities)]
+    assert max(abs(b - a) / 0.02 for a, b in pairwise(speeds)) < 1.1
+
+
+def test_a_stroke_too_short_to_turn_is_refused():
+    request = ExplorationRequest('in_hand_sliding', speed_m_s=0.1, distance_m=0.01)
+    with pytest.raises(MotionRefused, match=r'the length of a stroke, is 0\.01; allowed is 0\.0'):
+        in_hand_sliding(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+
+
+def turning_places(table):
+    """Return where the finger turned, as seen from the start, m."""
+    along = [place[0] for _, place in sliding(table)]
+    return [b for a, b, c in zip(along, along[1:], along[2:], strict=False) if (b - a) * (c - b) < 0]
+
+
+def test_random_strokes_stay_within_the_stroke_and_are_at_least_half_as_long():
+    for seed in range(20):
+        end_of = random_strokes(0.02, np.random.default_rng(seed))
+        places = [0.0]
+        for number in range(20):
+            places.append(end_of(number % 2 == 0, places[-1]))
+        assert min(places) >= 0.0 and max(places) <= 0.02
+        lengths = [abs(b - a) for a, b in pairwise(places)]
+        assert min(lengths) >= 0.01 - 1e-12
+        assert np.ptp(lengths) > 0.001
+
+
+def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
+    assert table.explore(ExplorationRequest('in_hand_random', duration_s=10.0)).success
+    along = [place[0] for place in table.places]
+    assert min(along) > -0.0005 and max(along) < 0.0205
+    places = turning_places(table)
+    assert len({round(place, 4) for place in places}) > 4  # without chance it turns at two; chance may repeat one
+
+
+def test_a_random_stroke_may_be_half_as_long_so_the_shortest_that_turns_is_twice_that():
+    request = ExplorationRequest('in_hand_random', speed_m_s=0.05, distance_m=0.02)
+    in_hand_sliding(
+        ExplorationRequest('in_hand_sliding', speed_m_s=0.05, distance_m=0.02),
+        (0.0, 0.0, 0.01),
+        TouchParams(),
+        SafetyLimits(),
+    )
+    with pytest.raises(MotionRefused, match=r'in_hand_random: distance_m, the length of a stroke, is 0\.02; allowed'):
+        in_hand_random(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+
+
+# --------------------
+# Paths and ramps.
+
+
+def follow(path, places):
+    follower = PathFollower(path)
+    for x, y in places:
+        follower.update(0, ArmState(0, (x, y, 0.0), (0.0, 0.0, 0.0), 0.0))
+    return follower
+
+
+def test_the_way_along_a_circle_is_its_arc():
+    angles = [2 * math.pi * k / 500 for k in range(501)]
+    follower = follow(CircularPath(0.02, 8.0, 0.0), [(0.02 * math.cos(a), 0.02 * math.sin(a)) for a in angles])
+    assert follower.travelled_m == pytest.approx(2 * math.pi * 0.02, rel=1e-3)
+    assert follower.velocity(1e-4) == pytest.approx((0.0, 1e-4), abs=1e-6)
+
+
+def test_a_finger_that_trembles_across_its_path_does_not_get_ahead():
+    trembling = [(0.0, 0.0), (0.01, 0.0), (-0.01, 0.0)] * 100 + [(0.0, 0.005)]
+    assert follow(StraightPath(1.0, math.pi / 2), trembling).travelled_m == pytest.approx(0.005, rel=1e-3)
+
+
+def test_a_ramp_keeps_to_the_acceleration_and_takes_half_the_speed_in_the_mean():
+    speed, acceleration = 0.2, 1.0
+    duration = ramp_s(speed, acceleration)
+    shares = [k / 1000 for k in range(1001)]
+    steepest = max(smooth(b) - smooth(a) for a, b in pairwise(shares)) * 1000
+    assert steepest * speed / duration == pytest.approx(acceleration, rel=1e-3)
+    mean = sum(map(smooth, shares)) / len(shares)
+    assert 2 * mean * speed * duration == pytest.approx(ramps_m(speed, duration) - 0.05 * speed)
+
+
+def test_a_ramp_is_flat_outside():
+    assert [smooth(-1.0), smooth(0.0), smooth(0.5), smooth(1.0), smooth(7.0)] == pytest.approx([0, 0, 0.5, 1, 1])
+
+
+def test_a_finger_beside_its_path_is_led_back_at_the_same_speed():
+    follower = follow(StraightPath(1.0, 0.0), [(0.0, 0.0), (0.01, 0.001)])
+    vx, vy = follower.velocity(0.1)
+    assert vy == pytest.approx(-0.015)  # 15 /s of 1 mm
+    assert math.hypot(vx, vy) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize('speed', [0.01, 0.05, 0.25])
+def test_no_ramp_exceeds_the_acceleration_or_the_jerk(speed):
+    duration, dt = ramp_s(speed, 1.0, 20.0), 1e-4
+    speeds = [speed * smooth((k * dt) / duration) for k in range(-2, round(duration / dt) + 3)]
+    accelerations = [(b - a) / dt for a, b in pairwise(speeds)]
+    jerks = [(b - a) / dt for a, b in pairwise(accelerations)]
+    assert max(map(abs, accelerations)) <= 1.0 * 1.001
+    assert max(map(abs, jerks)) <= 20.0 * 1.001

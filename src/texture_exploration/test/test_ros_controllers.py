@@ -8,10 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, MotionRefused
+from texture_core.errors import DeviceError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, Phase, quaternion_matrix, rotation_matrix
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.ros_controllers import GRAVITY_M_S2, ForceSample, PoseSample, RosControllersArm, ToolState
+from texture_exploration.arms.ros_controllers import (
+    GRAVITY_M_S2,
+    FollowWatch,
+    ForceSample,
+    PoseSample,
+    RosControllersArm,
+    ToolState,
+)
 from texture_exploration.arms.ros_controllers import RosControllersParams as Params
 from texture_exploration.explorer import Exploration, Explorer
 from texture_exploration.motions import MOTIONS
@@ -256,14 +263,6 @@ def test_a_broadcaster_that_repeats_an_old_pose_counts_as_stale(robot):
     assert 'no pose has come' in robot.driven.state().fault
 
 
-def test_a_command_that_is_not_repeated_ends_in_zero_velocity(robot):
-    robot.driven.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
-    robot.pass_time(0.05)
-    assert not robot.is_commanded_to_rest
-    robot.pass_time(0.1)
-    assert robot.is_commanded_to_rest
-
-
 def test_at_rest_nothing_is_sent_after_a_while_so_that_others_may_command(robot):
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     robot.driven.stop()
@@ -280,14 +279,6 @@ def test_closing_commands_zero_velocity_and_leaves_the_topics(robot):
     assert robot.closed
     with pytest.raises(DeviceError, match='not connected'):
         robot.driven.state()
-
-
-def test_a_command_out_of_range_is_refused_and_zero_velocity_is_commanded(robot):
-    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    with pytest.raises(CommandRefused):
-        robot.driven.command(ArmCommand(tangential_m_s=(math.nan, 0.0)))
-    robot.pass_time(0.01)
-    assert robot.is_commanded_to_rest
 
 
 def test_a_controller_that_ends_is_named(robot):
@@ -647,7 +638,7 @@ def test_an_explorer_that_was_stopped_in_the_slide_lifts_a_finger_whose_arm_obey
             looks.append(kind)
             if looks.count(kind) > 5:
                 return newest[kind]()
-            return replace(newest[kind](), stamp_ns=1, age_ns=stopped_ns) if looks.count(kind) == 5 else None
+            return newest[kind]()._replace(stamp_ns=1, age_ns=stopped_ns) if looks.count(kind) == 5 else None
 
         return look
 
@@ -826,3 +817,60 @@ def longest_above(forces_n, limit_n):
         run = run + 1 if force_n > limit_n else 0
         longest = max(longest, run)
     return longest
+
+
+# --------------------
+# Whether an arm follows what is commanded.
+
+STEP_S = 0.004
+DESCENT_M_S, LIFT_M_S = -0.0013, 0.05
+
+
+def complaints(velocities_m_s, lag_s, gain=1.0):
+    """Return what the watch says of an arm that does `gain` times what was commanded `lag_s` ago, (n, 3) m/s."""
+    watch, late = FollowWatch(), round(lag_s / STEP_S)
+    delayed = np.concatenate([np.zeros((late, 3)), velocities_m_s])[: len(velocities_m_s)]
+    positions = np.cumsum(gain * delayed * STEP_S, axis=0)
+    held_s = np.concatenate([[0.0], np.full(len(positions) - 1, STEP_S)])
+    commanded = np.concatenate([velocities_m_s[:1], velocities_m_s[:-1]])  # until now
+    steps = zip(positions, commanded, held_s, strict=True)
+    said = [
+        watch.update(round(number * STEP_S * 1e9), tuple(position), tuple(velocity), held)
+        for number, (position, velocity, held) in enumerate(steps)
+    ]
+    return [sentence for sentence in said if sentence]
+
+
+def along_normal(*parts):
+    """Return velocities (n, 3) along the normal of parts (speed in m/s, duration in s)."""
+    normal = np.concatenate([np.full(round(duration_s / STEP_S), speed_m_s) for speed_m_s, duration_s in parts])
+    return np.column_stack([np.zeros((len(normal), 2)), normal])
+
+
+@pytest.mark.parametrize('lag_s', [0.0, 0.04, 0.1])
+def test_an_arm_that_is_lifted_out_of_its_slow_descent_follows_wherever_the_descent_ended(lag_s):
+    for descent_s in np.arange(0.1, 3.2, 0.05):
+        assert complaints(along_normal((DESCENT_M_S, descent_s), (LIFT_M_S, 0.6)), lag_s) == [], descent_s
+
+
+def test_an_arm_that_goes_to_and_fro_follows():
+    assert complaints(along_normal(*[(speed, 0.5) for speed in (0.05, -0.05)] * 4), 0.1) == []
+
+
+@pytest.mark.parametrize('speed_m_s', [LIFT_M_S, -LIFT_M_S])
+def test_an_arm_that_stands_still_after_the_reversal_is_noticed_within_half_a_second(speed_m_s):
+    moving, blocked = along_normal((-speed_m_s, 0.4)), along_normal((speed_m_s, 0.5))
+    watch = FollowWatch()
+    place, said = 0.0, []
+    for number, velocity in enumerate(np.concatenate([moving, blocked])):
+        place += velocity[2] * STEP_S if number < len(moving) else 0.0
+        said.append(watch.update(round(number * STEP_S * 1e9), (0.0, 0.0, place), tuple(velocity), STEP_S))
+    assert not any(said[: len(moving)])
+    assert any('mm commanded in 0.3 s' in sentence for sentence in said[len(moving) :])
+
+
+def test_an_arm_that_stands_still_on_a_small_circle_is_noticed():
+    angles = np.arange(0.0, 1.0, STEP_S) * 0.05 / 0.01  # rad: 50 mm/s on a radius of 10 mm
+    circle = 0.05 * np.column_stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)])
+    assert complaints(circle, 0.1) == []
+    assert complaints(circle, 0.0, gain=0.0)

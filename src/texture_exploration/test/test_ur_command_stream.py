@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is sent to the UR controller, cycle by cycle, on a controller that is made up."""
 
+import importlib.util
+
 import numpy as np
 import pytest
 
+from texture_core.errors import DeviceError
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.ur import COMMAND, Counts, UrArm, UrArmParams, UrCommand, UrReport
+from texture_exploration.arms import ur as ur_probe
+from texture_exploration.arms.arm import ArmCommand
+from texture_exploration.arms.ur import COMMAND, Counts, UrArm, UrArmParams, UrCommand, UrReport, command_of
 from texture_exploration.arms.ur_worker import UrCommandStream, Watchdog
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
@@ -92,7 +97,7 @@ class SteppedLink:
         pass
 
     def send(self, data):
-        self.wish = UrCommand.from_bytes(data) if data[:1] == COMMAND else None
+        self.wish = command_of(data) if data[:1] == COMMAND else None
 
     def pace(self):
         for _ in range(5):
@@ -140,3 +145,133 @@ def test_a_slide_commands_force_and_speed_by_turns_and_ends_with_the_finger_lift
     assert pressed[1::2] == ['speedL'] * len(pressed[1::2])
     assert names.index('zeroFtSensor') < names.index('forceMode')
     assert link.robot.pressing_n == 0.0
+
+
+# --------------------
+# The watchdog waits while a command is carried out, and guards the moving arm again after it.
+
+WATCHED = UrArmParams(watchdog_hz=10.0, acknowledge_s=1.0)
+
+
+class TimedControl:
+    """A controller in its own time, whose watchdog is tripped when it hears nothing for too long."""
+
+    def __init__(self, late_s=0.002):
+        self.now_s, self.late_s = 0.0, late_s
+        self.period_s = None
+        self.tripped = False
+
+    def setWatchdog(self, frequency_hz):  # noqa: N802 (as in ur-rtde)
+        self.take(self.late_s / 2)
+        self.period_s = 1.0 / frequency_hz
+        self.take(self.late_s / 2)
+        return not self.tripped
+
+    def take(self, seconds):
+        self.now_s += seconds
+        self.tripped |= self.period_s is not None and seconds > self.period_s
+        return not self.tripped
+
+
+def watchdog_of(control):
+    return Watchdog(control, WATCHED, guard=lambda seconds: None, clock=lambda: control.now_s)
+
+
+def test_a_slow_command_does_not_trip_it_and_is_counted():
+    control = TimedControl()
+    watchdog = watchdog_of(control)
+    assert watchdog.arm()
+    assert control.period_s == pytest.approx(0.1)
+    with watchdog.patient():
+        assert watchdog.call(control.take, 0.3)
+        assert not watchdog.armed
+    assert watchdog.armed
+    assert not control.tripped
+    assert control.period_s == pytest.approx(0.1)
+    assert (watchdog.slow, watchdog.slowest_s) == (1, pytest.approx(0.3))
+
+
+def test_a_controller_that_acknowledges_the_watchdog_itself_late_is_given_more_time():
+    control = TimedControl(late_s=0.3)
+    watchdog = watchdog_of(control)
+    assert watchdog.arm()
+    assert not control.tripped
+    assert control.period_s == pytest.approx(0.9)
+    assert (watchdog.moving_s, watchdog.widened) == (pytest.approx(0.9), True)
+    control.late_s = 0.002
+    assert watchdog.arm()
+    assert control.period_s == pytest.approx(0.1)
+    assert (watchdog.moving_s, watchdog.widened) == (pytest.approx(0.1), False)
+
+
+def test_it_guards_again_also_after_an_error():
+    control = TimedControl()
+    watchdog = watchdog_of(control)
+    with pytest.raises(RuntimeError), watchdog.patient():
+        raise RuntimeError
+    assert watchdog.armed
+
+
+def test_a_program_that_no_longer_runs_is_not_guarded():
+    control = TimedControl()
+    control.tripped = True
+    assert not watchdog_of(control).arm()
+
+
+class MovingControl(TimedControl):
+    """The same, which also takes what moves the arm."""
+
+    def speedStop(self, _deceleration):  # noqa: N802
+        return self.take(0.0)
+
+    def forceModeStop(self):  # noqa: N802
+        return self.take(0.0)
+
+    def speedL(self, *_speed):  # noqa: N802
+        return self.take(0.0)
+
+    def kickWatchdog(self):  # noqa: N802
+        return self.take(0.0)
+
+
+def test_an_arm_at_rest_tries_again_to_have_the_watchdog_as_short_as_it_should_be():
+    control = MovingControl(late_s=0.3)
+    watchdog = watchdog_of(control)
+    commands = UrCommandStream(control, WATCHED, watchdog)
+    assert watchdog.arm()
+    commands.cycle(UrCommand(0, (0.0, 0.0, -0.01), None))
+    assert watchdog.moving_s == pytest.approx(0.9)
+    for _ in range(3):
+        commands.cycle(None)
+    control.late_s = 0.002
+    commands.cycle(UrCommand(0, (0.0, 0.0, -0.01), None))
+    assert watchdog.moving_s == control.period_s == pytest.approx(0.1)
+
+
+# --------------------
+# What is said before a controller is reached.
+
+
+def test_without_ur_rtde_the_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
+    with pytest.raises(DeviceError, match=r'pip install ur-rtde==1\.6\.5'):
+        UrArm().connect()
+
+
+def test_an_arm_that_was_never_connected_says_so():
+    arm = UrArm()
+    for call in (arm.state, arm.stop, arm.recover, lambda: arm.command(ArmCommand((0.02, 0.0)))):
+        with pytest.raises(DeviceError, match='connect it first'):
+            call()
+    arm.close()
+
+
+@pytest.mark.parametrize(
+    ('version', 'oldest'), [((3, 3), '3.12'), ((5, 4), '5.6'), ((10, 8), '10.10'), ((1, 8), '3.12')]
+)
+def test_a_controller_that_is_too_old_is_refused(version, oldest, monkeypatch):
+    monkeypatch.setattr(ur_probe, 'rtde_version', lambda ip, timeout_s: version)
+    with pytest.raises(
+        DeviceError, match=rf'has the software {version[0]}\.{version[1]}.*update it to {oldest} or newer'
+    ):
+        UrArm(UrArmParams(ip='127.0.0.82')).connect()
