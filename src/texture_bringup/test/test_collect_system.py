@@ -26,7 +26,7 @@ QUICK = CollectionParams(
     places=2, most_places=2, distance_m=0.03, speed_low_m_s=0.04, speed_high_m_s=0.05, bound=0.1
 )  # fmt: skip
 DEADLINE_S = 60.0
-PLATE = ('--force', '1', '--distance', '0.06')
+PLATE = ('--force', '1', '--distance', '0.12')
 
 
 @pytest.fixture(scope='module')

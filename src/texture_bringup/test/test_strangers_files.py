@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files from strangers: cut off, altered, of wrong types. Each is read or refused with one sentence, and runs no code.
 
-FUZZ_SEED and FUZZ_TRIES look further.
+Damage to bags and tables of others is in the tests of texture_recordings. FUZZ_SEED and FUZZ_TRIES look further.
 """
 
 from __future__ import annotations
@@ -19,12 +19,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 import yaml
-from rosbags.rosbag2 import StoragePlugin, Writer
-from scipy.io import savemat, wavfile
+from scipy.io import wavfile
 
 from texture_bringup.launcher import all_arguments
 from texture_core import config as resources
@@ -50,10 +48,10 @@ from texture_exploration.arms.hand import load_profile
 from texture_exploration.presets import load_preset
 from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
-from texture_recordings.bags import TYPES, BagWriter, decode, encode, typestore
+from texture_recordings.bags import TYPES, BagWriter, decode, encode
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.public_sets import IMPORTS, import_biotac20
-from texture_recordings.tables import MAPPED, import_tables, load_mapping, mapping_from
+from texture_recordings.public_sets import import_biotac20
+from texture_recordings.tables import load_mapping
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))
@@ -140,27 +138,6 @@ def make_bag(folder: Path) -> None:
             bag.write(topic, value, log_ns)
 
 
-def make_sqlite_bag(folder: Path) -> None:
-    with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
-        connections: dict[str, Any] = {}
-        for topic, value, log_ns in messages():
-            kind = TYPES[type(value)]
-            if topic not in connections:
-                connections[topic] = bag.add_connection(f'/{topic}', kind, typestore=typestore())
-            bag.write(connections[topic], log_ns, encode(value))
-
-
-def make_plain_bag(folder: Path) -> None:
-    """Write a bag that is not compressed, in which damage reaches the records."""
-    with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        connections: dict[str, Any] = {}
-        for topic, value, log_ns in messages():
-            kind = TYPES[type(value)]
-            if topic not in connections:
-                connections[topic] = bag.add_connection(f'/{topic}', kind, typestore=typestore())
-            bag.write(connections[topic], log_ns, encode(value))
-
-
 def make_wav(folder: Path) -> None:
     samples = np.random.default_rng(3).integers(-1000, 1000, (50, 2)).astype(np.int16)
     wavfile.write(folder / 'good.wav', 1000, samples)
@@ -187,52 +164,6 @@ def make_biotac(folder: Path) -> None:
         'epoch': np.float64(1e9),
     }
     np.savez_compressed(folder / 'material01.npz', **{f'slide01/{name}': array for name, array in arrays.items()})
-
-
-def make_ntp(folder: Path) -> None:
-    slide = np.random.default_rng(6).normal(size=(834, 11)).astype(np.float32)
-    np.savez_compressed(folder / 'slides.npz', **{'texture00/speed020/force0.0': slide})
-
-
-TABLE = {'streams': {'signal': {'columns': ['x', 'y'], 'rate_hz': 100.0}}, 'label': {'value': 'cork'}}
-WRENCH = 'geometry_msgs/msg/WrenchStamped'
-FOREIGN = {'streams': {'signal': {'columns': ['/wrench/wrench.force.*'], 'rate_hz': 100.0}}, 'label': {'value': 'cork'}}
-
-
-def write_columns(path: Path, columns: dict[str, np.ndarray]) -> None:
-    if path.suffix == '.csv':
-        rows = '\n'.join(f'{x:.5f},{y:.5f}' for x, y in zip(*columns.values(), strict=True))
-        path.write_text(f'{",".join(columns)}\n{rows}\n')
-    elif path.suffix == '.h5':
-        with h5py.File(path, 'w') as file:
-            for name, values in columns.items():
-                file.create_dataset(name, data=values, compression='gzip')
-    else:
-        savemat(path, columns, do_compression=True)
-
-
-def table_file(suffix: str) -> Reader:
-    x, y = np.random.default_rng(7).normal(size=(2, 400))
-    return Reader(
-        lambda folder: write_columns(folder / f'good{suffix}', {'x': x, 'y': y}),
-        read_import(lambda folder, out: import_tables(mapping_from(TABLE), folder, out)),
-        (f'good{suffix}',),
-    )
-
-
-def make_foreign_bag(folder: Path) -> None:
-    types = typestore().types
-    vector = types['geometry_msgs/msg/Vector3']
-    with Writer(folder / 'bag', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection('/wrench', WRENCH, typestore=typestore())
-        for number in range(200):
-            stamp = types['builtin_interfaces/msg/Time'](sec=1000 + number // 100, nanosec=number % 100 * 10_000_000)
-            header = types['std_msgs/msg/Header'](stamp=stamp, frame_id='tool')
-            inner = types['geometry_msgs/msg/Wrench'](
-                force=vector(x=1.0, y=2.0, z=float(number)), torque=vector(x=0.0, y=0.0, z=0.0)
-            )
-            message = typestore().serialize_cdr(types[WRENCH](header=header, wrench=inner), WRENCH)
-            writer.write(connection, 1_000_000_000 * (1000 + number), message)
 
 
 def read_import(load: Callable[..., object]) -> Callable[[Path], object]:
@@ -300,7 +231,6 @@ READERS = {
         make_roughness_model, lambda folder: load_roughness_model(folder / 'model'), (MODEL, CARD)
     ),
     'bag': Reader(make_bag, read_slides, ('bag/bag.mcap', 'bag/metadata.yaml')),
-    'SQLite bag': Reader(make_sqlite_bag, read_slides, ('bag/bag.db3', 'bag/metadata.yaml')),
     'signal': Reader(make_message(SIGNAL), read_message(TactileSignal), ('message',)),
     'state': Reader(make_message(STATE), read_message(ExplorationState), ('message',)),
     'recipe': text_file('texture_estimation', 'config/recipes/vibration-and-taxels.yaml', load_recipe),
@@ -314,7 +244,6 @@ READERS = {
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
     'grades': text_file('texture_papers', 'config/grades/ets_roughness.csv', read_grades),
     'ratings': Reader(make_ratings, lambda folder: read_ratings(folder / 'good.csv'), ('good.csv',)),
-    'plain bag': Reader(make_plain_bag, read_slides, ('bag/bag.mcap',)),
     'launch file': text_file(
         'texture_bringup', 'launch/emulator.launch.xml', lambda path: all_arguments(Path(path), {})
     ),
@@ -322,14 +251,7 @@ READERS = {
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
     'checkpoint': Reader(make_checkpoint, lambda folder: read_scores(folder / 'good.json', 'abc'), ('good.json',)),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
-    'NTP data set': Reader(make_ntp, read_import(IMPORTS['ntp21']), ('slides.npz',)),
     'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
-    **{f'table {suffix}': table_file(suffix) for suffix in ('.csv', '.mat', '.h5')},
-    'foreign bag': Reader(
-        make_foreign_bag,
-        read_import(lambda folder, out: import_tables(mapping_from(FOREIGN), folder / 'bag', out, MAPPED['bag'])),
-        ('bag/bag.mcap',),
-    ),
     **{f'recording {ending}': recording(ending) for ending in ('csv', 'npy', 'npz')},
 }
 CASES = [(name, file) for name, reader in READERS.items() for file in reader.files]

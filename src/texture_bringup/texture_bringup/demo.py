@@ -23,6 +23,7 @@ import numpy as np
 from scipy.signal import welch
 
 from texture_bringup.launcher import ChildLauncher
+from texture_bringup.nodes.collector import recorder
 from texture_bringup.operator import ExplorationResult, Operator
 from texture_core.config import write_json
 from texture_core.errors import InvalidData, LaunchFailed, MotionAborted
@@ -270,7 +271,6 @@ def table(rows: Sequence[RecognisedSlide], latencies: Mapping[str, float]) -> li
 # --------------------
 # The emulator of the demonstration: its processes, and what the operator does with it.
 
-RECORDED = ('signal', 'exploration')  # each is listened to by the feature extractor, too
 START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first time
 
 
@@ -296,7 +296,6 @@ class DemoRig:
             'recipe': recipe,
             'seed': seed,
         }
-        self._folder = folder
         self._launcher = ChildLauncher('emulator', arguments, self._environment, log)
         self._operator = Operator(domain_id=self._isolation.domain_id, guard=self._launcher.check)
         self._open = ExitStack()
@@ -316,14 +315,9 @@ class DemoRig:
     @contextmanager
     def recording(self, bag: Path) -> Iterator[None]:
         """Record the topics into a new bag for the length of a `with` block."""
-        recorder = ChildLauncher('record', {'out': bag}, self._environment, self._folder / f'{bag.name}.log')
-        # The explorer may listen to the signal, too: each topic has a number of its own.
-        wanted = {topic: self._operator.listeners(topic) + 1 for topic in RECORDED}
-        with recorder:
-            for topic, number in wanted.items():
-                self._operator.wait_for_listeners((topic,), number, recorder.check)
+        with recorder(self._operator, bag, '', self._environment) as check:
             yield
-            recorder.check()
+            check()
 
     def explore(
         self, surface: str, requests: Iterator[ExplorationRequest], tell: Callable[[str], None]

@@ -551,11 +551,6 @@ class Operator:
             if not outcome.successful:
                 raise InvalidParameter(f"node '{node}' refused parameter '{name}': {outcome.reason}")
 
-    def _result(self, future: Future) -> Any:
-        """Return the result of a future that the explorer or another node answers."""
-        self._wait(future.done, SILENT_S)
-        return future.result()
-
     def _wait(
         self, condition: Callable[[], bool], silent_s: float, ask_again: Callable[[], None] = lambda: None
     ) -> None:

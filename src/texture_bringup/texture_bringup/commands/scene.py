@@ -18,64 +18,21 @@ from texture_simulation.scene import Scene, load_scene
 from texture_simulation.scene_view import SceneView, ViewPlan, view
 
 # --------------------
-# Pictures of simulated scenes: one slide on a page, or all surfaces of a scene below each other.
+# Pictures of simulated scenes: surfaces below each other.
 
 MM, UM = 1e3, 1e6
 SHOWN_S = 0.25
-WIDE = 2.5  # times as wide as high
 MIN_DENSITY = 1e-6  # of the highest: what lies below is not shown
 RELIEF_COLOURS = 'cividis'
 
 
-def slide_picture(view: SceneView, title: str, path: str | Path) -> Path:
-    """Draw one slide: relief with the way, profile, signal and spectrum.
-
-    Parameters
-    ----------
-    view
-        What the finger meets and measures.
-    title
-        Above the panels.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    wide = (view.extent_m[1] - view.extent_m[0]) > WIDE * (view.extent_m[3] - view.extent_m[2])
-    with chart(path, (11.0, 5.8 if wide else 7.2), title) as figure:
-        # A straight way lies above the curves, a round one beside them.
-        parts: Any = (
-            figure.subfigures(2, 1, height_ratios=[0.8, 1.0])
-            if wide
-            else figure.subfigures(1, 2, width_ratios=[1.2, 1])
-        )
-        surface, curves = parts
-        relief = surface.subplots()
-        profile, signal, spectrum = curves.subplots(*((1, 3) if wide else (3, 1)))
-        image = _relief(relief, view)
-        below = {} if wide else {'location': 'bottom'}
-        surface.colorbar(image, ax=relief, label='height (µm)', fraction=0.03, **below)
-        relief.set_title('1. The surface, and the way of the finger (from the dot)')
-        _profile(profile, view)
-        profile.set_title('2. Height along the way')
-        profile.legend(loc='upper center', bbox_to_anchor=(0.5, -0.2), ncols=2, fontsize=8)
-        _signal(signal, view)
-        signal.set_title(f'3. What the sensor publishes: {view.channel}')
-        _spectrum(spectrum, view)
-        spectrum.set_title('4. Its power' + ('; dotted: speed / pitch' if view.lines_hz else ''))
-    return Path(path)
-
-
-def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
-    """Draw all surfaces of a scene, one in each row.
+def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
+    """Draw surfaces, one in each row: relief with the way of the finger, profile, signal and spectrum.
 
     Parameters
     ----------
     views
-        One for each surface.
+        What the finger meets and measures on each surface.
     title
         Above the panels.
     path
@@ -86,7 +43,8 @@ def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> P
     Path
         Of the file.
     """
-    with chart(path, (13.0, 0.8 + 1.75 * len(views)), title) as figure:
+    row_inches = 1.75 if len(views) > 1 else 3.2
+    with chart(path, (13.0, 0.8 + row_inches * len(views)), title) as figure:
         rows = figure.subplots(len(views), 4, squeeze=False, width_ratios=[1.5, 1, 1, 1])
         for (relief, profile, signal, spectrum), view in zip(rows, views, strict=True):
             image = _relief(relief, view)
@@ -95,7 +53,8 @@ def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> P
             _profile(profile, view)
             _signal(signal, view)
             _spectrum(spectrum, view)
-        for axes, name in zip(rows[0][1:], ('height along the way', 'signal', 'its power'), strict=True):
+        power = 'its power' + ('; dotted: speed / pitch' if any(view.lines_hz for view in views) else '')
+        for axes, name in zip(rows[0][1:], ('height along the way', 'signal', power), strict=True):
             axes.set_title(name)
         rows[0][1].legend(loc='upper center', bbox_to_anchor=(0.5, -0.3), ncols=2, fontsize=7)
     return Path(path)
@@ -194,10 +153,7 @@ def run(options: argparse.Namespace) -> int:
     rng = np.random.default_rng(options.seed)
     names = [options.surface] if options.surface else list(scene.surfaces)
     views = [view(scene, name, plan, rng) for name in names]
-    if options.surface:
-        slide_picture(views[0], caption(options.surface, scene.sensor, plan), out)
-    else:
-        table_picture(views, caption(f'Scene {scene.name}', scene.sensor, plan), out)
+    picture(views, caption(options.surface or f'Scene {scene.name}', scene.sensor, plan), out)
     for line in summary(scene):
         print(line)
     print(f'  {out}')

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
 from functools import partial
@@ -114,13 +114,15 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
 
 
 @contextmanager
-def recorder(operator: Operator, bag: Path, namespace: str) -> Iterator[Callable[[], None]]:
+def recorder(
+    operator: Operator, bag: Path, namespace: str, environment: Mapping[str, str] | None = None
+) -> Iterator[Callable[[], None]]:
     """Record into a bag by a process of its own; the function raises InvalidData, with what it said, if that ended."""
     operator.wait_for_listeners(RECORDED, 1, lambda: None)  # the feature extractor; by then all others are found
     wanted = {topic: operator.listeners(topic) + 1 for topic in RECORDED}
     command = [sys.executable, '-m', 'texture_bringup.command', 'record', str(bag), '--namespace', namespace]
     with tempfile.TemporaryFile('w+') as output:
-        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
+        process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True, env=environment)
 
         def said() -> str:
             output.seek(0)
