@@ -307,6 +307,10 @@ class TableMapping:
         """Return the names of the columns that are read as texts."""
         return [self.label.column, self.session, *[self.slides.column] * (self.slides.by == 'column')]
 
+    def numbers(self) -> list[str]:
+        """Return the names of the columns that are read as numbers, beside those of the streams."""
+        return [one.time.column for one in self.streams.values()] + [one.column for one in self.conditions.values()]
+
     def quantity(self, name: str) -> Quantity:
         """Return where a condition comes from."""
         return self.conditions.get(name, Quantity())
@@ -453,9 +457,7 @@ class Table:
         """
         fields = {**self.fields, **fields}
         chosen = {name: self.chosen(stream.columns) for name, stream in mapping.streams.items()}
-        wanted = [column for columns in chosen.values() for column in columns]
-        wanted += [stream.time.column for stream in mapping.streams.values()]
-        wanted += [quantity.column for quantity in mapping.conditions.values()]
+        wanted = [column for columns in chosen.values() for column in columns] + mapping.numbers()
         texts = mapping.texts()
         for name in filter(None, (*wanted, *texts)):
             if name not in fields and name not in self.names:
@@ -1071,7 +1073,8 @@ def read_message_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[
 
     Times are those of the headers, or of logging where there are none, from the first message of the bag on.
     """
-    wanted = wanted_columns(mapping)
+    columns_of_streams = [column for stream in mapping.streams.values() for column in stream.columns]
+    wanted = set(filter(None, [*columns_of_streams, *mapping.numbers(), *mapping.texts()]))
     topics: dict[str, _Topic] = {}
     first_ns = -1
     for message in read_foreign(path, partial(_is_wanted, wanted)):
@@ -1092,15 +1095,6 @@ def read_message_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[
             "field, such as '/wrench/wrench.force.x'"
         )
     yield Table(place, tuple(columns), partial(table_columns, columns, place), clocks=clocks)
-
-
-def wanted_columns(mapping: TableMapping) -> set[str]:
-    """Return the names and patterns of all columns that a mapping uses."""
-    names = [column for stream in mapping.streams.values() for column in stream.columns]
-    names += [stream.time.column for stream in mapping.streams.values()]
-    names += [mapping.label.column, mapping.session, mapping.slides.column]
-    names += [quantity.column for quantity in mapping.conditions.values()]
-    return set(filter(None, names))
 
 
 def _is_wanted(wanted: set[str], connection: BagConnection) -> bool:
