@@ -151,7 +151,7 @@ def make_vendor_csv(folder: Path) -> None:
 
 
 def make_checkpoint(folder: Path) -> None:
-    write_scores(folder / 'good.json', 'abc', {(1, 2): (0.5, 0.25)})
+    write_scores(folder / 'good.json', 'abc', {(1, 2): 0.5})
 
 
 def make_biotac(folder: Path) -> None:

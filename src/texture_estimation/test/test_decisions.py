@@ -30,7 +30,6 @@ from texture_estimation.decisions import (
     space_means,
 )
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.model_files import AddedSlide
 from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -52,13 +51,6 @@ def trained():
     centres = 3.0 * rng.normal(size=(CLASSES, FEATURE_COUNT))
     means, classes = slide_means(centres, rng)
     return ClassDistance.fit(means, classes), centres, rng
-
-
-def test_a_slide_is_nearer_to_its_own_class_than_to_any_other(trained):
-    distance, centres, rng = trained
-    means, classes = slide_means(centres, rng, 3)
-    scores = np.array([[distance.score(mean, code) for code in range(CLASSES)] for mean in means])
-    np.testing.assert_array_equal(scores.argmin(axis=1), classes)
 
 
 def test_the_distance_is_that_to_the_three_nearest_slides_less_that_to_the_centre(trained):
@@ -186,11 +178,6 @@ def test_where_no_rule_errs_rarely_enough_the_one_that_errs_least_is_taken():
     rule = fit_stopping_rule(courses, 0.0, by_novelty=False)
     assert not rule.decided(0.9, 2.0)
     assert rule.decided(0.9, 3.0)
-
-
-def test_without_anything_held_out_confidence_alone_decides():
-    assert StoppingRule().decided(0.96, 1.0)
-    assert not StoppingRule().decided(0.9, 100.0)
 
 
 def test_at_the_start_of_a_slide_a_smaller_novelty_score_is_needed():
@@ -347,12 +334,6 @@ def test_a_slide_below_the_limit_is_neither_known_nor_decided_and_keeps_its_labe
     assert after_one_window(model, examples).known
     strict = after_one_window(with_decisions(model, confidence_floor=STRICT), examples)
     assert (strict.label, strict.known, strict.decided) == ('felt', False, False)
-
-
-def test_added_slides_end_the_limit_as_their_labels_make_others_less_probable(model, examples):
-    added = AddedSlide('silk', 'silk-1', examples.values[examples.groups == 'felt/0'] + 9.0)
-    strict = with_decisions(model, confidence_floor=STRICT).with_added_slides((added,))
-    assert strict.active_decisions.confidence_floor == ConfidenceFloor()
 
 
 def test_training_fits_the_limit_that_a_recipe_asks_for(make_examples):

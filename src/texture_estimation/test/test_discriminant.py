@@ -265,13 +265,6 @@ def test_the_force_is_no_part_of_the_discriminants_and_without_it_there_is_one()
     assert scores == pytest.approx(Discriminant.predictor(alone.parameters)(plain))
 
 
-def test_one_window_is_judged_as_among_many():
-    values, codes, groups = of_forces(np.random.default_rng(1))
-    learner = ForceDiscriminant().of_examples(('signal/mean/pac', 'signal/force'), ('cork', 'felt'))
-    predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
-    assert np.stack([predictor(row) for row in values[:20]]) == pytest.approx(predictor(values[:20]))
-
-
 def test_a_difference_between_places_counts_less_the_more_weight_its_covariance_has():
     noise = np.random.default_rng(2).standard_normal((1000, 2))
     codes, stretches = np.repeat([0, 1], 4000), np.tile(np.repeat([0, 1], 2000), 2)

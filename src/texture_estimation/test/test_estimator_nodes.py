@@ -213,17 +213,6 @@ def test_the_roughness_estimator_grades_as_the_same_vectors_do_offline(graph, ro
     assert received[-1].processing_s > 0.0
 
 
-def test_without_contact_there_is_no_grade_but_a_reason_and_it_is_counted(graph, roughness_model, grade_2, tmp_path):
-    node = NodeUnderTest(graph, RoughnessEstimator, roughness_model.save(tmp_path / 'm'))
-    last = node.ask(slide_of_grade_2(roughness_model, windows=3, force_n=0.01))[-1]
-    assert (last.valid, last.final) == (False, True)
-    assert np.isnan(last.grade)
-    assert 'no contact' in last.message
-    numbers = node.report()[2]
-    assert (numbers['unusable_windows'], numbers['model']) == (3, 'felt')
-    assert node.ask(grade_2)[-1].valid
-
-
 def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, cloth_slide, tmp_path):
     path = model.save(tmp_path / 'm')
     node = NodeUnderTest(graph, Classifier, path)

@@ -53,11 +53,6 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert len(estimates[-1].probabilities) == len(model.labels)
 
 
-def test_an_estimate_carries_the_frame_of_its_vectors(model, examples):
-    stream = [dataclasses.replace(vector, frame_id='tip') for vector in vectors(examples)]
-    assert {estimate.frame_id for estimate in predict(model, stream)} == {'tip'}
-
-
 def test_the_final_estimate_says_how_many_windows_are_missing_from_it(make_examples):
     examples = make_examples(slides=5)  # enough for prediction sets, whose absence is another message
     model = unlimited(train(load_recipe('default'), examples))
@@ -73,27 +68,6 @@ def test_overlapping_windows_count_the_sliding_time_once(model, examples):
     assert estimates[0].stamp_ns == 1_500_000_000
     apart = predict(model, vectors(examples, hop_s=1.0))
     assert apart[2].evidence_s == pytest.approx(1.5)
-
-
-def test_the_same_windows_further_apart_weigh_more(model, make_examples):
-    vague = make_examples(seed=8, spread=2.0)
-    assert (
-        predict(unlimited(model), vectors(vague, hop_s=0.5))[-1].confidence
-        > predict(unlimited(model), vectors(vague, hop_s=0.02))[-1].confidence
-    )
-
-
-def test_windows_late_in_a_slide_change_its_label_less_where_the_recipe_says_so(model, examples):
-    start, end = (vectors(examples, label=label, hop_s=0.5) for label in ('felt', 'cork'))
-    later = [dataclasses.replace(vector, start_ns=vector.start_ns + 2_500_000_000) for vector in end]
-    slide = [*start[:5], *later[:8]]
-    alike, careful = (
-        dataclasses.replace(model, recipe=dataclasses.replace(model.recipe, evidence=SoftVote(late_weight=weight)))
-        for weight in (1.0, 0.25)
-    )
-    assert predict(alike, slide)[-1].label == 'cork'
-    assert predict(careful, slide)[-1].label == 'felt'
-    assert [e.label for e in predict(careful, slide[:5])] == [e.label for e in predict(alike, slide[:5])]
 
 
 def under(stream, **conditions):
@@ -120,14 +94,6 @@ def test_the_mean_speed_of_the_exploration_counts_not_that_of_one_window(model, 
     estimates = predict(trained_at(model, 0.05), [dataclasses.replace(first, speed_m_s=0.035), *rest])
     assert [bool(estimate.message) for estimate in estimates[:3]] == [True, True, False]
     assert estimates[-1].known
-
-
-def test_a_model_of_too_few_slides_names_no_candidates_and_says_why(make_examples):
-    few = make_examples(labels=('cork', 'felt'))
-    *growing, final = predict(train(load_recipe('default'), few), vectors(few))
-    assert final.prediction_set == ()
-    assert 'needs 19 slides or more' in final.message
-    assert {estimate.message for estimate in growing} == {''}
 
 
 def test_a_new_exploration_begins_again_even_without_an_end(model, examples):
@@ -187,16 +153,6 @@ def test_without_a_model_the_final_estimate_says_so(examples):
 def test_the_part_that_differs_is_named(came, trained, words):
     assert words in fingerprint_difference(came, trained)
     assert bool(fingerprint_difference(came, trained)) == bool(words)
-
-
-def test_a_slide_whose_windows_disagree_is_unclassified_until_enough_of_them_agree(model, examples):
-    recipe = dataclasses.replace(model.recipe, evidence=MajorityVote())
-    voting = dataclasses.replace(unlimited(model), recipe=recipe)
-    estimates = predict(voting, vectors(examples, hop_s=0.5))
-    assert [(estimate.label, estimate.known) for estimate in estimates[:2]] == [('', False)] * 2
-    assert [(estimate.label, estimate.known) for estimate in estimates[2:]] == [('felt', True)] * 7
-    assert estimates[0].probabilities == pytest.approx([0.25] * 4)
-    assert estimates[-1].confidence == pytest.approx(1.0, abs=1e-3)
 
 
 def voted(votes, group=5):

@@ -51,34 +51,12 @@ def test_trained_textures_share_what_they_have_together_as_they_were():
     assert probabilities[0] / probabilities[1] == pytest.approx(9.0)
 
 
-def test_a_trained_texture_under_other_conditions_is_recognised_under_both():
-    gaussians = trained().with_added([slide([0.0, 0.0, 9.0], 1)], np.array([1]))
-    assert best(gaussians, slide([0.0, 0.0, 9.0], 2)) == 1
-    values = slide([6.0, 0.0, 0.0], 3)
-    shares = gaussians.shares(values.mean(axis=0), values.var(axis=0), float(WINDOWS))
-    assert int(gaussians.combined(np.array([0.1, 0.9]), shares).argmax()) == 1
-
-
-def test_two_equal_slides_are_surer_than_one_of_them():
-    added, asked = slide([0.0, 8.0, 0.0], 1), slide([0.0, 7.0, 0.0], 2)
-    once, twice = (trained().with_added([added] * count, np.full(count, 2)) for count in (1, 2))
-    first, second = (one.shares(asked.mean(axis=0), asked.var(axis=0), float(WINDOWS)) for one in (once, twice))
-    assert np.isfinite(first).all() and np.isfinite(second).all()
-    assert best(once, added) == best(twice, added) == 2
-
-
 def test_added_slides_take_the_place_of_those_added_before_and_none_is_left_of_them():
     first, second = slide([0.0, 8.0, 0.0], 1), slide([0.0, 0.0, 8.0], 2)
     again = trained().with_added([first], np.array([2])).with_added([second], np.array([2]))
     direct = trained().with_added([second], np.array([2]))
     asked = slide([1.0, 2.0, 3.0], 3)
     np.testing.assert_array_equal(*(one.shares(asked.mean(axis=0), asked.var(axis=0), 3.0) for one in (again, direct)))
-
-
-def test_probabilities_are_neither_sure_of_everything_nor_of_nothing():
-    gaussians = trained().with_added([slide([0.0, 8.0, 0.0], 1)], np.array([2]))
-    between = np.exp(gaussians.window_shares(slide([3.0, 0.0, 0.0], 2)))
-    assert 0.5 < between.max(axis=1).mean() < 0.99
 
 
 def normal(centre, count, seed):
@@ -105,17 +83,6 @@ def test_a_class_of_few_slides_is_wider_and_as_sharp_as_the_others_with_many():
         variance = (1.0 + 1.0 / slides) ** classes.uncertainty_exponent
         log_odds = 0.5 * classes.inverse_temperature * (100.0 - 4.0 / variance)
         assert shares[2] - shares[1] == pytest.approx(log_odds, rel=0.1)
-
-
-def test_of_uncorrelated_features_a_diagonal_covariance_says_the_same(monkeypatch):
-    around = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
-    samples = np.concatenate([around, around + np.array([9.0, 5.0])])
-    given = samples, np.repeat([0, 1], 4), np.array([4, 4])
-    full = GaussianClasses.fit(*given)
-    monkeypatch.setattr('texture_estimation.gaussians.MAX_CORRELATED', 1)
-    diagonal = GaussianClasses.fit(*given)
-    assert diagonal.projection.shape == (2,)
-    np.testing.assert_allclose(diagonal.log_probabilities(samples), full.log_probabilities(samples))
 
 
 def test_more_features_than_a_covariance_could_hold_still_tell_the_classes():

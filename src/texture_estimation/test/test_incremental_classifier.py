@@ -129,16 +129,6 @@ def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, sil
     assert load_model(path).labels == model.labels
 
 
-def test_one_exploration_cannot_stand_under_two_labels(model, silk):
-    incremental_classifier = IncrementalClassifier(model)
-    measured(incremental_classifier, silk)
-    incremental_classifier.add('silk')
-    with pytest.raises(InvalidData, match="'e1' was added as 'silk'; it cannot be 'satin', too"):
-        incremental_classifier.add('satin')
-    incremental_classifier.remove_last()
-    assert incremental_classifier.add('satin') == 12
-
-
 def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tmp_path):
     path = model.save(tmp_path / 'surfaces')
     for _ in range(2):
@@ -262,13 +252,6 @@ def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(mode
     highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].probabilities))
     assert max(estimate.confidence for estimate in estimates) <= highest + 1e-9
     assert f'with {count} the confidence is' in estimates[-1].message
-
-
-def test_a_trained_texture_keeps_its_label_and_nearly_its_confidence_beside_an_added_one(model, examples, silk):
-    wood = examples.values[examples.labels == 'wood'][:6]
-    before, after = (estimated(one, wood)[-1] for one in (model, with_slides(model, silk, 1)))
-    assert before.label == after.label == 'wood'
-    assert after.confidence == pytest.approx(before.confidence, abs=0.1)
 
 
 @pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The multilayer perceptron against what mathematics says of it."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from sklearn.neural_network import MLPClassifier
 
-from texture_estimation import numerics as log_probabilities
 from texture_estimation.learners import mlp
 from texture_estimation.learners.discriminant import linear_discriminant
-from texture_estimation.learners.mlp import Mlp, MlpTraining, OnsetMlp
+from texture_estimation.learners.mlp import Mlp, MlpTraining
 from texture_estimation.numerics import log_loss, log_softmax
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
@@ -68,16 +65,6 @@ def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weigh
     answers = Mlp.predictor(parameters)(fresh)
     np.testing.assert_array_equal(answers.argmax(axis=1), network.predict(fresh))
     np.testing.assert_allclose(log_softmax(answers), network.predict_log_proba(fresh), atol=1e-9)
-
-
-def test_a_training_in_small_pieces_gives_the_same_network(examples, monkeypatch):
-    codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
-    whole = Mlp(epochs=2).fit(examples.values, codes, groups)
-    monkeypatch.setattr(log_probabilities, 'CHUNK', 40)
-    pieces = Mlp(epochs=2).fit(examples.values, codes, groups)
-    np.testing.assert_array_equal(pieces.parameters['hidden'], whole.parameters['hidden'])
-    np.testing.assert_allclose(pieces.parameters['output'], whole.parameters['output'], rtol=1e-4)  # the temperature
-    np.testing.assert_allclose(pieces.held_out, whole.held_out, rtol=1e-4)
 
 
 def test_a_training_that_would_take_too_long_makes_fewer_steps(examples, monkeypatch):
@@ -146,32 +133,8 @@ def test_first_windows_that_look_different_are_recognised_by_what_first_windows_
     assert shares(model_of({'mlp': {'hidden': 1, 'epochs': 20}}))[0] < 0.9
 
 
-def test_later_windows_are_decided_by_the_network_alone():
-    examples = examples_with_onset()
-    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    blind = examples.values * [1.0, 1.0, 0.0]
-    alone = Mlp(epochs=2).fit(blind, codes, groups)
-    both = OnsetMlp(epochs=2).of_examples(NAMES, ('cork', 'felt'))
-    fitted = both.fit(examples.values, codes, groups)
-    later = examples.values[examples.values[:, 2] == 0]
-    assert (
-        both.predictor(fitted.parameters)(later).argmax(axis=1) == Mlp.predictor(alone.parameters)(later).argmax(axis=1)
-    ).all()
-
-
 def test_a_first_window_is_estimated_live_by_the_discriminant_too():
     model = model_of({'onset_mlp': {'hidden': 4, 'epochs': 5}})
     first = examples_with_onset(seed=1).values[0]
     assert first[2] == 1.0
     np.testing.assert_allclose(model.predict_with_activations(first)[0], model.predictor(first))
-
-
-def test_without_the_feature_it_is_the_network():
-    examples = dataclasses.replace(examples_with_onset(), names=('signal/a', 'signal/b', 'signal/c'))
-    recipe = {'inputs': {'signal': {'features': ['hjorth']}}}
-    models = [
-        train(Recipe.from_mapping({**recipe, 'learner': {name: {'epochs': 5}}}, 'mine'), examples)
-        for name in ('mlp', 'onset_mlp')
-    ]
-    first, second = (model.predict_log_proba(examples.values) for model in models)
-    assert first == pytest.approx(second)

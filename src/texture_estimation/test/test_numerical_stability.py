@@ -10,7 +10,6 @@ from scipy.signal import lfilter
 from texture_core.config import folder
 from texture_core.types import Window
 from texture_estimation.decisions import FEATURES, NOVELTY_WINDOWS, ClassDistance, NoveltyDetector
-from texture_estimation.gaussians import LENGTHS, SlideGaussians
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import REGRESSORS, ROUGH, SMOOTH
@@ -90,19 +89,6 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
     assert np.mean(known) > 0.9
     far = distance.score(means[0] + 100.0 * np.ptp(values, axis=0), int(classes[0]))
     assert detector.novelty_score([far], 5.0) > detector.threshold(5.0)
-
-
-@pytest.mark.filterwarnings('error::RuntimeWarning')
-@pytest.mark.parametrize('change', DIFFICULT.values(), ids=DIFFICULT)
-def test_what_was_trained_live_is_evaluated_with_finite_log_probabilities(change, make_examples):
-    examples = make_examples(slides=2, windows=4)
-    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    trained = SlideGaussians.fit(change(examples.values), codes, groups, overlap=1.0)
-    gaussians = trained.with_added([change(examples.values)[:4] + 1.0], np.array([4]))
-    for values in (change(make_examples(seed=1).values), np.zeros((1, change(examples.values).shape[1]))):
-        assert np.isfinite(gaussians.window_shares(values)).all()
-        for length in LENGTHS:
-            assert np.isfinite(gaussians.shares(values.mean(axis=0), values.var(axis=0), length)).all()
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')

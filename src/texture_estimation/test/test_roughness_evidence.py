@@ -124,16 +124,6 @@ def test_a_slide_too_short_and_a_missing_model_are_reported() -> None:
     assert 'shorter than the 0.5 s of a window' in RoughnessAccumulator(model).update(last()).message
 
 
-@pytest.mark.usefixtures('never_early')
-def test_a_bad_window_among_good_ones_is_left_out(model) -> None:
-    evidence = RoughnessAccumulator(model)
-    evidence.update(vector())
-    estimate = evidence.update(vector((3.0, 0.0, 9.0, 8.0), sequence=1))
-    assert estimate.valid
-    assert estimate.windows == 1
-    assert 'skids' in estimate.message
-
-
 def test_where_no_head_fires_there_is_no_grade() -> None:
     model = train_grades(recipe(regressor={'texture_papers.rispal:Svm5': {'kernel_scale': 0.3}}), *graded())
     evidence = RoughnessAccumulator(model)
@@ -203,8 +193,3 @@ def test_examples_unfit_for_training_get_a_sentence() -> None:
     values[0, 0] = np.nan
     with pytest.raises(InvalidData, match='need the speed'):
         train_grades(recipe(), dataclasses.replace(examples, values=values), grades)
-
-
-def test_few_textures_make_a_model_whose_card_says_that_it_is_not_calibrated() -> None:
-    model = train_grades(recipe(), *graded(n_textures=3))
-    assert 'not calibrated' in model.training['calibration']

@@ -11,7 +11,7 @@ from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
 
 from texture_core.errors import InvalidParameter, MissingLibrary, ModelMismatch
 from texture_estimation.learners.learner import standardisation
-from texture_estimation.learners.sklearn_learner import SklearnLearner, SklearnPredictor, unpacked
+from texture_estimation.learners.sklearn_learner import SklearnPredictor, unpacked
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
@@ -134,8 +134,3 @@ def test_a_tree_that_points_outside_itself_is_refused_before_it_is_used():
     tree.__setstate__(state)
     with pytest.raises(ModelMismatch, match='points outside its nodes or features'):
         SklearnPredictor(forest, np.zeros(3), np.ones(3), 2, 1.0)
-
-
-def test_the_defaults_of_scikit_learn_hold_but_the_seed_is_fixed():
-    learner = SklearnLearner('sklearn.ensemble:RandomForestClassifier')
-    assert learner.new_estimator().get_params() == {**RandomForestClassifier().get_params(), 'random_state': 0}

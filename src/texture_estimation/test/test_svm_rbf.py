@@ -76,12 +76,6 @@ def test_consistent_pairs_give_back_the_probabilities_they_came_from():
     np.testing.assert_allclose(np.exp(coupling(margins)), probabilities, rtol=1e-12)
 
 
-def test_two_labels_have_the_sigmoid_itself():
-    coupling = PairCoupling(2, np.array([1.5]), np.array([0.2]), 1.0)
-    expected = 1 / (1 + np.exp(-(1.5 * 0.7 + 0.2)))
-    assert np.exp(coupling(np.array([0.7])))[0] == pytest.approx(expected)
-
-
 def test_fitted_probabilities_are_as_often_right_as_they_say():
     rng = np.random.default_rng(0)
     codes = rng.integers(0, 2, 4000)

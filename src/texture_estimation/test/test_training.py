@@ -7,7 +7,6 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.gaussians import MAX_EXAMPLES, spread
 from texture_estimation.learners.learner import assign_folds
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -82,17 +81,6 @@ def test_vectors_are_gathered_with_their_surfaces():
         LabelledFeatures.from_vectors(vectors, {})
 
 
-def test_the_start_of_a_slide_counts_as_often_as_asked_and_is_evaluated_once(examples):
-    recipes = [
-        dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, start_weight=weight))
-        for weight in (1, 3)
-    ]
-    once, often = (train(recipe, examples) for recipe in recipes)
-    assert once.training['windows'] == often.training['windows'] == len(examples.labels)
-    assert often.training['held_out_window_accuracy'] is not None
-    assert not np.array_equal(once.predict_log_proba(examples.values), often.predict_log_proba(examples.values))
-
-
 def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
     examples = make_examples()
     trusting, strict = (
@@ -161,13 +149,6 @@ def test_a_classifier_trained_with_gains_recognises_what_is_amplified(make_examp
     assert right['augmented'] > right['plain'] + 0.1
 
 
-def test_a_recipe_without_augmentation_ignores_copies(make_examples):
-    examples = make_examples(slides=4)
-    recipe = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
-    with_copies, without = train(recipe, augmented(examples, np.zeros(6))), train(recipe, examples)
-    np.testing.assert_array_equal(with_copies.parameters['hidden'], without.parameters['hidden'])
-
-
 def test_an_augmented_network_learns_windows_of_other_lengths_too(make_examples):
     examples, shorter = make_examples(), make_examples(seed=1, labels=('cork', 'felt', 'wood', 'slate'), windows=3)
     moved = dataclasses.replace(shorter, values=shorter.values + 10.0)
@@ -216,10 +197,3 @@ def test_a_label_with_one_slide_is_divided_by_windows_and_the_note_says_so():
 
 def test_a_label_with_one_window_cannot_be_divided():
     assert assign_folds(np.array([0, 0, 1]), np.array([0, 1, 2]), 2) is None
-
-
-def test_examples_are_thinned_evenly():
-    assert spread(3).tolist() == [0, 1, 2]
-    assert len(spread(10 * MAX_EXAMPLES)) == MAX_EXAMPLES
-    assert spread(1001, 3).tolist() == [0, 500, 1000]
-    assert spread(0).tolist() == []

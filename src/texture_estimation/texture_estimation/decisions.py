@@ -1291,49 +1291,33 @@ def fit_stopping_rule(
     -------
     StoppingRule
     """
-    table = _CourseTable(courses, early_novelty_score)
+    # (n_slides, n_windows), the shorter ones filled with what never stops a slide.
+    novelty = _filled([course.novelty_scores for course in courses], np.inf)
+    lengths = _filled([course.effective_windows for course in courses], np.nan)
+    known = _filled([course.known for course in courses], 0.0) > 0.0
+    known &= novelty <= early_novelty_score * EARLY_GROWTH ** (np.fmin(lengths, MAX_EARLY_WINDOWS) - 1.0)
+    confidences = np.where(known, _filled([course.confidences for course in courses], -1.0), -1.0)
+    wrong_then = _filled([~course.right for course in courses], 0.0) > 0.0
+    whole = np.array([course.effective_windows[-1] for course in courses])
+    undisturbed = np.array([not course.disturbance for course in courses])
+    rows = np.arange(len(courses))
     best, rule = (np.inf, np.inf), StoppingRule()
     ends = product(NOVELTY_SCORES, (NEVER,)) if by_novelty else product((NEVER,), MAX_WINDOWS)
     for confidence, (novelty_score, longest) in product(CONFIDENCES.tolist(), ends):
-        errors, disturbed_errors, windows = table.outcome(confidence, novelty_score, longest, at_end=not by_novelty)
-        excess = max(0.0, errors - wrong) + max(0.0, disturbed_errors - wrong_disturbed)
-        if (excess, windows) < best:
-            best, rule = (excess, windows), StoppingRule(confidence, longest, novelty_score, early_novelty_score)
-    return rule
-
-
-class _CourseTable:
-    """Courses as arrays (n_slides, n_windows), the shorter ones filled with what never stops a slide."""
-
-    def __init__(self, courses: Sequence[SlideCourse], early_novelty_score: float) -> None:
-        self._novelty = _filled([course.novelty_scores for course in courses], np.inf)
-        self._windows = _filled([course.effective_windows for course in courses], np.nan)
-        known = _filled([course.known for course in courses], 0.0) > 0.0
-        growing = EARLY_GROWTH ** (np.fmin(self._windows, MAX_EARLY_WINDOWS) - 1.0)
-        known &= self._novelty <= early_novelty_score * growing
-        self._confidences = np.where(known, _filled([course.confidences for course in courses], -1.0), -1.0)
-        self._wrong = _filled([~course.right for course in courses], 0.0) > 0.0
-        self._whole = np.array([course.effective_windows[-1] for course in courses])
-        self._undisturbed = np.array([not course.disturbance for course in courses])
-
-    def outcome(
-        self, confidence: float, novelty_score: float, longest: float, *, at_end: bool
-    ) -> tuple[float, float, float]:
-        """Return the share of slides stopped with a wrong label, undisturbed and disturbed, and the mean evidence.
-
-        The evidence is that of undisturbed slides, in effective windows; without disturbed ones, none of them is wrong.
-        """
-        stops = (self._confidences >= confidence) & (self._novelty <= novelty_score) | (self._windows >= longest)
-        if at_end:  # all slides stop there
-            stops |= self._windows == self._whole[:, None]
+        stops = (confidences >= confidence) & (novelty <= novelty_score) | (lengths >= longest)
+        if not by_novelty:  # what is said at the end of a slide counts, too
+            stops |= lengths == whole[:, None]
         places, stopped = stops.argmax(axis=1), stops.any(axis=1)
-        rows = np.arange(len(places))
-        wrong = stopped & self._wrong[rows, places]
-        taken = np.where(stopped, self._windows[rows, places], self._whole)
-        undisturbed = self._undisturbed
-        disturbed = wrong[~undisturbed]
-        disturbed_errors = float(disturbed.mean()) if len(disturbed) else 0.0
-        return float(wrong[undisturbed].mean()), disturbed_errors, float(taken[undisturbed].mean())
+        errors = stopped & wrong_then[rows, places]
+        taken = np.where(stopped, lengths[rows, places], whole)
+        excess = max(0.0, float(errors[undisturbed].mean()) - wrong)
+        if not undisturbed.all():
+            excess += max(0.0, float(errors[~undisturbed].mean()) - wrong_disturbed)
+        mean_windows = float(taken[undisturbed].mean())
+        if (excess, mean_windows) < best:
+            best = excess, mean_windows
+            rule = StoppingRule(confidence, longest, novelty_score, early_novelty_score)
+    return rule
 
 
 def _filled(rows: Sequence[Array | Mask], value: float) -> Array:

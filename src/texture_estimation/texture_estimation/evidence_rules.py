@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -21,17 +20,17 @@ ROUNDING = 1e-9
 FULL_WINDOWS = 5.0
 
 
-class EvidenceRule(Protocol):
-    """Frozen parameters of a rule.
+@dataclass(frozen=True)
+class EvidenceRule:
+    """Frozen parameters of a rule, which counts each window alike unless it says otherwise.
 
     Where several labels share the highest log-probability nothing is decided: the surface is unclassified.
     """
 
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
     @property
     def group(self) -> int:
         """How many consecutive windows decide together, the newest complete group for the slide; 0: all windows."""
+        return 0
 
     def window_evidence(self, log_probabilities: Array) -> Array:
         """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean.
@@ -46,6 +45,7 @@ class EvidenceRule(Protocol):
         (..., n_labels)
             What is averaged over the windows.
         """
+        return log_probabilities
 
     def window_weights(self, effective_windows: float | Array) -> Array:
         """Return the weight of windows in the mean evidence.
@@ -60,9 +60,11 @@ class EvidenceRule(Protocol):
         (n_windows,) or a number
             1 for a window that counts fully.
         """
+        return np.ones(np.shape(effective_windows))
 
     def window_weight(self, effective_windows: float) -> float:
         """Return the weight of one window, as `window_weights` does; without an array it costs a tenth."""
+        return 1.0
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the log-probability of each texture given all windows so far, (..., n_labels).
@@ -80,28 +82,16 @@ class EvidenceRule(Protocol):
         (..., n_labels)
             Logarithms of probabilities that add up to 1.
         """
+        raise NotImplementedError
 
     def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
-        """Return the probabilities of which `log_posterior` gives the logarithms; it costs half of that.
-
-        Parameters
-        ----------
-        mean_evidence : (..., n_labels)
-            Mean of the evidence of the windows.
-        effective_windows
-            Effective window count: sliding time over the length of a window.
-        tempering_exponent
-            Exponent of the effective window count, 0 to 1.
-
-        Returns
-        -------
-        (..., n_labels)
-            Probabilities that add up to 1.
-        """
+        """Return the probabilities of which `log_posterior` gives the logarithms, (..., n_labels)."""
+        probabilities: Array = np.exp(self.log_posterior(mean_evidence, effective_windows, tempering_exponent))
+        return probabilities
 
 
 @dataclass(frozen=True)
-class SoftVote:
+class SoftVote(EvidenceRule):
     """Mean log-probability of the windows, times their tempered effective number.
 
     Independent windows would count as their number n. Windows of one slide share force, place and contact, and count
@@ -121,11 +111,6 @@ class SoftVote:
         low=0.0,
         high=1.0,
     )
-    group: ClassVar[int] = 0
-
-    def window_evidence(self, log_probabilities: Array) -> Array:
-        """Return the log-probabilities as they are."""
-        return log_probabilities
 
     def window_weights(self, effective_windows: float | Array) -> Array:
         """Return 1 for the first FULL_WINDOWS effective windows, and `late_weight` for those after them."""
@@ -145,7 +130,7 @@ class SoftVote:
 
 
 @dataclass(frozen=True)
-class MajorityVote:
+class MajorityVote(EvidenceRule):
     """Each window votes for its best label; one that is undecided for none. Too few equal votes: unclassified.
 
     Windows vote in groups: with five windows of 0.1 s a decision rests on 0.5 s, however long the slide is. The newest
@@ -189,14 +174,6 @@ class MajorityVote:
         votes: Array = (best & alone).astype(np.float64)
         return votes
 
-    def window_weights(self, effective_windows: float | Array) -> Array:
-        """Return 1 for each window: votes are counted."""
-        return np.ones(np.shape(effective_windows))
-
-    def window_weight(self, effective_windows: float) -> float:
-        """Return 1: votes are counted."""
-        return 1.0
-
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.
 
@@ -208,11 +185,6 @@ class MajorityVote:
         abstained = 1.0 - np.add.reduce(mean_evidence, axis=-1, keepdims=True)
         shares = np.maximum(mean_evidence + abstained / n_labels, MIN_SHARE)
         return log_softmax(np.where(won, np.log(shares), 0.0))
-
-    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
-        """Return the shares of the votes; equal ones for all labels where the majority is lacking."""
-        probabilities: Array = np.exp(self.log_posterior(mean_evidence, effective_windows, tempering_exponent))
-        return probabilities
 
 
 class GroupedEvidence:

@@ -435,8 +435,8 @@ class TrainingExamples:
     Examples
     --------
     >>> examples = TrainingExamples.of(np.arange(4.0)[:, None], np.array([0, 0, 1, 1]), np.arange(4))
-    >>> examples.of_label(1).tolist()
-    [[2.0], [3.0]]
+    >>> examples.codes.tolist()
+    [0, 0, 1, 1]
     """
 
     values: NDArray[np.float32]
@@ -476,17 +476,6 @@ class TrainingExamples:
             raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
         if not n or self.codes.min() < 0 or self.codes.max() >= n_labels or not np.isfinite(self.values).all():
             raise ValueError('examples have labels that the model has not, or values that are not finite')
-
-    def of_label(self, code: int) -> Array:
-        """Return those of a label, (n, n_features); none of one that came later.
-
-        Returns
-        -------
-        (n, n_features)
-            float64.
-        """
-        rows: Array = self.values[self.codes == code].astype(np.float64)
-        return rows
 
 
 def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:

@@ -112,7 +112,7 @@ class IncrementalClassifier:
         if self._path is not None:
             self._store(self._path, added_slide)
         self.model = self.model.with_added_slides((*self.model.added_slides, added_slide))
-        return len(self.model.examples_of(label))
+        return self.model.n_examples(label)
 
     def _recent_windows_of(self, exploration_id: str) -> list[Array]:
         """Return the kept windows of an exploration, which counts as the newest one, also while it has none."""

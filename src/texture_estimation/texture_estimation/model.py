@@ -6,8 +6,8 @@ Adding slides does not change the two files.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from texture_estimation.decisions import Decisions, ErrorBound, SlideNovelty, sp
 from texture_estimation.gaussians import SlideGaussians, TrainingExamples
 from texture_estimation.learners.learner import Predictor, hidden_layer
 from texture_estimation.learners.mlp import MlpPredictor
-from texture_estimation.model_files import AddedSlide, part_of, read_added_slides, tree_of
+from texture_estimation.model_files import AddedSlide, StoredModel, part_of, read_added_slides, tree_of
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.numerics import is_tied, log_softmax
 from texture_estimation.recipe import Recipe
@@ -31,28 +31,18 @@ from texture_features.features import temporal as slide_onset
 LEAST_PROBABILITY = 1e-300  # so that its logarithm is finite
 
 
-@dataclass(frozen=True, eq=False)
-class TextureModel:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TextureModel(StoredModel):
     """Fitted parameters, and what is needed to classify a feature vector and to refuse an incompatible one.
 
     Parameters
     ----------
-    name
-        Of the model.
     labels
         Textures in the training set, in the order of the probabilities; added ones last.
-    names, feature_set
-        Features it expects, and their fingerprint.
-    recipe
-        By which it was made.
-    parameters
-        Fitted parameters of the learner, as the file stores them.
     tempering_exponent
         Exponent of the effective window count in the evidence, 0 to 1.
     decisions
         When a slide may end, and when its surface is known.
-    training
-        Facts about the training, for the card.
     next_touch_model
         Class-conditional Gaussians of each motion, to choose the next touch; None if all slides were alike.
     examples
@@ -78,15 +68,10 @@ class TextureModel:
     (('cork', 'felt'), ['cork', 'cork'])
     """
 
-    name: str
     labels: tuple[str, ...]
-    names: tuple[str, ...]
-    feature_set: str
     recipe: Recipe
-    parameters: Mapping[str, Any]
     tempering_exponent: float
     decisions: Decisions
-    training: Mapping[str, Any] = field(default_factory=dict)
     next_touch_model: NextTouchModel | None = None
     examples: TrainingExamples | None = None
     added_slides: tuple[AddedSlide, ...] = ()
@@ -231,17 +216,11 @@ class TextureModel:
         """Number of textures known from the training."""
         return int(self.examples.codes.max()) + 1 if self.examples else len(self.labels)
 
-    def examples_of(self, label: str) -> Array:
-        """Return the examples of a label from training and added slides, (n, n_features).
-
-        Returns
-        -------
-        (n, n_features)
-            Those of the training and those added.
-        """
-        known = self.examples.of_label(self.labels.index(label)) if self.examples and label in self.labels else None
-        own = [added_slide.values for added_slide in self.added_slides if added_slide.label == label]
-        return np.concatenate([np.empty((0, len(self.names))) if known is None else known, *own])
+    def n_examples(self, label: str) -> int:
+        """Return how many windows of a label there are from training and added slides."""
+        trained = self.examples is not None and label in self.labels
+        known = int((self.examples.codes == self.labels.index(label)).sum()) if self.examples and trained else 0
+        return known + sum(len(slide.values) for slide in self.added_slides if slide.label == label)
 
     def _fit_slide_gaussians(self) -> SlideGaussians:
         """Return the Gaussians of the trained textures, from the windows of the training that are kept."""
@@ -288,20 +267,13 @@ class TextureModel:
     def tree(self) -> dict[str, Any]:
         """What the two files hold: plain values, and arrays as leaves."""
         return {
-            **model_files.common_tree(self),
+            **super().tree,
             'labels': list(self.trained_labels),
             'tempering_exponent': self.tempering_exponent,
             'decisions': tree_of(self.decisions),
             'next_touch_model': tree_of(self.next_touch_model),
             'examples': tree_of(self.examples),
         }
-
-    def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
-        """Write NAME.npz and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.npz.
-
-        Added slides are not written: they lie beside the model to which they were added.
-        """
-        return model_files.write(path, {**self.tree, **(facts or {})})
 
 
 def load_model(path: str | Path) -> TextureModel:

@@ -219,21 +219,54 @@ def read(path: str | Path, *, of: str) -> dict[str, Any]:
     return tree
 
 
-def common_tree(model: Any) -> dict[str, Any]:
-    """Return what the trees of models of textures and of roughness have in common."""
-    return {
-        'name': model.name,
-        'feature_set': model.feature_set.partition(CORRECTED)[0],
-        'features': list(model.names),
-        'training': tree_of(model.training),
-        'recipe': model.recipe.as_mapping(),
-        'recipe_name': model.recipe.name,
-        'parameters': tree_of(model.parameters),
-    }
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StoredModel:
+    """What models of textures and of roughness have in common.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    names, feature_set
+        Features it expects, and their fingerprint.
+    recipe
+        By which it was made.
+    parameters
+        Fitted parameters of the learner or regressor, as the file stores them.
+    training
+        Facts about the training, for the card.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    feature_set: str
+    recipe: Any
+    parameters: Mapping[str, Any]
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def tree(self) -> dict[str, Any]:
+        """What the two files hold: plain values, and arrays as leaves."""
+        return {
+            'name': self.name,
+            'feature_set': self.feature_set.partition(CORRECTED)[0],
+            'features': list(self.names),
+            'training': tree_of(self.training),
+            'recipe': self.recipe.as_mapping(),
+            'recipe_name': self.recipe.name,
+            'parameters': tree_of(self.parameters),
+        }
+
+    def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
+        """Write NAME.npz and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.npz.
+
+        Slides added to a model are not written: they lie beside the model to which they were added.
+        """
+        return write(path, {**self.tree, **(facts or {})})
 
 
 def common_parts(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """Return fields of a model from what `common_tree` gave; InvalidData if they have other types."""
+    """Return the fields of `StoredModel`, but for its recipe, from its tree; InvalidData if they have other types."""
     return {
         'name': part_of(str, tree.get('name'), 'name'),
         'feature_set': part_of(str, tree.get('feature_set'), 'feature_set'),

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,6 +64,13 @@ def _listed(inputs: dict[str, tuple[str, str]]) -> str:
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 AUGMENTATION = 'augmentation'  # section within `training`
 SPEEDS = 5  # from the slowest to the fastest, for windows of as many lengths
+
+
+def check_keys(content: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    """Raise InvalidParameter if a mapping has another key than the known ones, with the nearest of these."""
+    for key in content:
+        if key not in known:
+            raise InvalidParameter(f'{where}: {unknown_name(str(key), known, "key")}')
 
 
 @dataclass(frozen=True)
@@ -285,9 +292,7 @@ class Recipe:
             With the place in the recipe and what is allowed there.
         """
         where = f"recipe '{name}'"
-        for key in content:
-            if key not in KEYS:
-                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
+        check_keys(content, KEYS, where)
         learner = choose(LEARNERS, content.get('learner', 'svm_rbf'), 'learner', where)
         evidence = choose(EVIDENCE_RULES, content.get('evidence', 'soft_vote'), 'evidence rule', where)
         training, augmentation = _training(content.get('training') or {}, where)

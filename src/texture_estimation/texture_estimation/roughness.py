@@ -7,7 +7,7 @@ import csv
 import dataclasses
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -19,13 +19,13 @@ from scipy.optimize import brentq
 from scipy.stats import t as student
 
 from texture_core.config import MB, find_file, from_mapping, param, read_text, unknown_name
-from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import NANOSECONDS, Array, FeatureVector, RoughnessEstimate
 from texture_estimation import model_files
 from texture_estimation.evidence import no_window
 from texture_estimation.learners.learner import Codes, standardisation
-from texture_estimation.model_files import part_of
-from texture_estimation.recipe import TrainingParams, fingerprint_difference
+from texture_estimation.model_files import StoredModel, part_of
+from texture_estimation.recipe import TrainingParams, check_keys, fingerprint_difference
 from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet, choose, read_recipe
 from texture_features.windows import WindowParams
@@ -144,21 +144,9 @@ REGRESSOR_GRADES: Array = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
 SMOOTH, ROUGH = 1.0, 5.0
 
 
-class RegressorPredictor(Protocol):
-    """Predict grades of windows, as plain arrays."""
-
-    def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and its standard deviation.
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (...,), (...,)
-            NaN as the grade where the regressor has no answer; 0 as the deviation if the regressor does not know it.
-        """
+# From features (..., n_features) to grade and its standard deviation, (...) each, as plain arrays: NaN as the grade
+# where the regressor has no answer, 0 as the deviation if it does not know it.
+RegressorPredictor = Callable[[Array], tuple[Array, Array]]
 
 
 class RoughnessRegressor(Protocol):
@@ -445,9 +433,7 @@ class RoughnessRecipe:
             With the place in the recipe and what is allowed there.
         """
         where = f"roughness recipe '{name}'"
-        for key in content:
-            if key not in KEYS:
-                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
+        check_keys(content, KEYS, where)
         return cls(
             name,
             FeatureSet.from_mapping(content, where),
@@ -540,28 +526,18 @@ class Calibration:
         return np.sqrt(self.shared_variance(regressor_std) + self.within_std**2)
 
 
-@dataclass(frozen=True, eq=False)
-class RoughnessModel:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RoughnessModel(StoredModel):
     """Fitted parameters, and what is needed to grade a feature vector and to refuse an incompatible one.
 
     Parameters
     ----------
-    name
-        Of the model.
-    names, feature_set
-        Features it expects, and their fingerprint.
-    recipe
-        By which it was made.
-    parameters
-        Fitted parameters of the regressor: plain arrays.
     calibration
         Of the standard deviation.
     limits
         Of the checks.
     grades
         Of the training textures.
-    training
-        Facts about the training, for the card.
 
     Examples
     --------
@@ -580,15 +556,10 @@ class RoughnessModel:
     True
     """
 
-    name: str
-    names: tuple[str, ...]
-    feature_set: str
     recipe: RoughnessRecipe
-    parameters: Mapping[str, Any]
     calibration: Calibration
     limits: Mapping[str, float]
     grades: Mapping[str, float]
-    training: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def predictor(self) -> RegressorPredictor:
@@ -624,16 +595,12 @@ class RoughnessModel:
     def tree(self) -> dict[str, Any]:
         """What the two files hold: plain values, and arrays as leaves."""
         return {
-            **model_files.common_tree(self),
+            **super().tree,
             'target': 'roughness grade, 1 (smooth) to 5 (rough), as people give it: an opinion, not a depth',
             'grades': dict(self.grades),
             'calibration': asdict(self.calibration),
             'limits': dict(self.limits),
         }
-
-    def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
-        """Write NAME.npz and NAME.json; `facts` are added to the card. Return NAME.npz."""
-        return model_files.write(path, {**self.tree, **(facts or {})})
 
 
 def load_roughness_model(path: str | Path) -> RoughnessModel:
@@ -802,39 +769,6 @@ MIN_TEXTURES = 4  # to hold one out and train on the others
 SCALES = (0.05, 20.0)
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOutGrades:
-    """What a regressor says of windows of textures that it has not seen, (n,) each; NaN where it gives no grade.
-
-    Examples
-    --------
-    >>> held = HeldOutGrades(np.array([1.0, 2.0, np.nan]), np.ones(3), np.ones(3), np.array([0, 0, 1]))
-    >>> held.graded.grades.tolist()
-    [1.0, 2.0]
-    """
-
-    grades: Array
-    stds: Array
-    true: Array
-    textures: Codes
-
-    @property
-    def graded(self) -> HeldOutGrades:
-        """Those windows that got a grade."""
-        rows = np.isfinite(self.grades)
-        return HeldOutGrades(self.grades[rows], self.stds[rows], self.true[rows], self.textures[rows])
-
-    def mean_over_textures(self, values: Array) -> float:
-        """Return the mean of values, (n,), in which each texture counts alike.
-
-        Parameters
-        ----------
-        values : (n,)
-            A number for each window.
-        """
-        return float(np.mean([values[self.textures == code].mean() for code in np.unique(self.textures)]))
-
-
 def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Grades, name: str = '') -> RoughnessModel:
     """Return a model that grades as the people did who graded the textures of the examples.
 
@@ -867,8 +801,11 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
     _check(examples)
     columns = graded_columns(examples.names)
     values = examples.values[:, columns]
-    held_out = hold_out(recipe.regressor, values, true, codes, recipe.training.folds)
-    calibration, facts = calibrate(held_out)
+    calibration, facts = Calibration(), {'calibration': f'not calibrated: fewer than {MIN_TEXTURES} textures'}
+    if len(labels) >= MIN_TEXTURES:
+        calibration, facts = calibrate(
+            *hold_out(recipe.regressor, values, true, codes, recipe.training.folds), true, codes
+        )
     return RoughnessModel(
         name=name or recipe.name,
         names=examples.names,
@@ -891,8 +828,8 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
 
 def hold_out(
     regressor: RoughnessRegressor, values: Array, true: Array, textures: Codes, folds: int
-) -> HeldOutGrades | None:
-    """Return what is said of each texture by a regressor that trained on the others; None if there are too few.
+) -> tuple[Array, Array]:
+    """Return grades and deviations, (n,) each, that a regressor gives which trained on other textures; NaN for none.
 
     Parameters
     ----------
@@ -909,11 +846,10 @@ def hold_out(
 
     Returns
     -------
-    HeldOutGrades or None
+    (n,), (n,)
+        Grades and their standard deviations.
     """
     codes = np.unique(textures)
-    if len(codes) < MIN_TEXTURES:
-        return None
     grades, stds = np.empty(len(true)), np.empty(len(true))
     # Textures of like grade go to different parts, so that each part leaves some of every grade.
     order = codes[np.argsort([true[textures == code][0] for code in codes], kind='stable')]
@@ -921,33 +857,34 @@ def hold_out(
         held = np.isin(textures, order[part :: min(folds, len(codes))])
         fitted = regressor.predictor(regressor.fit(values[~held], true[~held], textures[~held]))
         grades[held], stds[held] = fitted(values[held])
-    return HeldOutGrades(grades, stds, true, textures)
+    return grades, stds
 
 
-def calibrate(held_out: HeldOutGrades | None) -> tuple[Calibration, Mapping[str, object]]:
-    """Return the calibration, and facts for the card.
+def calibrate(grades: Array, stds: Array, true: Array, textures: Codes) -> tuple[Calibration, dict[str, Any]]:
+    """Return the calibration, and facts for the card, from what was said of textures held out, (n,) each.
 
     The scale makes the mean square of error over standard deviation, each texture counting alike, what it is for a
     Student distribution with as many degrees of freedom as there are textures, whose 90 % interval ours then is.
     """
-    if held_out is None:
-        return Calibration(), {'calibration': f'not calibrated: fewer than {MIN_TEXTURES} textures'}
-    graded = held_out.graded
-    if not len(graded.grades):
+    known = np.isfinite(grades)
+    if not known.any():
         return Calibration(), {'calibration': 'not calibrated: no held-out window got a grade'}
-    errors = graded.grades - graded.true
-    codes = np.unique(graded.textures)
-    # np.unique sorts, so codes index these tables by search.
-    at = np.searchsorted(codes, graded.textures)
-    means = np.array([graded.grades[at == number].mean() for number in range(len(codes))])
-    within = np.sqrt(graded.mean_over_textures((graded.grades - means[at]) ** 2))
-    knows = bool((graded.stds > 0).any())
-    base = 0.0 if knows else np.sqrt(graded.mean_over_textures((means[at] - graded.true) ** 2))
+    missing = 1.0 - float(known.mean())
+    grades, stds, true = grades[known], stds[known], true[known]
+    codes, at = np.unique(textures[known], return_inverse=True)
+
+    def over_textures(values: Array) -> Array:
+        """Return the mean of values, (n,), of each texture."""
+        return np.array([values[at == number].mean() for number in range(len(codes))])
+
+    errors, means = grades - true, over_textures(grades)
+    within = np.sqrt(over_textures((grades - means[at]) ** 2).mean())
+    base = 0.0 if (stds > 0).any() else np.sqrt(over_textures((means[at] - true) ** 2).mean())
     wanted = (NORMAL_90 / float(student.ppf(0.95, len(codes)))) ** 2
 
     def excess(log_scale: float) -> float:
-        spread = Calibration(float(np.exp(log_scale)), float(base), float(within)).window_std(graded.stds)
-        return graded.mean_over_textures((errors / np.maximum(spread, 1e-9)) ** 2) - wanted
+        spread = Calibration(float(np.exp(log_scale)), float(base), float(within)).window_std(stds)
+        return float(over_textures((errors / np.maximum(spread, 1e-9)) ** 2).mean()) - wanted
 
     low, high = np.log(SCALES)
     if excess(low) <= 0.0:
@@ -958,8 +895,8 @@ def calibrate(held_out: HeldOutGrades | None) -> tuple[Calibration, Mapping[str,
         scale = float(np.exp(brentq(excess, low, high)))
     return Calibration(scale, float(base), float(within)), {
         'calibration': f'{len(codes)} textures held out in turn',
-        'held_out_error': round(graded.mean_over_textures(np.abs(errors)), 4),
-        'held_out_without_grade': round(1.0 - len(graded.grades) / len(held_out.grades), 4),
+        'held_out_error': round(float(over_textures(np.abs(errors)).mean()), 4),
+        'held_out_without_grade': round(missing, 4),
     }
 
 

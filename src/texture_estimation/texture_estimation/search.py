@@ -2,8 +2,7 @@
 """Genetic search of a recipe's parameters: what is varied, how an individual is evaluated, what is found.
 
 As Roberge et al. do it: 20 individuals, 30 generations; the fitness is the mean of learning and test accuracy over
-random halves of the slides. pymoo provides the algorithms (GA; NSGA-II for accuracy against computing), joblib the
-cores.
+random halves of the slides. pymoo provides the algorithm, joblib the cores.
 """
 
 from __future__ import annotations
@@ -12,17 +11,15 @@ import copy
 import hashlib
 import json
 import math
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
@@ -36,19 +33,19 @@ from texture_core.config import (
     param,
     safe_repr,
     shipped,
-    unknown_name,
+    writing,
 )
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.types import Array, Samples
+from texture_core.types import Array
 from texture_estimation.evidence_rules import EvidenceRule, MajorityVote, deciding_rows
 from texture_estimation.learners.learner import Codes
+from texture_estimation.model_files import replace_file
 from texture_estimation.numerics import log_softmax
-from texture_estimation.recipe import Recipe
-from texture_estimation.roughness import LEVEL, REGRESSOR_GRADES, ROUGH, SMOOTH, STICK_SLIP, Grades, RoughnessRecipe
+from texture_estimation.recipe import Recipe, check_keys
+from texture_estimation.roughness import LEVEL, ROUGH, SMOOTH, STICK_SLIP, Grades, RoughnessRecipe
 from texture_features.feature import WindowBatch
-from texture_features.feature_set import AGAIN, FeatureSet
-from texture_features.features.temporal import Force, Speed
-from texture_features.windows import CutWindow, Stretched, WindowEvent, WindowParams
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import CutWindow, WindowEvent, WindowParams
 
 Mask = NDArray[np.bool_]
 
@@ -152,82 +149,6 @@ def _rows(windows: WindowBatch, rows: Mask | slice) -> WindowBatch:
 
 # Cuts the windows that a recipe asks for; called with equal parameters, it should answer with the same object.
 Cut = Callable[[WindowParams], LabelledWindows]
-
-ROUNDING = 1e-6  # of a sample: lengths in seconds are seldom exact
-
-
-@dataclass(frozen=True, eq=False)
-class ArrayStream:
-    """Scans of one input: samples (n_scans, n_samples, n_channels) at a rate, and names of the channels."""
-
-    samples: Samples
-    rate_hz: float
-    channels: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class SlideArrays:
-    """Equally long scans of known surfaces, such as simulated ones; called with window parameters it cuts them.
-
-    Parameters
-    ----------
-    streams
-        By topic.
-    labels : (n_scans,) of text
-        Surface of each scan.
-    speed_m_s, force_n : (n_scans,)
-        As the exploration tells them.
-
-    Examples
-    --------
-    >>> stream = ArrayStream(np.zeros((2, 100, 1)), rate_hz=100.0)
-    >>> slides = SlideArrays({'signal': stream}, np.array(['cork', 'felt']), np.full(2, 0.05), np.ones(2))
-    >>> slides(WindowParams(length_s=0.5, hop_s=0.5)).labels.tolist()  # two windows of each
-    ['cork', 'cork', 'felt', 'felt']
-    """
-
-    streams: Mapping[str, ArrayStream]
-    labels: NDArray[np.str_]
-    speed_m_s: Array
-    force_n: Array
-    _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
-
-    def of(self, chosen: Mask) -> SlideArrays:
-        """Return some of the scans; `chosen` is (n_scans,)."""
-        streams = {topic: replace(stream, samples=stream.samples[chosen]) for topic, stream in self.streams.items()}
-        return SlideArrays(streams, self.labels[chosen], self.speed_m_s[chosen], self.force_n[chosen])
-
-    def __call__(self, windows: WindowParams) -> LabelledWindows:
-        """Return the windows, scan by scan.
-
-        Raises
-        ------
-        InvalidData
-            If a scan is shorter than a window.
-        """
-        if windows not in self._known:
-            self._known[windows] = self._cut(windows)
-        return self._known[windows]
-
-    def _cut(self, windows: WindowParams) -> LabelledWindows:
-        duration_s = min(stream.samples.shape[1] / stream.rate_hz for stream in self.streams.values())
-        if duration_s - windows.skip_s < windows.length_s - ROUNDING:
-            raise InvalidData(
-                f'scans of {duration_s:g} s have no window of {windows.length_s:g} s after {windows.skip_s:g} s; '
-                'use shorter windows or longer scans'
-            )
-        count = int((duration_s - windows.skip_s - windows.length_s) / windows.hop_s + ROUNDING) + 1
-        speed, force = np.repeat(self.speed_m_s, count), np.repeat(self.force_n, count)
-        inputs = {}
-        for topic, stream in self.streams.items():
-            length = round(windows.length_s * stream.rate_hz)
-            starts = [round((windows.skip_s + n * windows.hop_s) * stream.rate_hz) for n in range(count)]
-            samples = np.stack([stream.samples[:, start : start + length] for start in starts], axis=1)
-            samples = samples.reshape(-1, *samples.shape[2:])
-            inputs[topic] = WindowBatch(samples, stream.rate_hz, speed, force, channels=stream.channels)
-        groups = np.array([f'{number:06d}' for number in range(len(self.labels))])
-        return LabelledWindows(inputs, np.repeat(self.labels, count), np.repeat(groups, count))
-
 
 # --------------------
 # Random halves of the slides: one for training, one to test on.
@@ -375,8 +296,7 @@ def nearness(grades: Array, true: Array) -> Array:
 class Trial:
     """A recipe on the halves of some windows; plain data that may travel to another machine.
 
-    `task` says what is learned; `values` are (n, n_features), `codes` and `slides` (n,), `halves` (n_halves, n); `cost`
-    is about how many operations a window takes.
+    `task` says what is learned; `values` are (n, n_features), `codes` and `slides` (n,), `halves` (n_halves, n).
     """
 
     task: ClassificationTask | RoughnessTask
@@ -386,7 +306,6 @@ class Trial:
     codes: Codes
     slides: Codes
     halves: Mask
-    cost: float
 
     def __call__(self, number: int) -> HalfScore:
         """Return learning and test score on a half."""
@@ -410,10 +329,6 @@ class ClassificationTask:
             decided, first = decided_by_slide(scores, trial.slides, recipe.evidence, windows.hop_s / windows.length_s)
             return shares_right(decided, trial.codes[first], training[first])
         return shares_right(decisions(scores), trial.codes, training)
-
-    def head(self, recipe: Recipe) -> Any:
-        """Return the learner."""
-        return recipe.learner
 
 
 @dataclass(frozen=True)
@@ -442,64 +357,6 @@ class RoughnessTask:
         parameters = regressor.fit(trial.values[training], true[training], trial.codes[training])
         near = nearness(regressor.predictor(parameters)(trial.values)[0], true)
         return float(near[training].mean()), float(near[~training].mean())
-
-    def head(self, recipe: RoughnessRecipe) -> Any:
-        """Return the regressor."""
-        return recipe.regressor
-
-
-# --------------------
-# What a window costs: operations counted, not timed, so that a search ends alike on any machine.
-
-EXPONENTIAL = 10.0  # operations of one exponential or hyperbolic tangent
-UNKNOWN = 50.0  # of a feature that does not say, for each sample
-
-
-def operations(
-    features: Sequence[Any], head: Any, *, n_samples: int, n_values: int, n_labels: int, n_training: int
-) -> float:
-    """Return about how many additions and multiplications lead from the samples of one window to the decision.
-
-    A feature, learner or regressor says it itself, if it has a method `operations`.
-
-    Parameters
-    ----------
-    features, head
-        What is done.
-    n_samples
-        Of a window, all channels together.
-    n_values
-        Values of all features.
-    n_labels, n_training
-        Surfaces or grades, and training examples, all of which may become support vectors.
-    """
-    own = getattr(head, 'operations', None)
-    decided = own(n_values, n_labels, n_training) if own else n_training * n_values
-    return float(sum(_of_feature(feature, n_samples) for feature in features) + decided)
-
-
-def _of_feature(feature: Any, n: int) -> float:
-    if isinstance(feature, Stretched):
-        return 2.0 * of_transform(n) + _of_feature(feature.feature, n)
-    if isinstance(feature, Speed | Force):
-        return 1.0
-    own = getattr(feature, 'operations', None)
-    return float(own(n)) if own else UNKNOWN * n
-
-
-def of_networks(count: float, hidden: int, n_values: int) -> float:
-    """Return the operations of so many networks with a hidden layer."""
-    return count * hidden * (2.0 * n_values + EXPONENTIAL)
-
-
-def of_machines(count: float, n_values: int, n_training: int) -> float:
-    """Return the operations of so many machines that share their support vectors."""
-    return n_training * (2.0 * n_values + EXPONENTIAL + 2.0 * count)
-
-
-def of_transform(n: int) -> float:
-    """Return the operations of a Fourier transform of n samples."""
-    return 5.0 * n * math.log2(max(n, 2))
 
 
 # --------------------
@@ -670,9 +527,7 @@ def _read(name_or_path: str, depth: int = 0) -> dict[str, Axis]:
     content = load_yaml(path, 'search space')
     if not isinstance(content, Mapping):
         raise InvalidParameter(f"search space '{path}' holds no mapping; 'variables' is needed")
-    for key in content:
-        if key not in KEYS:
-            raise InvalidParameter(f"search space '{path}': {unknown_name(str(key), KEYS, 'key')}")
+    check_keys(content, KEYS, f"search space '{path}'")
     included, variables = content.get('include') or [], content.get('variables') or {}
     if not isinstance(included, list) or not isinstance(variables, Mapping) or depth > MAX_INCLUDES:
         raise InvalidParameter(
@@ -757,7 +612,6 @@ KINDS: Mapping[str, Callable[[Mapping[str, Any]], Axis]] = {
 # --------------------
 # The search itself, and the file in which its scores are kept.
 
-OBJECTIVES = ('accuracy', 'front')
 WIDTH_INDEX = 3.0  # of crossover and mutation: low indices make wide steps, which variables of few values need
 CROSSOVER_SHARE = 0.9
 MAX_BYTES = 50 * MB  # of a checkpoint; a search of 10 000 individuals writes 10
@@ -778,21 +632,15 @@ class SearchParams:
         4, 'Number of these half splits on which each individual is evaluated during the search.', low=1, high=1000
     )
     seed: int = param(0, 'Seed of the random half splits and of the search; equal seeds give equal results.', low=0)
-    objective: str = param(
-        'accuracy',
-        "Objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
-        choices=OBJECTIVES,
-    )
     finalists: int = param(3, 'Number of best individuals that are evaluated on all half splits.', low=1, high=1000)
 
 
 @dataclass(frozen=True)
 class ScoredIndividual:
-    """An individual with its fitness (larger is better) and its cost."""
+    """An individual with its fitness: larger is better."""
 
     individual: Individual
     fitness: float
-    cost: float
 
 
 @dataclass(frozen=True)
@@ -825,7 +673,7 @@ class Finalist:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The best of the search, or the whole front of accuracy and cost, best first; and one entry a generation."""
+    """The best of the search, best first, and one entry a generation."""
 
     finalists: tuple[Finalist, ...]
     history: tuple[Generation, ...]
@@ -839,7 +687,6 @@ class SearchResult:
 def _algorithm(space: RecipeSpace, params: SearchParams) -> Any:
     """Return pymoo's algorithm; the recipe itself takes part in the first generation, the others are drawn."""
     library('pymoo', 'searches', 'search')
-    from pymoo.algorithms.moo.nsga2 import NSGA2  # noqa: PLC0415
     from pymoo.algorithms.soo.nonconvex.ga import GA  # noqa: PLC0415
     from pymoo.config import Config  # noqa: PLC0415
     from pymoo.core.problem import Problem  # noqa: PLC0415
@@ -858,8 +705,7 @@ def _algorithm(space: RecipeSpace, params: SearchParams) -> Any:
     Config.warnings['not_compiled'] = False
     counts = np.array([len(axis.values) for axis in space.axes.values()], dtype=np.float64)
     drawn = np.floor(np.random.default_rng(params.seed).random((params.population - 1, len(counts))) * counts)
-    kind, n_objectives = (NSGA2, 2) if params.objective == 'front' else (GA, 1)
-    algorithm = kind(
+    algorithm = GA(
         pop_size=params.population,
         sampling=np.vstack([space.of_base(), drawn]),
         crossover=SBX(eta=WIDTH_INDEX, prob=CROSSOVER_SHARE),
@@ -868,7 +714,7 @@ def _algorithm(space: RecipeSpace, params: SearchParams) -> Any:
         eliminate_duplicates=True,
     )
     # every value has a stretch of length 1, the first and the last one, too
-    problem = Problem(n_var=len(counts), n_obj=n_objectives, xl=-0.5, xu=counts - 0.5)
+    problem = Problem(n_var=len(counts), n_obj=1, xl=-0.5, xu=counts - 0.5)
     algorithm.setup(problem, termination=NoTermination(), seed=params.seed)
     return algorithm
 
@@ -913,7 +759,7 @@ def optimise(
             f'the slides have {slides.n_halves} half splits with seed {slides.seed}, the search asks for '
             f'{params.halves} with seed {params.seed}; give both the same'
         )
-    front, few = params.objective == 'front', min(params.search_halves, params.halves)
+    few = min(params.search_halves, params.halves)
     identity = _identity(space, slides, task, params)
     known = read_scores(resume, identity) if resume else {}
     n_read = len(known)
@@ -926,11 +772,10 @@ def optimise(
             break
         tried = [space.individual(point) for point in offspring.get('X')]
         new = [one for one in dict.fromkeys(tried) if one not in known]
-        trials = _trials(space, slides, task, new)
-        for one, trial, scores in zip(new, trials, _evaluated(trials, few), strict=True):
-            known[one] = (fitness(scores), trial.cost if front else 0.0)
-        scored = {one: ScoredIndividual(one, *known[one]) for one in tried}
-        offspring.set('F', np.array([[-scored[one].fitness, scored[one].cost][: 1 + front] for one in tried]))
+        trials = trials_of(space, slides, task, new)
+        known.update(zip(new, map(fitness, _evaluated(trials, few)), strict=True))
+        scored = {one: ScoredIndividual(one, known[one]) for one in tried}
+        offspring.set('F', np.array([[-scored[one].fitness] for one in tried]))
         algorithm.tell(infills=offspring)
         alive = [space.individual(point) for point in algorithm.pop.get('X')]
         members = {one: scored.get(one) or members[one] for one in alive}
@@ -940,8 +785,8 @@ def optimise(
             write_scores(checkpoint, identity, known)
         tell(history[-1])
     ranked = sorted(members.values(), key=_rank, reverse=True)
-    chosen = _front(ranked) if front else ranked[: params.finalists]
-    trials = _trials(space, slides, task, [one.individual for one in chosen])
+    chosen = ranked[: params.finalists]
+    trials = trials_of(space, slides, task, [one.individual for one in chosen])
     finalists = [
         Finalist(trial.recipe, one, scores)
         for one, trial, scores in zip(chosen, trials, _evaluated(trials, params.halves), strict=True)
@@ -949,20 +794,11 @@ def optimise(
     return SearchResult(tuple(sorted(finalists, key=lambda one: -one.fitness)), tuple(history))
 
 
-def _rank(one: ScoredIndividual) -> tuple[float, float, str]:
-    return one.fitness, -one.cost, str(one.individual)
+def _rank(one: ScoredIndividual) -> tuple[float, str]:
+    return one.fitness, str(one.individual)
 
 
-def _front(scored: Sequence[ScoredIndividual]) -> list[ScoredIndividual]:
-    """Return those that none beats in accuracy at the same cost or less, cheapest first."""
-    front: list[ScoredIndividual] = []
-    for one in sorted(scored, key=lambda s: (s.cost, -s.fitness)):
-        if not front or one.fitness > front[-1].fitness:
-            front.append(one)
-    return front
-
-
-def _trials(
+def trials_of(
     space: RecipeSpace,
     slides: SearchSlides,
     task: ClassificationTask | RoughnessTask,
@@ -974,27 +810,27 @@ def _trials(
     values = Parallel(backend='threading')(
         delayed(examples.values)(task.features(recipe)) for recipe, (examples, _) in zip(recipes, splits, strict=True)
     )
-    trials = []
-    for recipe, (examples, halves), columns in zip(recipes, splits, values, strict=True):
-        cost = operations(
-            [feature for item in task.features(recipe).inputs for _, feature in item.features],
-            task.head(recipe),
-            n_samples=sum(item.samples[0].size for item in examples.inputs.values()),
-            n_values=columns.shape[1],
-            n_labels=len(REGRESSOR_GRADES) if isinstance(task, RoughnessTask) else len(examples.names),
-            n_training=len(examples.codes) // 2,
-        )
-        trials.append(Trial(task, recipe, columns, examples.names, examples.codes, examples.slides, halves, cost))
-    return trials
+    return [
+        Trial(task, recipe, columns, examples.names, examples.codes, examples.slides, halves)
+        for recipe, (examples, halves), columns in zip(recipes, splits, values, strict=True)
+    ]
 
 
 def _evaluated(trials: Sequence[Trial], n_halves: int) -> list[tuple[HalfScore, ...]]:
     """Return the scores of each trial on so many halves."""
-    scores = Parallel()(delayed(_alone)(trial, number) for trial in trials for number in range(n_halves))
+    scores = Parallel()(delayed(scored_alone)(trial, number) for trial in trials for number in range(n_halves))
     return [tuple(scores[place * n_halves : (place + 1) * n_halves]) for place in range(len(trials))]
 
 
-def _alone(trial: Callable[[int], HalfScore], number: int) -> HalfScore:
+@contextmanager
+def single_blas_thread() -> Iterator[None]:
+    """Keep linear algebra from starting threads of its own: the cores are busy already."""
+    with threadpool_limits(limits=1, user_api='blas'):
+        yield
+
+
+def scored_alone(trial: Callable[[int], HalfScore], number: int) -> HalfScore:
+    """Return the scores of a trial on the half of this number, with linear algebra on one core."""
     with single_blas_thread():  # on a worker elsewhere, too
         return trial(number)
 
@@ -1004,7 +840,7 @@ def _identity(
 ) -> str:
     """Return what the scores of a search belong to, in sixteen letters."""
     examples, halves = slides.split(space.base.training_windows)
-    told = [space.base.as_mapping(), repr(space.axes), repr(task), params.objective, params.search_halves]
+    told = [space.base.as_mapping(), repr(space.axes), repr(task), params.search_halves]
     digest = hashlib.sha256(json.dumps(told, sort_keys=True, default=str).encode())
     for windows in examples.inputs.values():
         digest.update(np.ascontiguousarray(windows.samples).tobytes())
@@ -1012,24 +848,15 @@ def _identity(
     return digest.hexdigest()[:16]
 
 
-def write_scores(path: str | Path, identity: str, known: Mapping[Individual, tuple[float, float]]) -> None:
-    """Write the checkpoint; a reader never sees half a file."""
-    target = Path(path).expanduser()
-    scores = [[list(individual), *scored] for individual, scored in known.items()]
-    beside = target.with_name(f'.{target.name}.{os.getpid()}')
-    try:
-        beside.write_text(json.dumps({'search': identity, 'scores': scores}) + '\n', encoding='utf-8')
-        beside.replace(target)
-    except OSError as error:
-        raise InvalidParameter(
-            f"the checkpoint cannot be written to '{target}': {error.strerror}; name another file"
-        ) from error
-    finally:
-        beside.unlink(missing_ok=True)
+def write_scores(path: str | Path, identity: str, known: Mapping[Individual, float]) -> None:
+    """Write the checkpoint, the fitness by individual; a reader never sees half a file."""
+    scores = [[list(individual), scored] for individual, scored in known.items()]
+    with writing(path):
+        replace_file(Path(path).expanduser(), (json.dumps({'search': identity, 'scores': scores}) + '\n').encode())
 
 
-def read_scores(path: str | Path, identity: str) -> dict[Individual, tuple[float, float]]:
-    """Return what a checkpoint holds, by individual: fitness and cost.
+def read_scores(path: str | Path, identity: str) -> dict[Individual, float]:
+    """Return what a checkpoint holds.
 
     Raises
     ------
@@ -1039,7 +866,7 @@ def read_scores(path: str | Path, identity: str) -> dict[Individual, tuple[float
     try:
         content = load_json(Path(path).expanduser(), MAX_BYTES)
         found = content['search']
-        known = {tuple(one): (float(value), float(cost)) for one, value, cost in content['scores']}
+        known = {tuple(one): float(value) for one, value in content['scores']}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InvalidData(
             f"checkpoint '{path}' cannot be read: {error}; give a file that 'texture optimise' has written"
@@ -1050,238 +877,3 @@ def read_scores(path: str | Path, identity: str) -> dict[Individual, tuple[float
             'give the same recipe, bags and options as then, or start again without it'
         )
     return known
-
-
-# --------------------
-# A recipe for each pair of surfaces, found by a search of its own; the surface that wins most pairs is the answer.
-
-Pair = tuple[str, str]
-LEARNER = 'texture_papers.roberge:TunedPairs'
-SHARED = ('windows', 'evidence', 'training')
-
-
-@dataclass(frozen=True, eq=False)
-class PairSearchResult:
-    """The search of each pair; learning and test accuracy of the most pairs won, over all surfaces, on each half."""
-
-    by_pair: Mapping[Pair, SearchResult]
-    scores: tuple[HalfScore, ...]
-
-    @property
-    def fitness(self) -> float:
-        """Mean of learning and test accuracy of all pairs together."""
-        return fitness(self.scores)
-
-
-def optimise_pairs(
-    space: RecipeSpace,
-    slides: SearchSlides,
-    params: SearchParams,
-    *,
-    checkpoint: str | Path | None = None,
-    resume: str | Path | None = None,
-    tell: Callable[[Pair, Generation], None] = lambda *_: None,
-) -> PairSearchResult:
-    """Search for each pair of surfaces by itself, then evaluate all pairs together.
-
-    Arguments are those of `optimise`; each pair has its own checkpoint, named after it.
-
-    Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
-    to each pair of textures.
-    """
-    task, found = ClassificationTask(), {}
-    names = slides.split(space.base.training_windows)[0].names
-    for pair in combinations(names, 2):
-        reached = beside(resume, pair) if resume else None
-        found[pair] = optimise(
-            space,
-            replace(slides, labels=pair, _known={}),
-            params,
-            task,
-            checkpoint=beside(checkpoint, pair) if checkpoint else None,
-            # the search that is gone on with may not have come to this pair
-            resume=reached if reached and reached.is_file() else None,
-            tell=lambda generation, pair=pair: tell(pair, generation),  # type: ignore[misc]
-        )
-    # each best recipe once more, on the slides of all surfaces
-    best = {pair: _trials(RecipeSpace(result.best.recipe, {}), slides, task, [()])[0] for pair, result in found.items()}
-    together = Parallel()(delayed(_alone)(_MostPairsWon(best), number) for number in range(params.halves))
-    return PairSearchResult(found, tuple(together))
-
-
-def beside(path: str | Path, pair: Pair) -> Path:
-    """Return the path with the pair's name in it: 'best.yaml' → 'best-cork-vs-measured.yaml'."""
-    path = Path(path)
-    return path.with_name(f'{path.stem}-{pair[0]}-vs-{pair[1]}{path.suffix}')
-
-
-@dataclass(frozen=True, eq=False)
-class _MostPairsWon:
-    """The recipes of all pairs on the slides of all surfaces."""
-
-    trials: Mapping[Pair, Trial]
-
-    def __call__(self, number: int) -> HalfScore:
-        """Return learning and test accuracy of the surface that wins most pairs."""
-        wins: Array | None = None
-        for pair, trial in self.trials.items():
-            windows, halves = trial.recipe.training_windows, trial.halves[number]
-            two = np.array([trial.names.index(name) for name in pair])
-            training = halves & np.isin(trial.codes, two)
-            of_pair = (trial.codes[training] == two[1]).astype(np.intp)
-            learner = trial.recipe.learner
-            fitted = learner.fit(trial.values[training], of_pair, trial.slides[training])
-            scores = learner.predictor(fitted.parameters)(trial.values)
-            hop_share = windows.hop_s / windows.length_s
-            decided, first = decided_by_slide(scores, trial.slides, trial.recipe.evidence, hop_share)
-            codes, known = trial.codes[first], halves[first]
-            wins = np.zeros((len(codes), len(trial.names))) if wins is None else wins
-            rows = np.flatnonzero(decided != UNDECIDED)
-            wins[rows, two[decided[rows]]] += 1.0
-        assert wins is not None
-        return shares_right(decisions(wins), codes, known)
-
-
-def joined_recipe(recipes: Mapping[Pair, Recipe], base: Recipe) -> Recipe:
-    """Return the recipe of one model in which each pair of textures has the features and the learner of its own recipe.
-
-    Each input of a pair's recipe becomes an input of the joined one, named 'signal#1' and so on; pairs with the same
-    features share one.
-
-    Parameters
-    ----------
-    recipes
-        Recipe of each pair, by the two labels.
-    base
-        From which they were searched: gives windows, evidence rule and training, and decides pairs that are not listed.
-
-    Raises
-    ------
-    InvalidParameter
-        If the pairs differ in what all windows share: their length, the evidence rule or the training.
-    """
-    contents = {pair: recipe.as_mapping() for pair, recipe in recipes.items()}
-    first_pair, first = next(iter(contents.items()))
-    inputs: dict[str, Any] = {}
-    pairs = []
-    for pair, content in contents.items():
-        for section in SHARED:
-            if content[section] != first[section]:
-                raise InvalidParameter(
-                    f"the pairs {list(first_pair)} and {list(pair)} differ in '{section}', which a model has once; "
-                    'search without varying it'
-                )
-        own = [_placed(inputs, topic, section) for topic, section in content['inputs'].items()]
-        pairs.append({'pair': list(pair), 'inputs': own, 'learner': content['learner']})
-    return Recipe.from_mapping(
-        {
-            'description': f'{base.description} Each pair with variables of its own.'.strip(),
-            **{section: first[section] for section in SHARED},
-            'inputs': inputs,
-            'learner': {LEARNER: {'learner': base.as_mapping()['learner'], 'pairs': pairs}},
-        },
-        f'{base.name}-pairs',
-    )
-
-
-def _placed(inputs: dict[str, Any], topic: str, section: Any) -> str:
-    """Return the name under which an input of a pair stands among the inputs; it is added if it is new."""
-    plain = topic.partition(AGAIN)[0]
-    for name, known in inputs.items():
-        if name.partition(AGAIN)[0] == plain and known == section:
-            return name
-    name = f'{plain}{AGAIN}{1 + sum(known.partition(AGAIN)[0] == plain for known in inputs)}'
-    inputs[name] = section
-    return name
-
-
-# --------------------
-# Spread work over the cores of this machine, or over a Dask cluster.
-
-ANSWER_S, WORKERS_S = 4, 4  # for a scheduler to answer, and for its first worker to come
-# What scheduler and workers must have as this process has it: both unpack what is computed, and a scheduler that cannot
-# says so in its own log alone, while everybody waits.
-ON_CLUSTER = ('texture_core', 'texture_features', 'texture_estimation', 'texture_recordings', 'texture_evaluation')
-CLUSTER_ADVICE = (
-    'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
-    'suite'
-)
-LOCAL, MAX_LOCAL_WORKERS = 'local:', 64
-
-
-@contextmanager
-def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
-    """Have joblib use so many cores (-1: all) within a `with` block, or the cluster whose address is given.
-
-    Threads, not processes: what takes the time (libsvm, products of arrays) lets go of Python's lock, and nothing is
-    copied.
-    """
-    spread = dask_backend(dask) if dask else parallel_config(backend='threading', n_jobs=jobs)
-    with single_blas_thread(), spread:
-        yield
-
-
-@contextmanager
-def single_blas_thread() -> Iterator[None]:
-    """Keep linear algebra from starting threads of its own: the cores are busy already."""
-    with threadpool_limits(limits=1, user_api='blas'):
-        yield
-
-
-@contextmanager
-def dask_backend(address: str) -> Iterator[None]:
-    """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block.
-
-    Parameters
-    ----------
-    address
-        Address of its scheduler, such as 'tcp://192.168.1.5:8786', or 'local:2' to start a cluster of two workers on
-        this machine.
-
-    Raises
-    ------
-    InvalidParameter
-        If no scheduler answers there, it has no worker, or one of them lacks the suite or has another version.
-    """
-    cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
-
-    if address.startswith(LOCAL):
-        workers = address.removeprefix(LOCAL)
-        if not workers.isdecimal() or not 1 <= int(workers) <= MAX_LOCAL_WORKERS:
-            raise InvalidParameter(
-                f"the local cluster has '{workers}' workers; 1 to {MAX_LOCAL_WORKERS} are allowed, such as '{LOCAL}2'"
-            )
-        cluster: Any = cluster_of.LocalCluster(n_workers=int(workers), threads_per_worker=1, dashboard_address=None)
-        with cluster, dask_backend(cluster.scheduler_address):
-            yield
-        return
-
-    try:
-        client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        reason = ' '.join(str(error).split()) or type(error).__name__
-        raise InvalidParameter(
-            f"no Dask scheduler answers at '{address}' ({reason}); {CLUSTER_ADVICE}, "
-            "or leave '--dask' out to use this machine's cores"
-        ) from error
-    with client:
-        _check_cluster(client, address)
-        with client.as_current(), parallel_config(backend='dask'):
-            yield
-
-
-def _check_cluster(client: Any, address: str) -> None:
-    """Raise InvalidParameter if a cluster has no worker, or not everywhere what this process has."""
-    try:
-        client.wait_for_workers(1, timeout=WORKERS_S)
-    except TimeoutError as error:
-        raise InvalidParameter(f"the Dask scheduler at '{address}' has no worker; {CLUSTER_ADVICE}") from error
-    versions = client.get_versions(packages=ON_CLUSTER)
-    own = versions['client']['packages']
-    places = {f"the Dask scheduler at '{address}'": versions['scheduler']}
-    places |= {f"the Dask worker '{worker}'": found for worker, found in versions['workers'].items()}
-    for place, found in places.items():
-        for name in ON_CLUSTER:
-            has = found['packages'].get(name)
-            if own[name] and has != own[name]:
-                raise InvalidParameter(f'{place} has {has or "no"} {name}, {own[name]} is needed; {CLUSTER_ADVICE}')

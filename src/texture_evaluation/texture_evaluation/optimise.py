@@ -6,25 +6,173 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import cycle
+from itertools import combinations, cycle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
+from joblib import Parallel, delayed
 
 from texture_core.config import writing
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import Array
 from texture_estimation import search
 from texture_estimation.recipe import Recipe, load_recipe, with_channels
 from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe, read_grades
-from texture_evaluation.charts import COLOURS, chart, line_styles, pareto_front
-from texture_features.feature_set import FeatureSet
+from texture_evaluation.charts import chart, line_styles
+from texture_features.feature_set import AGAIN, FeatureSet
 from texture_features.windows import CutWindow, WindowParams
 from texture_recordings.dataset import SlideDataset
 
 # --------------------
-# Charts of genetic searches: how they converge, and the front of accuracy and computing.
+# A recipe for each pair of surfaces, found by a search of its own; the surface that wins most pairs is the answer.
+
+Pair = tuple[str, str]
+LEARNER = 'texture_papers.roberge:TunedPairs'
+SHARED = ('windows', 'evidence', 'training')
+
+
+@dataclass(frozen=True, eq=False)
+class PairSearchResult:
+    """The search of each pair; learning and test accuracy of the most pairs won, over all surfaces, on each half."""
+
+    by_pair: Mapping[Pair, search.SearchResult]
+    scores: tuple[search.HalfScore, ...]
+
+    @property
+    def fitness(self) -> float:
+        """Mean of learning and test accuracy of all pairs together."""
+        return search.fitness(self.scores)
+
+
+def optimise_pairs(
+    space: search.RecipeSpace,
+    slides: search.SearchSlides,
+    params: search.SearchParams,
+    *,
+    checkpoint: str | Path | None = None,
+    resume: str | Path | None = None,
+    tell: Callable[[Pair, search.Generation], None] = lambda *_: None,
+) -> PairSearchResult:
+    """Search for each pair of surfaces by itself, then evaluate all pairs together.
+
+    Arguments are those of `optimise`; each pair has its own checkpoint, named after it.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
+    to each pair of textures.
+    """
+    task, found = search.ClassificationTask(), {}
+    names = slides.split(space.base.training_windows)[0].names
+    for pair in combinations(names, 2):
+        reached = beside(resume, pair) if resume else None
+        found[pair] = search.optimise(
+            space,
+            replace(slides, labels=pair, _known={}),
+            params,
+            task,
+            checkpoint=beside(checkpoint, pair) if checkpoint else None,
+            # the search that is gone on with may not have come to this pair
+            resume=reached if reached and reached.is_file() else None,
+            tell=lambda generation, pair=pair: tell(pair, generation),  # type: ignore[misc]
+        )
+    # each best recipe once more, on the slides of all surfaces
+    best = {
+        pair: search.trials_of(search.RecipeSpace(result.best.recipe, {}), slides, task, [()])[0]
+        for pair, result in found.items()
+    }
+    together = Parallel()(delayed(search.scored_alone)(_MostPairsWon(best), number) for number in range(params.halves))
+    return PairSearchResult(found, tuple(together))
+
+
+def beside(path: str | Path, pair: Pair) -> Path:
+    """Return the path with the pair's name in it: 'best.yaml' → 'best-cork-vs-measured.yaml'."""
+    path = Path(path)
+    return path.with_name(f'{path.stem}-{pair[0]}-vs-{pair[1]}{path.suffix}')
+
+
+@dataclass(frozen=True, eq=False)
+class _MostPairsWon:
+    """The recipes of all pairs on the slides of all surfaces."""
+
+    trials: Mapping[Pair, search.Trial]
+
+    def __call__(self, number: int) -> search.HalfScore:
+        """Return learning and test accuracy of the surface that wins most pairs."""
+        wins: Array | None = None
+        for pair, trial in self.trials.items():
+            windows, halves = trial.recipe.training_windows, trial.halves[number]
+            two = np.array([trial.names.index(name) for name in pair])
+            training = halves & np.isin(trial.codes, two)
+            of_pair = (trial.codes[training] == two[1]).astype(np.intp)
+            learner = trial.recipe.learner
+            fitted = learner.fit(trial.values[training], of_pair, trial.slides[training])
+            scores = learner.predictor(fitted.parameters)(trial.values)
+            hop_share = windows.hop_s / windows.length_s
+            decided, first = search.decided_by_slide(scores, trial.slides, trial.recipe.evidence, hop_share)
+            codes, known = trial.codes[first], halves[first]
+            wins = np.zeros((len(codes), len(trial.names))) if wins is None else wins
+            rows = np.flatnonzero(decided != search.UNDECIDED)
+            wins[rows, two[decided[rows]]] += 1.0
+        assert wins is not None
+        return search.shares_right(search.decisions(wins), codes, known)
+
+
+def joined_recipe(recipes: Mapping[Pair, Recipe], base: Recipe) -> Recipe:
+    """Return the recipe of one model in which each pair of textures has the features and the learner of its own recipe.
+
+    Each input of a pair's recipe becomes an input of the joined one, named 'signal#1' and so on; pairs with the same
+    features share one.
+
+    Parameters
+    ----------
+    recipes
+        Recipe of each pair, by the two labels.
+    base
+        From which they were searched: gives windows, evidence rule and training, and decides pairs that are not listed.
+
+    Raises
+    ------
+    InvalidParameter
+        If the pairs differ in what all windows share: their length, the evidence rule or the training.
+    """
+    contents = {pair: recipe.as_mapping() for pair, recipe in recipes.items()}
+    first_pair, first = next(iter(contents.items()))
+    inputs: dict[str, Any] = {}
+    pairs = []
+    for pair, content in contents.items():
+        for section in SHARED:
+            if content[section] != first[section]:
+                raise InvalidParameter(
+                    f"the pairs {list(first_pair)} and {list(pair)} differ in '{section}', which a model has once; "
+                    'search without varying it'
+                )
+        own = [_placed(inputs, topic, section) for topic, section in content['inputs'].items()]
+        pairs.append({'pair': list(pair), 'inputs': own, 'learner': content['learner']})
+    return Recipe.from_mapping(
+        {
+            'description': f'{base.description} Each pair with variables of its own.'.strip(),
+            **{section: first[section] for section in SHARED},
+            'inputs': inputs,
+            'learner': {LEARNER: {'learner': base.as_mapping()['learner'], 'pairs': pairs}},
+        },
+        f'{base.name}-pairs',
+    )
+
+
+def _placed(inputs: dict[str, Any], topic: str, section: Any) -> str:
+    """Return the name under which an input of a pair stands among the inputs; it is added if it is new."""
+    plain = topic.partition(AGAIN)[0]
+    for name, known in inputs.items():
+        if name.partition(AGAIN)[0] == plain and known == section:
+            return name
+    name = f'{plain}{AGAIN}{1 + sum(known.partition(AGAIN)[0] == plain for known in inputs)}'
+    inputs[name] = section
+    return name
+
+
+# --------------------
+# Charts of genetic searches: how they converge.
 
 NAMED = 10  # lines of more searches than this are not named
 
@@ -54,37 +202,6 @@ def convergence_chart(searches: Mapping[str, Sequence[search.Generation]], title
         axes.set(xlabel='generation', ylabel='fitness of the best individual (%)')
         if len(searches) <= NAMED:
             axes.legend(loc='lower right')
-    return Path(path)
-
-
-def search_front_chart(fronts: Mapping[str, Sequence[tuple[float, float]]], title: str, path: str | Path) -> Path:
-    """Draw the recipes of each search by cost and fitness, and the front that none of them betters.
-
-    Parameters
-    ----------
-    fronts
-        Name of the search → (operations of a window, fitness from 0 to 1) of each recipe.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-    """
-    with chart(path, (7.5, 4.2), title) as figure:
-        axes = figure.subplots()
-        for number, (name, points) in enumerate(fronts.items()):
-            colour = COLOURS[number % len(COLOURS)]
-            best = [points[index] for index in pareto_front(points)]
-            axes.plot([cost for cost, _ in points], [100 * share for _, share in points], '.', color=colour)
-            axes.step(
-                [cost for cost, _ in best], [100 * share for _, share in best],
-                where='post', color=colour, linewidth=1, label=name,
-            )  # fmt: skip
-        axes.set(xscale='log', xlabel='operations from the samples of a window to the decision', ylabel='fitness (%)')
-        axes.legend(loc='lower right')
     return Path(path)
 
 
@@ -191,28 +308,23 @@ def optimise_from_bags(
     if resume and not written_checkpoints(target):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
-    found: search.SearchResult | search.PairSearchResult
+    found: search.SearchResult | PairSearchResult
     if wanted.per_pair:
-        found = search.optimise_pairs(
+        found = optimise_pairs(
             space, search_slides, params, tell=lambda pair, said: tell(' – '.join(pair), said), **options
         )
     else:
         task = search.RoughnessTask(read_grades(wanted.grades)) if wanted.grades else search.ClassificationTask()
         found = search.optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
     written = write_recipes(found, space.base, wanted.recipe, params, target)
-    chart = _draw(found, wanted.recipe, params, target.with_suffix('.png'))
+    chart = _draw(found, wanted.recipe, target.with_suffix('.png'))
     return Written((*written.files, chart), written.lines)
 
 
-def _draw(
-    found: search.SearchResult | search.PairSearchResult, recipe: str, params: search.SearchParams, chart: Path
-) -> Path:
-    if isinstance(found, search.PairSearchResult):
+def _draw(found: search.SearchResult | PairSearchResult, recipe: str, chart: Path) -> Path:
+    if isinstance(found, PairSearchResult):
         histories = {' – '.join(pair): one.history for pair, one in found.by_pair.items()}
         return convergence_chart(histories, f'{recipe}: a search for each pair', chart)
-    if params.objective == 'front':
-        points = [(one.searched.cost, one.fitness) for one in found.finalists]
-        return search_front_chart({recipe: points}, f'{recipe}: accuracy and computing', chart)
     return convergence_chart({recipe: found.history}, f'{recipe}: the search', chart)
 
 
@@ -267,13 +379,9 @@ def written_checkpoints(out: str | Path) -> list[Path]:
 
 
 def write_recipes(
-    found: search.SearchResult | search.PairSearchResult,
-    base: Any,
-    tuned: str,
-    params: search.SearchParams,
-    target: Path,
+    found: search.SearchResult | PairSearchResult, base: Any, tuned: str, params: search.SearchParams, target: Path
 ) -> Written:
-    """Write the best recipe, with the others of a front beside it; of pairs, theirs and the one that joins them.
+    """Write the best recipe; of pairs, theirs and the one that joins them.
 
     Where a recipe comes from and its scores stand at the top of its file.
 
@@ -304,34 +412,28 @@ def write_recipes(
         f'Found by `texture optimise {tuned}`: {params.population} individuals, {params.generations} '
         f'generations, {params.halves} halves, seed {params.seed}.'
     )
-    files = _files(found, target, front=params.objective == 'front')
+    files = (
+        {beside(target, pair): one.best for pair, one in found.by_pair.items()}
+        if isinstance(found, PairSearchResult)
+        else {target: found.best}
+    )
     for path, finalist in files.items():
         _write(finalist.recipe, path, origin, _scores(finalist))
     written = Written(tuple(files), tuple(f'{path}: {_scores(finalist)}' for path, finalist in files.items()))
-    if isinstance(found, search.PairSearchResult):
+    if isinstance(found, PairSearchResult):
         return _with_joined(written, found, base, origin, target)
     return Written((*written.files, checkpoint_of(target)), written.lines)
 
 
-def _with_joined(written: Written, pairs: search.PairSearchResult, base: Recipe, origin: str, target: Path) -> Written:
+def _with_joined(written: Written, pairs: PairSearchResult, base: Recipe, origin: str, target: Path) -> Written:
     """Write the recipe that joins those of the pairs, or say why there is none."""
     together = f'all pairs together, most pairs won: {_shares(pairs.scores)}'
     try:
-        joined = search.joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
+        joined = joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
     except InvalidParameter as error:
         return Written(written.files, (*written.lines, together, f'no recipe of all pairs was written: {error}'))
     _write(joined, target, origin, together)
     return Written((target, *written.files), (*written.lines, f'{target}: {together}'))
-
-
-def _files(
-    found: search.SearchResult | search.PairSearchResult, target: Path, *, front: bool
-) -> Mapping[Path, search.Finalist]:
-    if isinstance(found, search.PairSearchResult):
-        return {search.beside(target, pair): one.best for pair, one in found.by_pair.items()}
-    others = [one for one in found.finalists if front and one is not found.best]
-    numbered = {target.with_name(f'{target.stem}-{n}{target.suffix}'): one for n, one in enumerate(others, 2)}
-    return {target: found.best} | numbered
 
 
 def _write(recipe: Any, path: Path, origin: str, scores: str) -> None:

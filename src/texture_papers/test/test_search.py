@@ -13,23 +13,21 @@ from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import Grades, load_roughness_recipe
 from texture_estimation.search import (
     UNDECIDED,
-    ArrayStream,
     Axis,
     ClassificationTask,
     RecipeSpace,
     RoughnessTask,
     SearchParams,
     SearchSlides,
-    SlideArrays,
-    dask_backend,
     decided_by_slide,
     decisions,
     optimise,
-    optimise_pairs,
     random_halves,
-    workers,
 )
+from texture_evaluation.optimise import optimise_pairs
+from texture_evaluation.workers import dask_backend, workers
 from texture_features.windows import CutWindow
+from texture_papers.protocol import ArrayStream, SlideArrays
 
 distributed = pytest.importorskip('distributed')
 
@@ -139,16 +137,13 @@ def test_a_tie_is_undecided_and_three_of_five_parts_decide_a_slide() -> None:
 
 
 class Known:
-    """A task with a known landscape: the score is highest at a C of 1 and 30 peaks, and each peak costs."""
+    """A task with a known landscape: the score is highest at a C of 1 and 30 peaks."""
 
     def __init__(self):
         self.tried = 0
 
     def features(self, recipe):
         return ClassificationTask().features(recipe)
-
-    def head(self, recipe):
-        return recipe.learner
 
     def score(self, trial, training):
         self.tried += 1
@@ -163,7 +158,6 @@ class Known:
 @pytest.fixture
 def landscape(monkeypatch) -> tuple[RecipeSpace, SearchSlides]:
     monkeypatch.setattr(search.LabelledWindows, 'values', lambda windows, _: np.zeros((len(windows.labels), 1)))
-    monkeypatch.setattr(search, 'operations', lambda features, *_, **__: float(features[0].feature.peaks))
     paths = ('inputs/signal/features/texture_papers.roberge:SpectralPeaks/peaks',
              'learner/texture_papers.roberge:SvmPairs/box_constraint')  # fmt: skip
     values = (tuple(range(1, 51)), tuple(np.geomspace(0.01, 100.0, 81).tolist()))
@@ -180,15 +174,6 @@ def test_the_search_finds_the_best_of_a_known_landscape(landscape) -> None:
     assert len(found.history) == 30
     assert found.history[-1].tried <= 600  # 20 individuals, 30 generations
     assert task.tried == 4 * found.history[-1].tried + 20 * 3  # the best three on all halves
-
-
-def test_two_objectives_give_a_front_from_cheap_to_good(landscape) -> None:
-    found = optimise(*landscape, SearchParams(objective='front', generations=12), Known())
-    front = sorted((one.searched for one in found.finalists), key=lambda one: one.cost)
-    assert len(front) > 5
-    assert front[0].cost <= 2.0
-    assert front[-1].cost <= 31.0  # what costs more than the best is beaten by it
-    assert [one.fitness for one in front] == sorted(one.fitness for one in front)
 
 
 def test_a_search_cut_off_and_resumed_ends_as_one_in_one_go(landscape, tmp_path) -> None:

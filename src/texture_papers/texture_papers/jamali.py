@@ -41,7 +41,14 @@ from numpy.typing import NDArray
 
 from texture_core.config import find, param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, assign_folds, standardisation
+from texture_estimation.learners.learner import (
+    UNCALIBRATED,
+    Codes,
+    Fitted,
+    assign_folds,
+    held_out_scores,
+    standardisation,
+)
 from texture_estimation.learners.sklearn_learner import SklearnPredictor, packed
 from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch
@@ -384,11 +391,10 @@ class NaiveBayes:
         split = assign_folds(y, groups, FOLDS)
         parameters = self._fit(X, y, n_labels)
         if split is None:
-            return Fitted(parameters, None, 'not calibrated, as a label has a single window')
-        held_out = np.empty((len(y), n_labels))
-        for part in np.unique(split[0]):
-            held = split[0] == part
-            held_out[held] = self.predictor(self._fit(X[~held], y[~held], n_labels))(X[held])
+            return Fitted(parameters, None, UNCALIBRATED)
+        held_out = held_out_scores(
+            lambda held: self.predictor(self._fit(X[~held], y[~held], n_labels)), X, split[0], n_labels
+        )
         return Fitted(parameters, held_out, f'not calibrated; growth from {split[1]}')
 
     @staticmethod

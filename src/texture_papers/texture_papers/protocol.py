@@ -25,28 +25,28 @@ from scipy.stats import t
 from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold, ShuffleSplit, StratifiedShuffleSplit
 
 from texture_core.config import find
-from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.errors import InvalidData, InvalidParameter, UnknownName
 from texture_core.types import AnyArray, Array, Samples
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_recipe
 from texture_estimation.search import (
     UNDECIDED,
-    ArrayStream,
     ClassificationTask,
+    LabelledWindows,
     RecipeSpace,
     RoughnessTask,
     SearchParams,
     SearchResult,
     SearchSlides,
-    SlideArrays,
     decided_by_slide,
     optimise,
     space_for,
-    workers,
 )
+from texture_evaluation.workers import workers
+from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet, InputFeatures
-from texture_features.windows import SEPARATOR, Stretched, axis_along
+from texture_features.windows import SEPARATOR, Stretched, WindowParams, axis_along
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene
@@ -773,7 +773,80 @@ def tune(
     return TunedRecipe(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))
 
 
-ROUNDING = 1e-6
+ROUNDING = 1e-6  # of a sample: lengths in seconds are seldom exact
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayStream:
+    """Scans of one input: samples (n_scans, n_samples, n_channels) at a rate, and names of the channels."""
+
+    samples: Samples
+    rate_hz: float
+    channels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class SlideArrays:
+    """Equally long scans of known surfaces, such as simulated ones; called with window parameters it cuts them.
+
+    Parameters
+    ----------
+    streams
+        By topic.
+    labels : (n_scans,) of text
+        Surface of each scan.
+    speed_m_s, force_n : (n_scans,)
+        As the exploration tells them.
+
+    Examples
+    --------
+    >>> stream = ArrayStream(np.zeros((2, 100, 1)), rate_hz=100.0)
+    >>> slides = SlideArrays({'signal': stream}, np.array(['cork', 'felt']), np.full(2, 0.05), np.ones(2))
+    >>> slides(WindowParams(length_s=0.5, hop_s=0.5)).labels.tolist()  # two windows of each
+    ['cork', 'cork', 'felt', 'felt']
+    """
+
+    streams: Mapping[str, ArrayStream]
+    labels: NDArray[np.str_]
+    speed_m_s: Array
+    force_n: Array
+    _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
+
+    def of(self, chosen: Mask) -> SlideArrays:
+        """Return some of the scans; `chosen` is (n_scans,)."""
+        streams = {topic: replace(stream, samples=stream.samples[chosen]) for topic, stream in self.streams.items()}
+        return SlideArrays(streams, self.labels[chosen], self.speed_m_s[chosen], self.force_n[chosen])
+
+    def __call__(self, windows: WindowParams) -> LabelledWindows:
+        """Return the windows, scan by scan.
+
+        Raises
+        ------
+        InvalidData
+            If a scan is shorter than a window.
+        """
+        if windows not in self._known:
+            self._known[windows] = self._cut(windows)
+        return self._known[windows]
+
+    def _cut(self, windows: WindowParams) -> LabelledWindows:
+        duration_s = min(stream.samples.shape[1] / stream.rate_hz for stream in self.streams.values())
+        if duration_s - windows.skip_s < windows.length_s - ROUNDING:
+            raise InvalidData(
+                f'scans of {duration_s:g} s have no window of {windows.length_s:g} s after {windows.skip_s:g} s; '
+                'use shorter windows or longer scans'
+            )
+        count = int((duration_s - windows.skip_s - windows.length_s) / windows.hop_s + ROUNDING) + 1
+        speed, force = np.repeat(self.speed_m_s, count), np.repeat(self.force_n, count)
+        inputs = {}
+        for topic, stream in self.streams.items():
+            length = round(windows.length_s * stream.rate_hz)
+            starts = [round((windows.skip_s + n * windows.hop_s) * stream.rate_hz) for n in range(count)]
+            samples = np.stack([stream.samples[:, start : start + length] for start in starts], axis=1)
+            samples = samples.reshape(-1, *samples.shape[2:])
+            inputs[topic] = WindowBatch(samples, stream.rate_hz, speed, force, channels=stream.channels)
+        groups = np.array([f'{number:06d}' for number in range(len(self.labels))])
+        return LabelledWindows(inputs, np.repeat(self.labels, count), np.repeat(groups, count))
 
 
 @dataclass(frozen=True, eq=False)

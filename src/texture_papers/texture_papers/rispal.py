@@ -41,7 +41,6 @@ from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, standardisation
 from texture_estimation.roughness import REGRESSOR_GRADES as GRADES
 from texture_estimation.roughness import ROUGH, SMOOTH
-from texture_estimation.search import of_machines, of_networks
 from texture_papers.roberge import (
     LINEAR,
     SIGMOID,
@@ -229,10 +228,6 @@ class Ann1:
         """Return the predictor made from the stored parameters."""
         return NetworkRegressorPredictor(RegressionNetworks(**parameters))
 
-    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
-        """Return what a window costs."""
-        return of_networks(1.0, self.hidden, n_values)
-
 
 @dataclass(frozen=True, eq=False)
 class NetworkRegressorPredictor:
@@ -288,10 +283,6 @@ class Ann5:
     def predictor(parameters: Mapping[str, Any]) -> VotingNetworksPredictor:
         """Return the predictor made from the stored parameters."""
         return VotingNetworksPredictor(RegressionNetworks(**parameters))
-
-    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
-        """Return what a window costs."""
-        return of_networks(n_labels, self.hidden, n_values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,10 +356,6 @@ class Svm5:
     def predictor(parameters: Mapping[str, Any]) -> VotingSvmsPredictor:
         """Return the predictor made from the stored parameters."""
         return VotingSvmsPredictor(**parameters)
-
-    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
-        """Return what a window costs."""
-        return of_machines(n_labels, n_values, n_training)
 
 
 @dataclass(frozen=True, eq=False)

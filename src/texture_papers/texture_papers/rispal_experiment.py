@@ -27,7 +27,7 @@ from texture_estimation.roughness import (
     read_grades,
     train_grades,
 )
-from texture_estimation.search import ArrayStream, RecipeSpace, RoughnessTask, SearchParams, SlideArrays
+from texture_estimation.search import RecipeSpace, RoughnessTask, SearchParams
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
@@ -35,10 +35,12 @@ from texture_features.windows import CutWindow
 from texture_papers.protocol import (
     FULL,
     QUICK,
+    ArrayStream,
     Experiment,
     ExperimentResult,
     Finding,
     RecognitionTask,
+    SlideArrays,
     TunedRecipe,
     Visits,
     digest_of_row,

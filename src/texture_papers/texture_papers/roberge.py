@@ -61,7 +61,6 @@ from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, Learner, standardisation
 from texture_estimation.learners.svm import RbfMachines
 from texture_estimation.numerics import log_softmax
-from texture_estimation.search import of_machines, of_networks, of_transform
 from texture_features.feature import WindowBatch, first_difference, power
 from texture_features.feature_set import choose, entry_of
 from texture_features.spectra import amplitudes_of
@@ -88,10 +87,6 @@ class SignalEnergy:
         rows = windows.centred_rows
         return (power(rows) * (rows.shape[-1] / windows.rate_hz))[..., None]
 
-    def operations(self, n: int) -> float:
-        """Return how many n samples cost."""
-        return 3.0 * n
-
 
 @dataclass(frozen=True)
 class ArcLength:
@@ -113,10 +108,6 @@ class ArcLength:
         """Return Σ √(Δt² + Δs²)."""
         lengths: Array = np.add.reduce(np.hypot(first_difference(windows.rows), 1.0 / windows.rate_hz), axis=-1)
         return lengths[..., None]
-
-    def operations(self, n: int) -> float:
-        """Return how many n samples cost."""
-        return 6.0 * n
 
 
 @dataclass(frozen=True)
@@ -164,11 +155,6 @@ class SpectralPeaks:
         if self.order == 'frequency':
             values = by_frequency(values)
         return values.reshape(*values.shape[:-2], -1)
-
-    def operations(self, n: int) -> float:
-        """Return how many n samples cost: transform, amplitudes, and twice through half the points for each peak."""
-        points = max(self.points, n)
-        return of_transform(points) + points * (2.0 + 2.0 * self.peaks)
 
 
 def by_frequency(peaks: Array) -> Array:
@@ -600,10 +586,6 @@ class SvmPairs:
         machines = RbfMachines(**parameters['machines'])
         return SvmPairsPredictor(machines, PairVotes(machines.n_labels), str(parameters['ties']))
 
-    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
-        """Return what a window costs: each example has a weight in n_labels - 1 pairs."""
-        return of_machines(n_labels - 1, n_values, n_training)
-
 
 @dataclass(frozen=True, eq=False)
 class SvmPairsPredictor:
@@ -688,10 +670,6 @@ class AnnPairs:
     def predictor(parameters: Mapping[str, Any]) -> PairNetworksPredictor:
         """Return the predictor made from the stored parameters."""
         return PairNetworksPredictor(**parameters)
-
-    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
-        """Return what a window costs."""
-        return of_networks(n_labels * (n_labels - 1) / 2, self.hidden, n_values)
 
 
 @dataclass(frozen=True, eq=False)

@@ -229,6 +229,26 @@ def _numbered(groups: Codes) -> Codes:
     return rank[inverse.reshape(-1)]
 
 
+def held_out_scores(fit: Callable[[NDArray[np.bool_]], Predictor], X: Array, folds_of: Codes, count: int) -> Array:
+    """Return what is said of each example by a predictor that has not seen its part, (n, count).
+
+    Parameters
+    ----------
+    fit
+        Returns the predictor fitted without the examples of a mask, (n,).
+    X : (n, n_features)
+    folds_of : (n,)
+        Part of each example.
+    count
+        Number of values that a predictor returns.
+    """
+    found = np.empty((len(X), count))
+    for part in np.unique(folds_of):
+        held = folds_of == part
+        found[held] = fit(held)(X[held])
+    return found
+
+
 UNCALIBRATED = 'not calibrated, as a label has a single window'  # so nothing can be held out
 
 

@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from texture_core.config import BROKEN_CONTENT, MB, Archive, library, parse_json, safe_repr, unknown_name
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
-from texture_estimation.learners.learner import UNCALIBRATED, Codes, Fitted, assign_folds, standardisation
+from texture_estimation.learners.learner import (
+    UNCALIBRATED,
+    Codes,
+    Fitted,
+    assign_folds,
+    held_out_scores,
+    standardisation,
+)
 from texture_estimation.numerics import fit_temperature, log_softmax
 
 # --------------------
@@ -330,10 +337,7 @@ class SklearnLearner:
         if split is None:
             note = UNCALIBRATED
             return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, note)
-        held_out = np.empty((len(y), n_labels))
-        for part in np.unique(split[0]):
-            held = split[0] == part
-            held_out[held] = self._fit(X[~held], y[~held], n_labels)(X[held])
+        held_out = held_out_scores(lambda held: self._fit(X[~held], y[~held], n_labels), X, split[0], n_labels)
         temperature = fit_temperature(held_out, y)
         return Fitted(
             {**parameters, 'n_labels': n_labels, 'temperature': temperature},

@@ -13,7 +13,14 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import UNCALIBRATED, Codes, Fitted, assign_folds, standardisation
+from texture_estimation.learners.learner import (
+    UNCALIBRATED,
+    Codes,
+    Fitted,
+    assign_folds,
+    held_out_scores,
+    standardisation,
+)
 from texture_estimation.numerics import fit_temperature, group_means, log_softmax
 
 # --------------------
@@ -428,10 +435,10 @@ class SvmRbf:
             coupling, held_out, note = uncalibrated(n_labels), None, UNCALIBRATED
         else:
             folds_of, note = split
-            decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
-            for part in np.unique(folds_of):
-                held = folds_of == part
-                decisions[held] = self._fit(X[~held], y[~held], groups[~held], differences)(X[held])
+            decisions = held_out_scores(
+                lambda held: self._fit(X[~held], y[~held], groups[~held], differences),
+                X, folds_of, n_labels * (n_labels - 1) // 2,
+            )  # fmt: skip
             coupling = fit_coupling(decisions, y, n_labels)
             held_out = coupling(decisions)
         return Fitted({'machines': asdict(machines), 'coupling': asdict(coupling)}, held_out, note)

@@ -81,8 +81,7 @@ class Classifier(EstimatorNode):
         try:
             answer.examples = self._require_incremental().add(request.label, request.exploration_id)
         except (TextureError, OSError) as error:
-            answer.error_code, answer.message = int(_code(error)), str(error)
-            return answer
+            return _refused(answer, error)
         model = self._use_updated_model()
         answer.error_code = srv.AddTexture.Response.ERROR_NONE
         answer.message = f"added '{request.label.strip()}' from '{model.added_slides[-1].exploration_id}'; " + _known(
@@ -106,8 +105,7 @@ class Classifier(EstimatorNode):
         try:
             removed = self._require_incremental().remove(request.label)
         except (TextureError, OSError) as error:
-            answer.error_code, answer.message = int(_code(error)), str(error)
-            return answer
+            return _refused(answer, error)
         answer.error_code = srv.RemoveTexture.Response.ERROR_NONE
         answer.slides = len(removed)
         model = self._use_updated_model()
@@ -133,11 +131,12 @@ class Classifier(EstimatorNode):
         return model
 
 
-def _code(error: TextureError | OSError) -> ChangeError:
-    if isinstance(error, ChangeRefused):
-        return error.error
+def _refused(answer: Any, error: TextureError | OSError) -> Any:
     kinds = {ModelMismatch: ChangeError.NO_MODEL, UnknownName: ChangeError.NOT_ADDED, OSError: ChangeError.NOT_STORED}
-    return next((code for kind, code in kinds.items() if isinstance(error, kind)), ChangeError.INVALID_LABEL)
+    code = next((code for kind, code in kinds.items() if isinstance(error, kind)), ChangeError.INVALID_LABEL)
+    answer.error_code = int(error.error if isinstance(error, ChangeRefused) else code)
+    answer.message = str(error)
+    return answer
 
 
 def _known(model: TextureModel) -> str:

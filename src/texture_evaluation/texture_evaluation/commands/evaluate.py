@@ -16,7 +16,6 @@ from texture_core.errors import InvalidParameter
 from texture_estimation.model import load_model
 from texture_estimation.model_files import both_files
 from texture_estimation.recipe import load_recipe, with_channels
-from texture_estimation.search import dask_backend
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
     CrossValidation,
@@ -28,6 +27,7 @@ from texture_evaluation.cross_validation import (
     parse_split,
 )
 from texture_evaluation.evaluate import evaluate, sentence, summary, table
+from texture_evaluation.workers import dask_backend
 from texture_recordings.dataset import SlideDataset
 
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 
 from texture_core.cli import add_channels, add_dask, add_seed, add_slides
 from texture_core.config import from_mapping
-from texture_estimation.search import OBJECTIVES, Generation, SearchParams, workers
+from texture_estimation.search import Generation, SearchParams
 from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
+from texture_evaluation.workers import workers
 
 BAR = 20  # letters
 
@@ -25,9 +26,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--search', default='', metavar='NAME', help='search space: a shipped one, or a YAML file')
     parser.add_argument('--grades', default='', metavar='FILE', help='CSV file texture,grade: tune a roughness recipe')
     parser.add_argument('--per-pair', action='store_true', help='a set of variables for each pair of surfaces')
-    parser.add_argument(
-        '--objective', choices=OBJECTIVES, default=usual.objective, help='accuracy alone, or its front with computing'
-    )
     parser.add_argument('--population', type=int, default=usual.population, metavar='N', help='of a generation')
     parser.add_argument('--generations', type=int, default=usual.generations, metavar='N', help='the first included')
     parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random splits evaluated on')
@@ -44,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     """Search, write the recipe, and say how good it is."""
     given = {name: getattr(options, name) for name in ('recipe', 'search', 'slides', 'grades', 'per_pair')}
     wanted = Wanted(bags=tuple(options.bags), channels=options.channels or 'all', **given)
-    chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed', 'objective')}
+    chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed')}
     if options.all_halves:
         chosen['search_halves'] = options.halves
     params = from_mapping(SearchParams, chosen, 'texture optimise')
