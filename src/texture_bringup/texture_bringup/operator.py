@@ -25,6 +25,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
+from texture_core.cli import task
 from texture_core.config import unknown_name
 from texture_core.errors import ExplorationError, InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.ros import FEATURE_QOS, SENSOR_QOS, from_msg, to_msg
@@ -573,10 +574,11 @@ class Operator:
 
     def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:
         deadline = time.monotonic() + deadline_s
-        while not condition():
-            if time.monotonic() > deadline:
-                raise LaunchFailed(f'{complaint} (waited {deadline_s:.0f} s)')
-            self._step()
+        with task(f'waiting; so far {complaint}'):
+            while not condition():
+                if time.monotonic() > deadline:
+                    raise LaunchFailed(f'{complaint} (waited {deadline_s:.0f} s)')
+                self._step()
 
     def _step(self) -> None:
         self._guard()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 import threading
 import time
@@ -152,8 +153,12 @@ def task(what: str, total: int = 0) -> Iterator[Callable[[], None]]:
         while not over.wait(waited_s):
             waited_s = TERMINAL_PERIOD_S if terminal else LOG_PERIOD_S
             count = f' {done} of {total}' if total else f' {done}' if done else ''
-            line = f'{what}{count}, {time.monotonic() - began_s:.0f} s'
-            print(f'\r\x1b[2K{line}' if terminal else line, end='' if terminal else '\n', file=sys.stderr, flush=True)
+            since = f'{count}, {time.monotonic() - began_s:.0f} s'
+            if terminal:  # a line that wraps could not be written over
+                room = max(0, shutil.get_terminal_size().columns - 1 - len(since))
+                print(f'\r\x1b[2K{what[:room]}{since}', end='', file=sys.stderr, flush=True)
+            else:
+                print(f'{what}{since}', file=sys.stderr, flush=True)
 
     teller = threading.Thread(target=tell, name='progress', daemon=True)
     teller.start()
