@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from texture_core.types import FeatureVector
 from texture_estimation.decisions import (
     FEATURES,
     FLOOR_WINDOWS,
@@ -29,7 +28,6 @@ from texture_estimation.decisions import (
     slide_scores,
     space_means,
 )
-from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -211,17 +209,13 @@ def with_decisions(model, **changes):
     return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, **changes))
 
 
-def estimates(model, examples):
-    """Return the true surface and the estimates of each slide, window by window and at its end."""
-    for slide in np.unique(examples.groups).tolist():
-        rows = np.flatnonzero(examples.groups == slide)
-        windows = [
-            FeatureVector(k * 10**8, slide, 0.5, 0.1, model.names, examples.values[row], feature_set=model.feature_set)
-            for k, row in enumerate(rows)
-        ]
-        evidence = EvidenceAccumulator(model)
-        end = FeatureVector(10**9, slide, 0.0, 0.1, last=True)
-        yield str(examples.labels[rows[0]]), [evidence.update(vector) for vector in (*windows, end)]
+@pytest.fixture
+def estimates(estimates_of):
+    """Return a function that gives the true surface and the estimates of each slide."""
+    return lambda model, examples: [
+        (slide.split('/')[0], estimates_of(model, examples.values[examples.groups == slide]))
+        for slide in np.unique(examples.groups).tolist()
+    ]
 
 
 @pytest.mark.parametrize('slides', [1, 12, 149, 600])
@@ -254,7 +248,7 @@ def test_a_limited_confidence_keeps_the_order_of_the_labels_and_the_sum_of_the_p
     assert np.argsort(limited).tolist() == np.argsort(sure).tolist()
 
 
-def test_no_wrong_label_of_a_model_of_three_slides_a_surface_is_certain_or_confident(make_examples):
+def test_no_wrong_label_of_a_model_of_three_slides_a_surface_is_certain_or_confident(make_examples, estimates):
     """Its held-out slides are all right, so that the stopping rule alone ends slides at the first windows."""
     model = train(RECIPE, make_examples(slides=3, spread=1.5))
     trusting = with_decisions(model, error_bound=ANY_ERROR_RATE)
@@ -269,7 +263,7 @@ def test_no_wrong_label_of_a_model_of_three_slides_a_surface_is_certain_or_confi
     assert max(confidences) == pytest.approx(0.05 ** (1 / 12))
 
 
-def test_only_the_final_estimate_says_why_no_slide_of_few_was_certain(make_examples):
+def test_only_the_final_estimate_says_why_no_slide_of_few_was_certain(make_examples, estimates):
     few = train(RECIPE, make_examples(labels=('cork', 'felt')))
     enough = with_decisions(few, error_bound=ErrorBound(149, RECIPE.training.max_error_rate))
     for model, said in ((few, True), (enough, False)):
@@ -323,16 +317,10 @@ def test_the_limit_is_interpolated_and_stays_beyond_its_ends():
     assert not floor.reached(0.88, 50.0)
 
 
-def after_one_window(model, examples, slide='felt/0'):
-    evidence = EvidenceAccumulator(model)
-    values = examples.values[examples.groups == slide][0] * 0.85  # towards the middle of the textures
-    evidence.update(FeatureVector(0, 'e1', 0.5, 0.1, examples.names, values, feature_set=examples.feature_set))
-    return evidence.update(FeatureVector(10**9, 'e1', 0.0, 0.1, last=True))
-
-
-def test_a_slide_below_the_limit_is_neither_known_nor_decided_and_keeps_its_label(model, examples):
-    assert after_one_window(model, examples).known
-    strict = after_one_window(with_decisions(model, confidence_floor=STRICT), examples)
+def test_a_slide_below_the_limit_is_neither_known_nor_decided_and_keeps_its_label(model, examples, estimates_of):
+    values = examples.values[examples.groups == 'felt/0'][:1] * 0.85  # towards the middle of the textures
+    assert estimates_of(model, values)[-1].known
+    strict = estimates_of(with_decisions(model, confidence_floor=STRICT), values)[-1]
     assert (strict.label, strict.known, strict.decided) == ('felt', False, False)
 
 

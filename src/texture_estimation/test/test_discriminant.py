@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from texture_core.config import folder
-from texture_core.types import FeatureVector
 from texture_estimation.decisions import ONE_PLACE
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.evidence_rules import SoftVote, running_means
@@ -203,36 +202,23 @@ def force_examples():
     )
 
 
-def probabilities_after(model, forces):
-    evidence = EvidenceAccumulator(model)
-    found = []
-    for number, force in enumerate(forces):
-        values = np.array([3.0 if force < 2.0 else -3.0, force])
-        window = FeatureVector(
-            250_000_000 * number,
-            'a',
-            0.5,
-            0.25,
-            ('signal/mean/pac', 'signal/force'),
-            values,
-            feature_set=model.feature_set,
-        )
-        found.append(evidence.update(window).probabilities[0])
-    return found
+def probabilities_after(estimates_of, model, forces):
+    values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])
+    return [estimate.probabilities[0] for estimate in estimates_of(model, values, hop_s=0.25)[:-1]]
 
 
-def test_evidence_from_far_outside_the_trained_forces_neither_adds_nor_dilutes():
+def test_evidence_from_far_outside_the_trained_forces_neither_adds_nor_dilutes(estimates_of):
     examples = force_examples()
     model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
     model = replace(model, tempering_exponent=0.0)  # so that length alone adds nothing
-    near = probabilities_after(model, [1.0, 1.0, 1.0])
-    further = probabilities_after(model, [1.0, 1.0, 1.0, 40.0, 40.0])
+    near = probabilities_after(estimates_of, model, [1.0, 1.0, 1.0])
+    further = probabilities_after(estimates_of, model, [1.0, 1.0, 1.0, 40.0, 40.0])
     assert near[-1] > 0.8  # 16 slides show no more than 0.83
     assert further[-1] == pytest.approx(near[-1], abs=1e-6)
-    assert probabilities_after(model, [40.0, 40.0, 40.0])[-1] == pytest.approx(0.5, abs=1e-3)
+    assert probabilities_after(estimates_of, model, [40.0, 40.0, 40.0])[-1] == pytest.approx(0.5, abs=1e-3)
 
 
-def test_held_out_slides_are_followed_as_the_classifier_follows_them():
+def test_held_out_slides_are_followed_as_the_classifier_follows_them(estimates_of):
     examples = force_examples()
     rule = SoftVote(late_weight=0.25)
     evidence, trusted = np.log([[0.9, 0.1], [0.2, 0.8], [0.6, 0.4]]), np.array([0.125, 0.5, 0.5])
@@ -251,7 +237,8 @@ def test_held_out_slides_are_followed_as_the_classifier_follows_them():
     )
     expected = np.exp(model.recipe.evidence.log_posterior(followed, effective[:, None], model.tempering_exponent))
     bound = model.decisions.error_bound
-    assert probabilities_after(model, forces) == pytest.approx([bound.limited(row)[0] for row in expected])
+    found = probabilities_after(estimates_of, model, forces)
+    assert found == pytest.approx([bound.limited(row)[0] for row in expected])
 
 
 def test_the_force_is_no_part_of_the_discriminants_and_without_it_there_is_one():

@@ -8,20 +8,20 @@ import pytest
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.types import FeatureVector
 from texture_estimation.decisions import Domain, ErrorBound
-from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.model import load_model
 from texture_features.examples import SlideConditions
 
 
-def measured(incremental_classifier, values, exploration_id='e1', feature_set=None, last=True):
-    names, kind = incremental_classifier.model.names, feature_set or incremental_classifier.model.feature_set
-    for number, row in enumerate(values):
-        incremental_classifier.observe(
-            FeatureVector(number * 10**8, exploration_id, 0.5, 0.1, names, row, feature_set=kind)
-        )
-    if last:
-        incremental_classifier.observe(FeatureVector(10**9, exploration_id, 0.0, 0.1, last=True))
+@pytest.fixture
+def measured(slide_of):
+    """Return a function that lets a classifier observe a slide of these windows."""
+
+    def observe(classifier, values, identity='e1', **more):
+        for vector in slide_of(classifier.model, values, identity, **more):
+            classifier.observe(vector)
+
+    return observe
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def silk():
     return 4.0 + rng.normal(size=(12, 6))
 
 
-def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, silk):
+def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, silk, measured):
     incremental_classifier = IncrementalClassifier(model)
     measured(incremental_classifier, silk)
     assert incremental_classifier.add('silk') == 12
@@ -44,7 +44,7 @@ def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, sil
     assert after > before - 0.03
 
 
-def test_more_examples_of_a_known_texture_add_no_label(model, examples):
+def test_more_examples_of_a_known_texture_add_no_label(model, examples, measured):
     incremental_classifier = IncrementalClassifier(model)
     moved = examples.values[examples.labels == 'wood'][:8] + np.array([0, 0, 0, 0, 0, 9.0])
     measured(incremental_classifier, moved)
@@ -53,7 +53,7 @@ def test_more_examples_of_a_known_texture_add_no_label(model, examples):
     assert incremental_classifier.model.decide(moved) == ['wood'] * 8
 
 
-def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, silk, tmp_path):
+def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, silk, tmp_path, measured):
     path = model.save(tmp_path / 'surfaces')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     measured(incremental_classifier, silk)
@@ -77,7 +77,7 @@ def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, 
         later.remove_last()
 
 
-def test_a_trained_model_that_was_saved_again_keeps_its_examples_but_other_features_do_not(model, silk, tmp_path):
+def test_a_model_saved_again_keeps_its_added_slides_but_not_those_of_other_features(model, silk, tmp_path, measured):
     path = model.save(tmp_path / 'm')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     measured(incremental_classifier, silk)
@@ -94,7 +94,7 @@ def test_a_trained_model_that_was_saved_again_keeps_its_examples_but_other_featu
         load_model(path)
 
 
-def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk):
+def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured):
     incremental_classifier = IncrementalClassifier(model)
     with pytest.raises(InvalidData, match='no exploration was classified with this model; explore first'):
         incremental_classifier.add('silk')
@@ -110,7 +110,7 @@ def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk):
         incremental_classifier.add('  ')
 
 
-def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path):
+def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path, measured):
     (tmp_path / 'm.added').write_text('in the way')
     incremental_classifier = IncrementalClassifier(model, tmp_path / 'm')
     measured(incremental_classifier, silk)
@@ -120,7 +120,7 @@ def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path):
 
 
 @pytest.mark.parametrize('label', ['../../etc/x', 'x' * 10_000, 'two\nlines'])
-def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, silk, tmp_path, label):
+def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, silk, tmp_path, label, measured):
     path = model.save(tmp_path / 'surfaces')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     measured(incremental_classifier, silk)
@@ -129,7 +129,7 @@ def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, sil
     assert load_model(path).labels == model.labels
 
 
-def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tmp_path):
+def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tmp_path, measured):
     path = model.save(tmp_path / 'surfaces')
     for _ in range(2):
         incremental_classifier = IncrementalClassifier(load_model(path), path)
@@ -167,7 +167,7 @@ def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_resta
 
 
 @pytest.fixture
-def three_added(model, examples, silk, tmp_path):
+def three_added(model, examples, silk, tmp_path, measured):
     """Return a classifier to which silk, oak, more wood and more silk were added in this order, and its path."""
     path = model.save(tmp_path / 'surfaces')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
@@ -192,7 +192,7 @@ def test_a_texture_is_removed_by_its_label_with_all_its_slides_live_and_stored(t
     )
 
 
-def test_what_is_added_after_a_removal_replaces_no_stored_slide(three_added, model, silk):
+def test_what_is_added_after_a_removal_replaces_no_stored_slide(three_added, model, silk, measured):
     incremental_classifier, path = three_added
     incremental_classifier.remove('silk')
     measured(incremental_classifier, 2 * silk, 'e9')
@@ -222,19 +222,7 @@ def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, 
     assert len(load_model(path).added_slides) == 4
 
 
-def estimated(model, values, exploration_id='asked'):
-    """Return the estimates of a slide, window by window and at its end."""
-    evidence = EvidenceAccumulator(model)
-    windows = [
-        FeatureVector(number * 10**8, exploration_id, 0.5, 0.1, model.names, row, feature_set=model.feature_set)
-        for number, row in enumerate(values)
-    ]
-    return [
-        evidence.update(vector) for vector in (*windows, FeatureVector(10**10, exploration_id, 0.0, 0.1, last=True))
-    ]
-
-
-def with_slides(model, values, count):
+def with_slides(measured, model, values, count):
     """Return the model after so many slides with these windows were added as silk."""
     incremental_classifier = IncrementalClassifier(model)
     for number in range(count):
@@ -244,9 +232,10 @@ def with_slides(model, values, count):
 
 
 @pytest.mark.parametrize('count', [1, 2, 5])
-def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(model, silk, count):
+def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(model, silk, count, measured, estimates_of):
     decisions = dataclasses.replace(model.decisions, error_bound=ErrorBound(600, 0.02))
-    estimates = estimated(with_slides(dataclasses.replace(model, decisions=decisions), silk, count), silk + 0.1)
+    trusting = dataclasses.replace(model, decisions=decisions)
+    estimates = estimates_of(with_slides(measured, trusting, silk, count), silk + 0.1)
     assert {estimate.label for estimate in estimates} == {'silk'}
     assert not any(estimate.decided for estimate in estimates)
     highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].probabilities))

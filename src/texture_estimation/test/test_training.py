@@ -6,7 +6,6 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.types import FeatureVector
-from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.learners.learner import assign_folds
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -81,7 +80,7 @@ def test_vectors_are_gathered_with_their_surfaces():
         LabelledFeatures.from_vectors(vectors, {})
 
 
-def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
+def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples, estimates_of):
     examples = make_examples()
     trusting, strict = (
         dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=share))
@@ -91,36 +90,22 @@ def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
     model = train(strict, examples)
     assert model.decisions.novelty_detector is not None
     values = examples.values[examples.groups == examples.groups[0]]
-    assert final_estimate(model, values).known
-    assert not final_estimate(model, values + 50.0).known
+    assert estimates_of(model, values)[-1].known
+    assert not estimates_of(model, values + 50.0)[-1].known
 
 
-def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_examples):
+def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_examples, estimates_of):
     labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
     examples = make_examples(labels=labels, slides=12, features=8, seed=3)
     recipe = dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=0.05))
     model = train(recipe, pick(examples, examples.labels != 'glass'))
     new = make_examples(labels=labels, slides=12, features=8, seed=4)
     known = {
-        label: [e.known for slide in range(12) for e in estimates(model, new.values[new.groups == f'{label}/{slide}'])]
+        label: [e.known for n in range(12) for e in estimates_of(model, new.values[new.groups == f'{label}/{n}'])]
         for label in labels
     }
     assert np.mean(known.pop('glass')) < 0.2
     assert np.mean(list(known.values())) > 0.9
-
-
-def estimates(model, values):
-    """Return what the model says after each window of a slide and at its end."""
-    evidence = EvidenceAccumulator(model)
-    vectors = [
-        FeatureVector(k * 10**8, 'e', 0.5, 0.1, model.names, row, feature_set=model.feature_set)
-        for k, row in enumerate(values)
-    ]
-    return [evidence.update(vector) for vector in (*vectors, FeatureVector(10**10, 'e', 0.0, 0.1, last=True))]
-
-
-def final_estimate(model, values):
-    return estimates(model, values)[-1]
 
 
 def augmented(examples, response, copies=2, shift=0.0):

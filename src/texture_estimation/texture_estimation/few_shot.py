@@ -13,6 +13,7 @@ from texture_core.types import Array
 from texture_estimation.decisions import ErrorBound
 from texture_estimation.learners.discriminant import Discriminant
 from texture_estimation.model import TextureModel
+from texture_estimation.numerics import shrunk_covariance
 from texture_features.examples import LabelledFeatures, SlideConditions
 
 DIRECTIONS = 40  # of largest variance over slides, in which covariances can be told from some hundred slides
@@ -123,6 +124,6 @@ def _covariances(
     within = deviations.T @ deviations / max(1, len(deviations) - groups)
     between = shifts.T @ shifts / len(shifts)
     size = len(within)
-    within = (1.0 - SHRINKAGE) * within + SHRINKAGE * np.diag(np.diag(within))
+    within = shrunk_covariance(within, SHRINKAGE)
     between = (1.0 - SHRINKAGE) * between + SHRINKAGE * np.trace(between) / size * np.eye(size)
     return within + 1e-9 * np.trace(within) / size * np.eye(size), between, np.array(classes)

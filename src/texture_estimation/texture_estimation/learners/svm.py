@@ -95,12 +95,6 @@ class PairCoupling:
         return scores
 
 
-def uncalibrated(n_labels: int) -> PairCoupling:
-    """Return the coupling with middling sigmoids, for when nothing can be held out."""
-    n_pairs = n_labels * (n_labels - 1) // 2
-    return PairCoupling(n_labels, np.full(n_pairs, 2.0), np.zeros(n_pairs), 1.0)
-
-
 def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
     """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,).
 
@@ -429,15 +423,17 @@ class SvmRbf:
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
         n_labels = int(y.max()) + 1
+        n_pairs = n_labels * (n_labels - 1) // 2
         split = assign_folds(y, groups, self.folds, parts)
         machines = self._fit(X, y, groups, differences)
         if split is None:
-            coupling, held_out, note = uncalibrated(n_labels), None, UNCALIBRATED
+            coupling = PairCoupling(n_labels, np.full(n_pairs, 2.0), np.zeros(n_pairs), 1.0)  # middling sigmoids
+            held_out, note = None, UNCALIBRATED
         else:
             folds_of, note = split
             decisions = held_out_scores(
                 lambda held: self._fit(X[~held], y[~held], groups[~held], differences),
-                X, folds_of, n_labels * (n_labels - 1) // 2,
+                X, folds_of, n_pairs,
             )  # fmt: skip
             coupling = fit_coupling(decisions, y, n_labels)
             held_out = coupling(decisions)
