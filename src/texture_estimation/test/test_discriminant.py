@@ -221,10 +221,10 @@ def test_evidence_from_far_outside_the_trained_forces_neither_adds_nor_dilutes(e
 def test_held_out_slides_are_followed_as_the_classifier_follows_them(estimates_of):
     examples = force_examples()
     rule = SoftVote(late_weight=0.25)
-    evidence, trusted = np.log([[0.9, 0.1], [0.2, 0.8], [0.6, 0.4]]), np.array([0.125, 0.5, 0.5])
+    evidence, trusted = np.log([[0.9, 0.1], [0.2, 0.8], [0.6, 0.4]]), np.array([0.25, 0.5, 0.5])
     means = running_means(rule, evidence, np.array([1.0, 1.5, 2.0]), trusted)
-    assert means[0] == pytest.approx(0.5 * evidence[0])  # an eighth of a window is trusted, a quarter is enough
-    assert means[1] == pytest.approx((0.125 * evidence[0] + 0.5 * evidence[1]) / 0.625)
+    assert means[0] == pytest.approx(0.25 * evidence[0])  # a quarter of a window is trusted
+    assert means[1] == pytest.approx(0.5 * (0.25 * evidence[0] + 0.5 * evidence[1]) / 0.75)
     model = train(Recipe.from_mapping({**CONTENT, 'learner': 'force_discriminant'}, 'forces'), examples)
     forces = [1.0, 4.5, 40.0, 1.0]
     values = np.array([[3.0 if force < 2.0 else -3.0, force] for force in forces])

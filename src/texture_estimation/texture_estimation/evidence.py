@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.decisions import ErrorBound, SlideNovelty
-from texture_estimation.evidence_rules import ENOUGH, GroupedEvidence
+from texture_estimation.evidence_rules import GroupedEvidence
 from texture_estimation.gaussians import SlideMoments
 from texture_estimation.model import TextureModel
 from texture_estimation.numerics import is_tied
@@ -198,8 +198,8 @@ class EvidenceAccumulator:
             )
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
-        # As long as the windows that the classifier trusts do not add up to enough, their mean counts less.
-        mean = self._evidence.mean * min(1.0, self._trusted_ns / self._window_ns / ENOUGH)
+        # As long as the windows that the classifier trusts do not add up to one, their mean counts less.
+        mean = self._evidence.mean * min(1.0, self._trusted_ns / self._window_ns)
         deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
         probabilities = self._with_added(
             model, model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent), effective_windows

@@ -252,11 +252,6 @@ class _Sum:
     time_s: float = 0.0
 
 
-# Trusted windows that count as evidence in full; below, the finger hardly was where the classifier was trained. Chosen
-# on slides 1-30 of biotac20: with a whole window as many slides elsewhere are known and right, and more wrong.
-ENOUGH = 0.25
-
-
 def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array, trusted: Array | float = 1.0) -> Array:
     """Return the weighted mean evidence of a slide after each window, where all windows decide together.
 
@@ -269,8 +264,8 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array,
     effective_windows : (n_windows,)
         Effective window count including each window.
     trusted : (n_windows,) or a number
-        How much the classifier trusts each window; weighs it, too. As long as the trusted ones do not add up to
-        ENOUGH windows, their mean counts less in proportion.
+        How much the classifier trusts each window; weighs it, too. As long as the trusted ones do not add up to one
+        window, their mean counts less in proportion.
 
     Returns
     -------
@@ -286,7 +281,7 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array,
     means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
     if np.ndim(trusted):
         added = np.cumsum(trusted * np.diff(effective_windows, prepend=0.0))
-        means *= np.minimum(added / ENOUGH, 1.0)[:, None]
+        means *= np.minimum(added, 1.0)[:, None]
     return means
 
 
