@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime, timezone
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -364,22 +364,17 @@ class Exploration:
         vx, vy, _ = arm.velocity
         x, y, z = arm.position
         self._report(
-            ExplorationState(
-                stamp_ns=now_ns,
-                exploration_id=self.exploration_id,
-                motion=self.request.motion,
-                phase=step.phase,
-                steady_s=step.steady_s,
-                speed_m_s=(vx * vx + vy * vy) ** 0.5,
-                force_n=arm.force_n,
-                tangential_force_n=arm.tangential_force_n,
-                direction_rad=step.direction_rad,
-                progress=step.progress,
-                surface=self.request.surface,
-                x_m=x,
-                y_m=y,
-                z_m=z,
-            )
+            now_ns,
+            step.phase,
+            steady_s=step.steady_s,
+            speed_m_s=(vx * vx + vy * vy) ** 0.5,
+            force_n=arm.force_n,
+            tangential_force_n=arm.tangential_force_n,
+            direction_rad=step.direction_rad,
+            progress=step.progress,
+            x_m=x,
+            y_m=y,
+            z_m=z,
         )
 
     def _end_of(self, phase: Phase) -> tuple[ExplorationError, str]:
@@ -395,20 +390,14 @@ class Exploration:
         """End at once: an arm that does not follow cannot be lifted, only stopped."""
         error, message = (self._abort[0], f'{self._abort[1]}; {reason}') if self._abort else (error, reason)
         self.outcome = ExplorationOutcome(error, message, self._slid, lifted=False)
-        self._report(
-            ExplorationState(
-                stamp_ns=self._clock(),
-                exploration_id=self.exploration_id,
-                motion=self.request.motion,
-                phase=Phase.ABORTED,
-                progress=self.state.progress,
-                surface=self.request.surface,
-            )
-        )
+        self._report(self._clock(), Phase.ABORTED, progress=self.state.progress)
 
-    def _report(self, state: ExplorationState) -> None:
-        self.state = state
-        self._on_state(state)
+    def _report(self, stamp_ns: int, phase: Phase, **numbers: Any) -> None:
+        request = self.request
+        self.state = ExplorationState(
+            stamp_ns, self.exploration_id, request.motion, phase, surface=request.surface, **numbers
+        )
+        self._on_state(self.state)
 
 
 def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Listening = WITHOUT_GAPS) -> str:

@@ -1053,11 +1053,9 @@ class Halt(Stage):
         """Follow the ramp down."""
         self._along.follower.update(time_ns, arm)
         share = self.elapsed_s(time_ns) / self._along.ramp_s
-        return (
-            None
-            if share >= 1.0
-            else ArmCommand(self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share)))
-        )
+        if share >= 1.0:
+            return None
+        return ArmCommand(self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share)))
 
 
 class LiftStage(Stage):
