@@ -117,7 +117,7 @@ PAPERS = {
         'tsf85_3x4', 'ets-circular', 'ets-circular-svm', ('ets-circular-ann', 'ets-circular-svm-pairs')
     ),
     'Roberge et al., ten textures': Paper(
-        'tsf85_3x4', 'ets-ten-textures', 'ets-fine-svm', ('ets-fine-ann', 'ets-fine-svm-pairs')
+        'tsf85_3x4', 'ets-ten-textures', 'ets-fine-svm', ('ets-fine-ann', 'ets-fine-svm-pairs'), slides=5, live=3
     ),
     'Jamali & Sammut 2010': Paper(
         'daq',

@@ -54,6 +54,7 @@ from numpy.typing import NDArray
 from texture_core.config import find, param
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, standardisation
+from texture_estimation.learners.sklearn_learner import packed, unpacked
 from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch, centred, power
 from texture_features.features.temporal import Hjorth
@@ -655,13 +656,10 @@ class EmMixture:
         n_clusters = len(mixture.weights_)
         counts = np.zeros((n_clusters, n_labels))
         np.add.at(counts, (found, y), 1.0)
-        factors = mixture.precisions_cholesky_
         parameters = {
+            'packed': packed(mixture, 'GaussianMixture'),
             'mean': mean,
             'scale': scale,
-            'centres': mixture.means_,
-            'factors': factors if self.covariance == 'full' else np.stack([np.diag(row) for row in factors]),
-            'log_weights': np.log(mixture.weights_),
             'names': np.eye(n_labels)[counts.argmax(axis=1)],
         }
         return Fitted(parameters, None, 'not calibrated: probabilities of clusters found without labels')
@@ -669,7 +667,8 @@ class EmMixture:
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> MixturePredictor:
         """Return the predictor made from the stored parameters."""
-        return MixturePredictor(**parameters)
+        values = dict(parameters)
+        return MixturePredictor(unpacked(values.pop('packed')), **values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -678,51 +677,20 @@ class MixturePredictor:
 
     Parameters
     ----------
+    mixture
+        Fitted `GaussianMixture`.
     mean, scale : (n_features,)
         Of the standardisation.
-    centres : (n_clusters, n_features)
-    factors : (n_clusters, n_features, n_features)
-        Upper triangular; the precision matrix is factor · factorᵀ.
-    log_weights : (n_clusters,)
     names : (n_clusters, n_labels)
         1 for the label of the cluster, else 0.
     """
 
+    mixture: Any
     mean: Array
     scale: Array
-    centres: Array
-    factors: Array
-    log_weights: Array
     names: Array
-
-    def __post_init__(self) -> None:
-        n_features = self.factors.shape[1]
-        together = self.factors.transpose(1, 0, 2).reshape(n_features, -1)
-        shift = np.einsum('kf,kfg->kg', self.centres, self.factors)
-        determinants = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
-        object.__setattr__(self, '_together', together.copy())
-        object.__setattr__(self, '_shift', shift)
-        object.__setattr__(self, '_constant', determinants + self.log_weights)
 
     def __call__(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        shares = np.exp(log_softmax(self.cluster_scores(X)))
-        return log_softmax(np.log(shares @ self.names + LEAST))
-
-    def cluster_scores(self, X: Array) -> Array:
-        """Return the log-density of each cluster times its weight, but for a constant, (..., n_clusters).
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_clusters)
-            In nats.
-        """
-        standard = (X - self.mean) / self.scale
-        white = (standard @ self._together).reshape(*standard.shape[:-1], *self._shift.shape)  # type: ignore[attr-defined]
-        white -= self._shift  # type: ignore[attr-defined]
-        scores: Array = self._constant - 0.5 * np.add.reduce(white * white, axis=-1)  # type: ignore[attr-defined]
-        return scores
+        shares = self.mixture.predict_proba(np.atleast_2d((X - self.mean) / self.scale))
+        return log_softmax(np.log(shares @ self.names + LEAST)).reshape(*X.shape[:-1], -1)

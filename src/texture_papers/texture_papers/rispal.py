@@ -30,7 +30,7 @@ search
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -103,7 +103,7 @@ class RegressionNetworks:
     hidden_bias : (n_networks · n_hidden,)
     out : (n_networks, n_hidden)
     out_bias : (n_networks,)
-    linear : ()
+    linear
         Whether the hidden layers are linear, not sigmoid.
 
     Examples
@@ -120,7 +120,7 @@ class RegressionNetworks:
     hidden_bias: Array
     out: Array
     out_bias: Array
-    linear: Array = field(default_factory=lambda: np.array(False))
+    linear: bool = False
 
     def __call__(self, X: Array) -> Array:
         """Return the outputs, (..., n_networks) of (..., n_features)."""
@@ -174,7 +174,7 @@ def fit_networks(
         'hidden_bias': np.concatenate([network.hidden_bias for network in fitted]),
         'out': np.stack([network.out for network in fitted]),
         'out_bias': np.array([network.out_bias for network in fitted]),
-        'linear': np.array(transfer == LINEAR),
+        'linear': transfer == LINEAR,
     }
 
 
