@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Count pages and words written by hand: `python tools/words.py`.
+"""Count pages and words written by hand: `python tools/words.py`; it ends with 1 above the limits.
 
 Code blocks, comments and generated pages do not count. Code within a line counts as one word, and what has neither a
 letter nor a digit, such as the rules of a table, as none.
@@ -8,10 +8,12 @@ letter nor a digit, such as the rules of a table, as none.
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ('README.md', 'CONTRIBUTING.md', 'docs/*.md', 'docs/appendix/*.md', 'src/*/README.md')
+MOST_PAGES, MOST_WORDS = 20, 18_000
 GENERATED = '<!-- This page is generated'
 LEFT_OUT = re.compile(r'<!--.*?-->|^ *```.*?^ *```|^    .*?$', re.DOTALL | re.MULTILINE)
 
@@ -31,4 +33,6 @@ if __name__ == '__main__':
     counts = {page.relative_to(ROOT): words(page) for pattern in PAGES for page in written(pattern)}
     for path, count in sorted(counts.items(), key=lambda item: item[1]):
         print(f'{count:6d} {path}')
-    print(f'{sum(counts.values()):6d} words on {len(counts)} pages')
+    total = sum(counts.values())
+    print(f'{total:6d} words on {len(counts)} pages; at most {MOST_WORDS} on {MOST_PAGES}')
+    sys.exit(total > MOST_WORDS or len(counts) > MOST_PAGES)
