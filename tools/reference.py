@@ -304,10 +304,9 @@ def plain(interval: list[float], *, middle: bool = True) -> str:
 
 def later(root: Path) -> str:
     """Return a table of the recipes on later slides, each with the definition that was measured, best first."""
-    numbers = json.loads((root / CHARTS / 'recipes_later.json').read_text(encoding='utf-8'))['numbers']
-    [cells] = next(
-        setting for setting in numbers.values() if isinstance(setting, dict) and 'by time' in setting
-    ).values()
+    numbers = json.loads((root / CHARTS / 'overview.json').read_text(encoding='utf-8'))['numbers']
+    found = {**numbers['vibration'], **numbers['all channels']}
+    cells = {name: cell for name, cell in found.items() if 'definition' in cell}
     rows = [
         '| recipe | single windows or votes | slides after 5 s | windows or votes unclassified | definition |',
         '|---|---|---|---|---|',

@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from texture_benchmarks import study
-from texture_benchmarks.study import BenchmarkOptions, imported, importing_once, map_forked
+from texture_benchmarks.study import BenchmarkOptions, imported, importing_once, map_forked, share_interval
 from texture_core.errors import InvalidData
 
 
@@ -88,3 +88,9 @@ def test_linear_algebra_keeps_to_one_thread_in_each() -> None:
         return {pool['num_threads'] for pool in threadpool_info() if pool['user_api'] == 'blas'}
 
     assert map_forked(threads, [0]) == [{1}]
+
+
+def test_an_interval_is_as_wide_as_slides_and_surfaces_ask_for() -> None:
+    assert share_interval([True] * 20, ['a', 'b'] * 10) == pytest.approx((0.8316, 1.0), abs=1e-4)  # 1 - 0.025^(1/20)
+    low, high = share_interval([True] * 10 + [False] * 10, ['a'] * 10 + ['b'] * 10)
+    assert (low, high) == (0.0, 1.0)  # one surface is right and one is wrong: any share may be

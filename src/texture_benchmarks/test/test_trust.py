@@ -22,6 +22,7 @@ from texture_benchmarks.trust import (
     UNDISTURBED,
     Outcome,
     breakdown,
+    breakdown_strengths,
     breakdowns,
     ordered,
     run,
@@ -83,6 +84,7 @@ def test_factors_break_down_on_both_sides_of_one() -> None:
     lowest, *_, highest = (name for _, name in ordered(ROWS['gain']))
     found = breakdowns(ROWS['gain'], {**ends, lowest: worst, highest: worst})
     assert found == pytest.approx([0.9, 7.1])
+    assert breakdown_strengths(ROWS['gain'], {**ends, lowest: worst, highest: worst}) == pytest.approx([0.68, 1.46])
 
 
 def test_what_the_training_covers_is_read_from_the_recipe() -> None:
@@ -171,7 +173,16 @@ def test_outcomes_are_counted_at_the_first_decided_estimate_and_at_the_end() -> 
     rejected = estimate('cork', known=False, decided=False, evidence_s=2.0)
     slides = [[undecided, right, wrong], [undecided, wrong, rejected], [undecided, rejected], []]
     outcome = Outcome.of([SlideResult('cork', [], estimates) for estimates in slides])
-    assert dataclasses.astuple(outcome) == (4, 1, 1, 0, 1, pytest.approx(1.5), 2, (0.5, 0.5))
+    assert dataclasses.astuple(outcome) == (
+        4,
+        1,
+        1,
+        0,
+        1,
+        pytest.approx(1.5),
+        2,
+        pytest.approx((0.0676, 0.9324), abs=1e-4),
+    )
 
 
 @pytest.mark.benchmark

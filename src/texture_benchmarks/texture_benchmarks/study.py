@@ -16,9 +16,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+from scipy.stats import binomtest
+
 from texture_core.errors import DeviceError, InvalidData
 from texture_estimation.recipe import Recipe
 from texture_estimation.search import single_blas_thread
+from texture_evaluation.cross_validation import interval
 from texture_recordings.public_sets import IMPORTS
 
 CPU_INFO = Path('/proc/cpuinfo')
@@ -123,6 +127,20 @@ def in_own_process(measure: Callable[[], Out]) -> Out:
     finally:
         process.join()
     return found
+
+
+def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
+    """Return the 95 % interval of a share of slides: by bootstrap over surfaces, or exact over slides where wider.
+
+    Slides over one surface are no independent draws. Where all surfaces are alike, resampling them says nothing.
+    Source of the exact one: Clopper & Pearson 1934.
+    """
+    surface = np.unique(surfaces, return_inverse=True)[1]
+    drawn = interval(np.stack([np.bincount(surface, right), np.bincount(surface)], axis=1).astype(np.float64))
+    exact = binomtest(int(np.sum(right)), len(right)).proportion_ci()
+    if all(right) or not any(right):
+        return float(exact.low), float(exact.high)
+    return float(min(drawn[0], exact.low)), float(max(drawn[1], exact.high))
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from texture_benchmarks.borders import FINGER, PLACE, SAME, for_recipe, recipe_o
 from texture_benchmarks.borders import SETS as BORDER_SETS
 from texture_benchmarks.borders import figures as border_figures
 from texture_benchmarks.disturbances import ROWS, SCENE, SIMULATED, TRAINED, DisturbanceSweep, disturbed, simulate
-from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, trained_apart
+from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, share_interval, trained_apart
 from texture_core.types import Array, FeatureVector
 from texture_estimation.decisions import OUTSIDE
 from texture_estimation.evidence import EvidenceAccumulator
@@ -24,7 +24,6 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.cross_validation import interval
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import training_examples
 from texture_recordings.dataset import LabelledSlide, SlideDataset
@@ -75,8 +74,6 @@ class Outcome:
         final = [result.end.label == result.surface for result in measured if result.end.known]
         times = [(estimate or result.estimates[-1]).evidence_s for estimate, result in first]
         labels = [bool(result.estimates) and result.end.label == result.surface for result in results]
-        surface = np.unique([result.surface for result in results], return_inverse=True)[1]
-        low, high = interval(np.stack([np.bincount(surface, labels), np.bincount(surface)], axis=1).astype(np.float64))
         return cls(
             slides=len(results),
             early_right=sum(early),
@@ -85,7 +82,7 @@ class Outcome:
             final_wrong=len(final) - sum(final),
             mean_s=float(np.mean(times)) if times else math.nan,
             label_right=sum(labels),
-            interval=(low, high),
+            interval=share_interval(labels, [result.surface for result in results]),
         )
 
 
@@ -146,7 +143,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     Slides that are right and known, unknown, or wrong and known, at the first decided estimate and at the end, and
     slides whose label is right, known or not; breakdown: strengths at which these fall below 90 % of those without a
     disturbance, linear between strengths. The estimates are told nothing of the disturbance. 95 % intervals by
-    bootstrap over surfaces.
+    bootstrap over surfaces, or exact over slides where these are wider.
     """
     data = _Data.simulated(options.seed) if options.quick else _Data.recorded(options)
     models = {name: _trained(name, data.trained) for name in (QUICK_COMPARED if options.quick else COMPARED)}
@@ -165,7 +162,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
                 'confidence_floor': asdict(model.decisions.confidence_floor),
                 'above_allowed': [row for row, one in outcomes[name].items() if one.worst_wrong > MAX_WRONG_KNOWN],
                 'outcomes': {row: asdict(outcome) for row, outcome in outcomes[name].items()},
-                'breakdown': {row: breakdowns(ROWS[row], outcomes[name]) for row in _rows(options)},
+                'breakdown': {row: breakdown_strengths(ROWS[row], outcomes[name]) for row in _rows(options)},
             }
             for name, model in models.items()
         },
@@ -298,6 +295,16 @@ def breakdowns(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]) -> list
     return [place for place in found if place is not None]
 
 
+def breakdown_strengths(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]) -> list[float]:
+    """Return the strengths at these places; below an infinite one, the first that was measured."""
+    strengths = [strength for strength, _ in ordered(sweep)]
+    found = []
+    for place in breakdowns(sweep, outcomes):
+        before, after = strengths[math.floor(place)], strengths[math.ceil(place)]
+        found.append(after if math.isinf(before) else before + (place % 1.0) * (after - before))
+    return found
+
+
 # --------------------
 # The chart.
 
@@ -355,10 +362,11 @@ def _draw_sweep(lines: Any, strip: Any, sweep: DisturbanceSweep, numbers: Mappin
         low, high = 100 * np.array([end['interval'] for end in ends]).T
         lines.fill_between(places, low, high, color=colour, alpha=0.13, linewidth=0)
         lines.plot(places, share, color=colour, marker=marker, markersize=4, label=label)
-    for place in numbers[OURS]['breakdown'][next(key for key, row in ROWS.items() if row is sweep)]:
+    ours = {row: Outcome(**numbers[OURS]['outcomes'][row]) for _, row in rows}
+    for place in breakdowns(sweep, ours):
         lines.axvline(place, color=COLOURS[0], linestyle=':')
     lines.plot([], [], color=COLOURS[0], linestyle=':', label=f'{OURS} breaks down: 90 % of undisturbed')
-    lines.set(ylim=(0, 103), xticks=places, xlim=(-0.5, len(rows) - 0.5))
+    lines.set(ylim=(0, 105), xticks=places, xlim=(-0.5, len(rows) - 0.5))
     lines.tick_params(labelbottom=False)
     own = [numbers[OURS]['outcomes'][row] for _, row in rows]
     shares = np.array([[end['final_right'], end['final_wrong'], end['label_right']] for end in own])
@@ -390,5 +398,5 @@ def _draw_ends(strip: Any, shares: Array) -> None:
     strip.bar(places, 100 - right - wrong, 0.8, right, color=UNKNOWN, label='unknown')
     strip.bar(places, wrong, 0.8, 100 - wrong, color=WRONG, label='wrong and known')
     strip.plot(places, label, 'D', color='black', markersize=4, label='label right, rejected or not')
-    strip.set(ylim=(0, 104), yticks=[0, 50, 100], xlim=(-0.5, len(places) - 0.5))
+    strip.set(ylim=(0, 112), yticks=[0, 50, 100], xlim=(-0.5, len(places) - 0.5))
     strip.grid(visible=False)

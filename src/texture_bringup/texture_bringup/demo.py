@@ -32,15 +32,13 @@ from texture_core.types import (
     Array,
     ExplorationRequest,
     ExplorationState,
-    FeatureVector,
     Phase,
     Rejection,
     TactileSignal,
     TextureEstimate,
 )
-from texture_estimation.evidence_rules import running_means
 from texture_estimation.model import TextureModel, load_model
-from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles
+from texture_evaluation.charts import COLOURS, chart, draw_confusion
 from texture_evaluation.commands import train as training
 from texture_evaluation.evaluate import EvaluationReport, evaluate, percent
 from texture_evaluation.train import train_from_bags
@@ -367,31 +365,26 @@ def explore_patiently(
 # --------------------
 # The picture of the demonstration: one recognised slide from touch to decision.
 
-SHOWN_LABELS = 3
 SHOWN_S = 0.5
-CHART_MARGIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What a bag holds: slide states, windows and the newest estimate of each exploration, all vibration batches."""
+    """What a bag holds: slide states and estimates of each exploration, all vibration batches."""
 
     states: defaultdict[str, list[ExplorationState]] = field(default_factory=lambda: defaultdict(list))
-    windows: defaultdict[str, list[FeatureVector]] = field(default_factory=lambda: defaultdict(list))
-    estimates: dict[str, TextureEstimate] = field(default_factory=dict)
+    estimates: defaultdict[str, list[TextureEstimate]] = field(default_factory=lambda: defaultdict(list))
     batches: list[TactileSignal] = field(default_factory=list)
 
     @classmethod
     def of(cls, bag: Path) -> Recorded:
         """Read a bag."""
         found = cls()
-        for _, _, value in read_bag(bag, ('exploration', 'signal', 'features', 'texture')):
+        for _, _, value in read_bag(bag, ('exploration', 'signal', 'texture')):
             if isinstance(value, TactileSignal):
                 found.batches.append(value)
-            elif isinstance(value, FeatureVector) and not value.last:
-                found.windows[value.exploration_id].append(value)
             elif isinstance(value, TextureEstimate) and value.probabilities:
-                found.estimates[value.exploration_id] = value
+                found.estimates[value.exploration_id].append(value)
             elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
                 found.states[value.exploration_id].append(value)
         return found
@@ -403,26 +396,6 @@ class Recorded:
         samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
         return samples
 
-    def log_odds(self, name: str, model: TextureModel) -> tuple[Array, Array]:
-        """Return the evidence of an exploration after each of its windows, as the classifier has it.
-
-        Returns
-        -------
-        (n_windows,)
-            Sliding time used, s.
-        (n_windows, n_labels)
-            Natural logarithm of how much more probable the label at the end is than each; 0 for itself.
-        """
-        windows, rule = self.windows[name], model.recipe.evidence
-        scores = rule.window_evidence(model.predict_log_proba(np.array([window.values for window in windows])))
-        length_s = windows[0].window_s
-        seconds = length_s + np.array([window.start_ns - windows[0].start_ns for window in windows]) / NANOSECONDS
-        effective = seconds / length_s
-        means = running_means(rule, scores, effective)
-        posterior = rule.log_posterior(means, effective[:, None], model.tempering_exponent)
-        best = model.labels.index(self.estimates[name].label)
-        return seconds, posterior[:, [best]] - posterior
-
 
 def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> None:
     """Draw an exploration of a surface, and the confusion of all explorations in the bag.
@@ -432,7 +405,7 @@ def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport,
     bag
         With the signal, the states, the features and the live estimates.
     surface
-        Of which surface: the exploration in which the evidence was weakest at first.
+        Of which surface: the exploration that was least certain at first.
     model
         That recognised the slides.
     report
@@ -444,48 +417,49 @@ def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport,
     """
     found = Recorded.of(bag)
     surfaces = {name: found.states[name][0].surface for name in found.estimates}
-    odds = {name: found.log_odds(name, model) for name in surfaces if surfaces[name] == surface}
-    name = min(odds, key=lambda each: np.sort(odds[each][1][0])[1])
+    own = {name: found.estimates[name] for name in surfaces if surfaces[name] == surface}
+    name = min(own, key=lambda each: own[each][0].confidence)
     slides = {label: found.samples(each) for each, label in {**surfaces, name: surface}.items()}
     slides[surface] = found.samples(name)
     rate_hz, unit = found.batches[0].sampling_rate_hz, found.batches[0].common_unit
-    with chart(path, (11.0, 8.0), f'How a slide over {surface} is recognised (simulated Robotiq TSF-85)') as figure:
+    title = f'How a slide over {surface} is recognised (simulated Robotiq TSF-85)'
+    with chart(path, (11.0, 8.8), title, points=11.0) as figure:
         (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
         shown = slides[surface][: round(SHOWN_S * rate_hz)]
         signal.plot(np.arange(len(shown)) / rate_hz, shown, color=COLOURS[0], linewidth=0.8)
         signal.set(xlabel='time since the slide began (s)', ylabel=f'signal ({unit or "no unit"})')
         signal.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
-        ordered = sorted(slides.items(), key=lambda item: item[0] != surface)  # that of the slide has the first colour
-        for (label, samples), colour in zip(ordered, COLOURS, strict=False):
+        # That of the slide has the first colour, here and in the next panel.
+        colours = dict(zip(sorted(slides, key=lambda label: label != surface), COLOURS, strict=False))
+        for label, colour in colours.items():
+            samples = slides[label]
             hertz, power = welch(samples, fs=rate_hz, nperseg=min(len(samples), round(rate_hz / 2)))
-            own = label == surface
-            spectrum.semilogy(
-                hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=label, zorder=2 + own
-            )
+            width, above = (1.6, 3) if label == surface else (0.7, 2)
+            spectrum.semilogy(hertz[1:], power[1:], color=colour, linewidth=width, label=label, zorder=above)
         spectrum.set(xlabel='frequency (Hz)', ylabel=f'power density ({f"{unit}²" if unit else "1"}/Hz)')
         spectrum.set_title('2. Its spectrum is the mark of the surface')
         spectrum.legend(loc='upper right')
-        _draw_evidence(evidence, model.labels, found.estimates[name], *odds[name])
+        _draw_evidence(evidence, model.labels, found.estimates[name], colours)
         draw_confusion(table, report.labels, report.confusion)
         table.set_title('4. Single windows of all test slides')
         if note:
-            figure.supxlabel(note, fontsize='medium')
+            figure.supxlabel(note, fontsize=9)
 
 
 def _draw_evidence(
-    axes: Any, labels: Sequence[str], estimate: TextureEstimate, seconds: Array, log_odds: Array
+    axes: Any, labels: Sequence[str], estimates: Sequence[TextureEstimate], colours: Mapping[str, str]
 ) -> None:
-    others = [column for column in np.argsort(log_odds[-1]) if labels[column] != estimate.label]
-    for column, style in zip(others[:SHOWN_LABELS], line_styles(), strict=False):
-        axes.plot(seconds, log_odds[:, column], marker='.', label=labels[column], **style)
-    axes.axhline(0, color='grey', linewidth=0.8)
-    low, high = min(0.0, float(log_odds.min())), max(1.0, float(log_odds.max()))
-    margin = CHART_MARGIN * (high - low)
-    axes.set(xlabel='sliding time used (s)', ylabel=f'log odds of {estimate.label}')
-    axes.set(ylim=(low - margin, high + margin))
+    """Draw the probability of each surface after each window, in its colour, and the confidence that is reported."""
+    seconds = [estimate.evidence_s for estimate in estimates]
+    for column, label in enumerate(labels):
+        share = [100 * estimate.probabilities[column] for estimate in estimates]
+        axes.plot(seconds, share, marker='.', color=colours.get(label, 'grey'), label=label, alpha=0.7)
+    confidence = [100 * estimate.confidence for estimate in estimates]
+    axes.plot(seconds, confidence, color='black', linestyle='--', label='confidence reported')
+    axes.set(xlabel='sliding time used (s)', ylabel='probability, confidence (%)', ylim=(-4, 104))
     axes.set_xlim(left=0)
-    axes.set_title(f'3. Each window adds evidence; reported confidence {estimate.confidence:.2f}')
-    axes.legend(loc='lower right', title='compared with')
+    axes.set_title(f'3. Confidence after each window; {confidence[-1]:.0f} % at the end')
+    axes.legend(loc='center left')
 
 
 # --------------------
