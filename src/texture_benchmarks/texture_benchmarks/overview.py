@@ -344,13 +344,16 @@ def sliding_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
 
 
 def _shown(numbers: Mapping[str, Any], channels: str) -> dict[str, Mapping[str, Any]]:
-    """Return ours, the best recipe of a paper, which may leave channels out, and the peers, by the name at the line."""
+    """Return ours, the best recipe of a paper with these channels, and general classifiers, by the name at the line."""
     cells = numbers[channels]
-    papers = {name: cell for own in (numbers[VIBRATION], cells) for name, cell in own.items() if cell['kind'] == PAPERS}
+    papers = {name: cell for name, cell in cells.items() if cell['kind'] == PAPERS}
     best = max(papers, key=lambda name: papers[name]['accuracy_at_end'])
-    ours = {name: cells[name] for name in ('default', 'onset', 'vibration-and-taxels') if name in cells}
+    ours = {name: cells[name] for name in ('default', 'vibration-and-taxels') if name in cells}
     peers = {name: cell for name, cell in cells.items() if cell['kind'] == PEERS}
-    return {**ours, f'{AUTHORS[best.split("-")[0]]}: {best}': papers[best], **peers}
+    if channels != VIBRATION:
+        others = {f'{name},\n{VIBRATION}': cell for name, cell in numbers[VIBRATION].items() if cell['kind'] == PEERS}
+        peers |= {name: cell for name, cell in others.items() if name.partition(',')[0] not in peers}
+    return {**ours, f'{AUTHORS[best.split("-")[0]]}:\n{best}': papers[best], **peers}
 
 
 def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
@@ -363,7 +366,7 @@ def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
             axes.plot(ends['mean_s'], wrong_percent(ends['accuracy']), '*', markersize=15, markeredgecolor='black',
                       zorder=5, **style)  # fmt: skip
     last = [float(np.log10(wrong_percent(cell['share'][-1]))) for cell in shown.values()]
-    for (name, cell), height in zip(shown.items(), spread(last, 0.17), strict=True):
+    for (name, cell), height in zip(shown.items(), spread(last, 0.24), strict=True):
         axes.text(6.25, 10**height, name, va='center', **STYLES[cell['kind']])
     axes.set(xscale='log', yscale='log', xlim=(0.45, 6.1), ylim=(100.0, LEAST * 0.8), ylabel='slides wrong (%)')
     axes.set_xticks([s for s in TICKS_S if s > 0.4], [f'{s:g}' for s in TICKS_S if s > 0.4])
@@ -435,6 +438,7 @@ def _name_points(axes: Any, names: Sequence[str], kinds: Sequence[str], points: 
                                  textcoords='offset points', ha=side, va='center', **STYLES[kinds[index]])  # fmt: skip
             box = text.get_window_extent(figure.canvas.get_renderer())
             if not any(box.overlaps(other) for other in taken):
+                text.set_bbox({'facecolor': 'white', 'alpha': 0.7, 'edgecolor': 'none', 'pad': 0.5})
                 taken.append(box)
                 break
             text.remove()
