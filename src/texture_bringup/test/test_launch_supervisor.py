@@ -126,9 +126,10 @@ def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) ->
 
 
 def test_the_death_of_a_needed_node_stops_the_others(launch) -> None:
-    launched = launch({'good': GOOD, 'bad': 'exit 3'}, bad='on_exit="shutdown"')
+    launched = launch({'good': GOOD, 'bad': 'echo no disk; exit 3'}, bad='on_exit="shutdown"')
     assert launched.end() == 1
     assert any('bad is needed' in line for line in launched.lines)
+    assert launched.lines[-1] == '[launch] the launch ended because bad died with exit code 3: no disk'
 
 
 def test_a_node_killed_by_a_signal_is_named_with_it(launch) -> None:

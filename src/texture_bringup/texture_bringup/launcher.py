@@ -232,6 +232,7 @@ class RunningNode:
     ) -> None:
         self.node = node
         self.deaths = 0  # of processes of the same node before
+        self.last = ''  # line that it wrote
         self._say = say
         try:
             self._process = subprocess.Popen(
@@ -286,7 +287,8 @@ class RunningNode:
     def _show(self, stream: IO[bytes], line: bytes) -> None:
         # As upstream: without output="screen", what a node prints is not shown, only its log and error messages.
         if self.node.screen or stream is self._process.stderr:
-            self._say(f'[{self.node.label}] {line.decode(errors="replace").rstrip()}')
+            self.last = line.decode(errors='replace').rstrip()
+            self._say(f'[{self.node.label}] {self.last}')
 
     def send(self, number: signal.Signals) -> None:
         """Send a signal to the whole group of the process; one that is gone is left alone.
@@ -352,6 +354,7 @@ class Supervisor:
         self._stopping_since_s: float | None = None
         self._signals_sent = 0
         self._failed = False
+        self._cause = ''  # why the launch ends by itself
 
     def run(self) -> int:
         """Run the nodes to their end; return 0 if none died by itself, else 1.
@@ -372,6 +375,8 @@ class Supervisor:
                 self._selector.close()
                 for number, handler in handlers.items():
                     signal.signal(number, handler)
+        if self._cause:  # again: nodes that are being stopped have said much since
+            self._say(f'[launch] the launch ended because {self._cause}')
         return int(self._failed)
 
     def stop(self) -> None:
@@ -432,6 +437,7 @@ class Supervisor:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
             self._say(f'[launch] {node.label} is needed by the others, which are stopped now')
+            self._cause = f'{node.label} {ending(code)}{f": {process.last}" * bool(code and process.last)}'
             self.stop()
 
     def _forget(self, process: RunningNode) -> None:

@@ -38,6 +38,10 @@ class Scripted:
         step = self.script.pop(0) if self.script else '.'
         if step == 'x':
             raise DeviceError('it is gone')
+        if step == 'v':
+            raise ValueError('4 bytes came')
+        if step == '?':
+            raise DeviceError('is the finger on?')
         threading.Event().wait(0.001)
         first = self.counts['samples']
         self.counts['samples'] += 10
@@ -79,6 +83,15 @@ def test_a_sensor_that_is_gone_is_opened_again_and_reported_of_once() -> None:
         'the sensor delivers samples',
     ]
     assert reader.fault == ''
+
+
+def test_a_sensor_that_raises_anything_else_is_told_of_with_its_line_and_opened_again() -> None:
+    sensor, reader, told = run('..v..', 4)
+    assert sensor.counts['reopened'] == 1
+    assert told[1].startswith('the sensor raised ValueError in test_health.py, line ')
+    assert told[1].endswith(': 4 bytes came. Trying again every 0.2 s')
+    assert reader.fault == ''
+    assert run('..?..', 4)[2][1] == 'is the finger on? Trying again every 0.2 s'
 
 
 def test_a_sensor_that_appears_soon_after_the_start_gives_no_warning(monkeypatch) -> None:

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 from texture_core.config import PARSE_ERRORS, find_file, from_mapping, load_yaml, param, parse_yaml, safe_repr
@@ -59,6 +61,7 @@ QUIET_ATTEMPTS = 25
 Deliver = Callable[[str, TactileSignal], None]
 LogSentence = Callable[[str], None]
 Action = Callable[[], None]
+T = TypeVar('T')
 
 
 class SensorReader:
@@ -112,10 +115,10 @@ class SensorReader:
 
     def _read_until_gone(self) -> None:
         try:
-            self.sensor.open()
+            self._of_sensor(self.sensor.open)
             self._quiet_attempts = 0
             while not self._stop.is_set():
-                for topic, batches in self.sensor.read().items():
+                for topic, batches in self._of_sensor(self.sensor.read).items():
                     self._deliver_all(topic, batches)
                 while self._actions:
                     self._actions.popleft()()
@@ -123,13 +126,25 @@ class SensorReader:
             self.fault = str(error)
             self._warn_once(self.fault)
 
+    def _of_sensor(self, call: Callable[[], T]) -> T:
+        """Return what a call of the sensor does; DeviceError, with type, text and line, whatever else it raises."""
+        try:
+            return call()
+        except DeviceError:
+            raise
+        except Exception as error:  # a sensor may be a user's, and raise anything: this thread must outlive it
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            where = f'{Path(place.filename).name}, line {place.lineno}'
+            raise DeviceError(f'the sensor raised {type(error).__name__} in {where}: {error}') from error
+
     def _warn_once(self, fault: str) -> None:
         """Warn of a fault that was not warned of yet, except in the first attempts."""
         if self._quiet_attempts:
             self._quiet_attempts -= 1
         elif self._warned != fault:
             self._warned = fault
-            self._warn(f'{fault}. Trying again every {RETRY_S} s')
+            stop = '' if fault.endswith(('.', '?', '!')) else '.'
+            self._warn(f'{fault}{stop} Trying again every {RETRY_S} s')
 
     def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
         if batches and self.fault:  # before the first batch is out: who has it may ask for a tare at once
@@ -142,8 +157,6 @@ class SensorReader:
 
 # --------------------
 # Settings of one kind of sensor, beside those of every sensor: from a YAML file, or written in place.
-
-T = TypeVar('T')
 
 
 def load_settings(cls: type[T], config: str) -> T:
