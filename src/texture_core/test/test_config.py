@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import socket
 import sys
 import zipfile
@@ -28,6 +29,7 @@ from texture_core.config import (
     markdown_table,
     open_regular,
     param,
+    parameters_of,
     parse_json,
     parse_yaml,
     read_array,
@@ -54,6 +56,37 @@ def test_a_users_class_is_imported() -> None:
 def test_what_cannot_be_imported_is_said(name: str) -> None:
     with pytest.raises(UnknownName, match='module:Class'):
         find({}, name, 'feature')
+
+
+@pytest.mark.parametrize(
+    ('line', 'error'),
+    [
+        ('1 / 0', 'ZeroDivisionError: division by zero'),
+        ('undefined', "NameError: name 'undefined' is not defined"),
+        ('int("x")', "ValueError: invalid literal for int() with base 10: 'x'"),
+        ('len(3)', "TypeError: object of type 'int' has no len()"),
+        ('import no_such_library', "ModuleNotFoundError: No module named 'no_such_library'"),
+        ('x = = 1', 'SyntaxError: invalid syntax'),
+    ],
+)
+def test_an_error_in_a_users_module_is_told_with_its_file_and_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, error: str
+) -> None:
+    file = tmp_path / 'users_module_with_a_fault.py'
+    file.write_text(f'first = 1\n{line}\n')
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(UnknownName, match=re.escape(f'fails with {error} ({file}:2); mend it there')):
+        find({}, 'users_module_with_a_fault:Thing', 'feature')
+
+
+def test_an_empty_choice_is_not_listed() -> None:
+    @dataclass(frozen=True)
+    class Chosen:
+        sensor: str = param('', "Sensor; '' takes that of the scene.", choices=('', 'tsf85'))
+
+    [item] = parameters_of(Chosen)
+    with pytest.raises(InvalidParameter, match=r'allowed is one of tsf85$'):
+        item.check('x')
 
 
 @pytest.mark.parametrize('name', ['antigravity:fly', 'unittest.__main__:main', 'numpy.__main__:x'])

@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
-from texture_core.ros import declare, on_change, read, warn_of_unknown
+from texture_core.ros import check_names, declare, on_change, read, run
 from texture_core.ros_testing import LocalGraph
 
 pytestmark = pytest.mark.ros
@@ -69,8 +69,24 @@ def test_a_refused_change_is_not_set(make_node: Any) -> None:
 
 
 def test_a_parameter_that_the_node_does_not_know_is_named_in_a_warning(make_node: Any, capfd: Any) -> None:
-    node = make_node(lenght_s=2.0, length_s=2.0)
+    node = make_node(colour=2.0, length_s=2.0)
     declare(node, Params)
-    warn_of_unknown(node)
+    check_names(node)
     [line] = capfd.readouterr().err.splitlines()
-    assert "no parameter 'lenght_s'; did you mean 'length_s'?" in line
+    assert "this has no effect: no parameter 'colour'. Known: " in line
+
+
+@pytest.mark.parametrize('section', ['/**', '/n', '/**/n'])
+def test_a_node_with_a_misspelled_parameter_does_not_start(tmp_path: Any, capfd: Any, section: str) -> None:
+    file = tmp_path / 'robot.yaml'
+    file.write_text(f'{section}:\n  ros__parameters:\n    lenght_s: 2.0\n')
+
+    def n() -> Any:
+        node = rclpy.create_node('n')
+        declare(node, Params)
+        return node
+
+    with pytest.raises(SystemExit) as ended:
+        run(n, ['--ros-args', '--params-file', str(file)])
+    assert ended.value.code == 2
+    assert "n: node 'n' has no parameter 'lenght_s'; did you mean 'length_s'? Correct" in capfd.readouterr().err

@@ -15,6 +15,7 @@ import os
 import stat
 import sys
 import tokenize
+import traceback
 import typing
 import zipfile
 import zlib
@@ -25,7 +26,7 @@ from typing import IO, TYPE_CHECKING, Any, BinaryIO, TypeVar, cast
 
 import yaml
 
-from texture_core.errors import InvalidParameter, MissingLibrary, UnknownName
+from texture_core.errors import InvalidParameter, MissingLibrary, TextureError, UnknownName
 
 if TYPE_CHECKING:
     from texture_core.types import AnyArray
@@ -98,10 +99,28 @@ def _import(name: str, kind: str) -> Any:
         raise UnknownName(f"no {kind} '{name}': '{module}' is a part or a program of Python; name a module of your own")
     try:
         return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
+    except TextureError:
+        raise
+    except Exception as error:  # whatever the user's module does when it is imported
+        place = place_of(error, module)
+        if place and module not in sys.modules:  # else it was imported, and lacks the attribute
+            raise UnknownName(f"no {kind} '{name}': its module fails with {place}; mend it there") from error
         raise UnknownName(
             f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported"
         ) from error
+
+
+def place_of(error: Exception, module: str) -> str:
+    """Return type, text, file and line of an error that was raised in the package of `module`, '' if it was not."""
+    if isinstance(error, SyntaxError):
+        return f'{type(error).__name__}: {error.msg} ({error.filename}:{error.lineno})'
+    package = module.partition('.')[0]
+    places = [
+        f'{frame.f_code.co_filename}:{line}'
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        if frame.f_globals.get('__name__', '').partition('.')[0] == package
+    ]
+    return f'{type(error).__name__}: {error} ({places[-1]})' if places else ''
 
 
 def library(name: str, purpose: str, extra: str) -> Any:
@@ -623,7 +642,7 @@ class Parameter:
     def range_text(self) -> str:
         """The allowed values in words, '' if all are."""
         if self.choices:
-            return 'one of ' + ', '.join(self.choices)
+            return 'one of ' + ', '.join(filter(None, self.choices))  # the description says what '' is for
         unit = f' {self.unit}' if self.unit else ''
         bounds = {
             (True, True): f'{self.low} to {self.high}{unit}',

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import array
 import contextlib
+import difflib
 import json
 import signal
 import socket
@@ -252,12 +253,29 @@ def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
     node.add_on_set_parameters_callback(check)
 
 
-def warn_of_unknown(node: Any) -> None:
-    """Log a warning for each parameter that was given and is unknown: a mistyped limit limits nothing."""
+# Two letters swapped in a short name ('x_hihg_m') are above it, most pairs of different names are below.
+MISSPELLED = 0.85
+
+
+def check_names(node: Any) -> None:
+    """Refuse a parameter that was given and is nearly one of the node's; log a warning for others that are unknown.
+
+    Raises
+    ------
+    InvalidParameter
+        With the nearest name. A mistyped limit limits nothing, and the node would run with its default.
+    """
     declared = set(node._parameters)
     for name in sorted(set(node._parameter_overrides) - declared):
-        if not name.startswith('qos_overrides.'):
-            node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
+        if name.startswith('qos_overrides.'):
+            continue
+        near = difflib.get_close_matches(name, declared, n=1, cutoff=MISSPELLED)
+        if near:
+            raise InvalidParameter(
+                f"node '{node.get_name()}' has no parameter '{name}'; did you mean '{near[0]}'? Correct the name, or, "
+                "if it is another node's, give it in the section of that node"
+            )
+        node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
 
 
 def _needed(item: Parameter) -> str:
@@ -342,7 +360,7 @@ def run(
     node = executor = None
     try:
         node = make_node()
-        warn_of_unknown(node)
+        check_names(node)
         executor = make_executor()
         executor.add_node(node)
         _wake_on_signals(executor)

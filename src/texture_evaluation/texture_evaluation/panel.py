@@ -247,10 +247,8 @@ def _mean(values: list[float]) -> float:
 # --------------------
 # A human panel: people who grade textures from 1 (smooth) to 5 (rough), and how far they agree.
 #
-# The protocol is that of Rispal, Rana & Duchaine, "Texture roughness estimation using dynamic tactile sensing",
-# section
-# III: each person gives every texture a whole grade from 1 to 5 and spreads the textures evenly, 4 to 6 a grade for
-# 25.
+# The protocol is that of Rispal, Rana & Duchaine, "Texture roughness estimation using dynamic tactile sensing", section
+# III: each person gives every texture a whole grade from 1 to 5 and spreads the textures evenly, 4 to 6 a grade for 25.
 
 TEXTURES_PER_GRADE = (4, 6)  # of the paper's 25; other numbers of textures in proportion
 PAPERS_TEXTURES = 25

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from texture_core.errors import DeviceError, MotionRefused, UnknownName
+from texture_core.errors import DeviceError, ExplorationError, MotionRefused, UnknownName
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
@@ -35,6 +35,16 @@ def test_a_second_exploration_at_once_is_refused(explorer):
 def test_an_unknown_motion_is_refused_with_the_nearest_name(explorer):
     with pytest.raises(UnknownName, match="did you mean 'linear_slide'"):
         explorer.begin('one', ExplorationRequest('linear_slid'))
+
+
+def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp_path, monkeypatch):
+    file = tmp_path / 'users_planner.py'
+    file.write_text('def plan(*_):\n    return 1 / 0\n')
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(MotionRefused) as refused:
+        explorer.begin('one', ExplorationRequest('users_planner:plan'))
+    assert refused.value.error == ExplorationError.INVALID_REQUEST
+    assert f'failed with ZeroDivisionError: division by zero ({file}:2); mend it there' in str(refused.value)
 
 
 def test_stopping_lifts_the_finger(explorer):

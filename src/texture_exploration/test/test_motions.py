@@ -143,7 +143,8 @@ def test_a_default_that_is_refused_is_called_one():
 
 def test_a_distance_beyond_both_limits_is_refused_with_the_smaller_one_at_once():
     assert 'distance_m is 2, which' in linear_refusal(distance_m=2.0, speed_m_s=0.05)
-    assert 'at most 0.192 m' in linear_refusal(distance_m=2.0, speed_m_s=0.05)
+    refusal = linear_refusal(distance_m=2.0, speed_m_s=0.05)
+    assert "at most 0.192 m from x 0.000 and y 0.000 m, as 'x_high_m' is 0.2 m" in refusal
 
 
 def test_numbers_that_are_none_are_refused():
@@ -290,7 +291,7 @@ def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(
     request = ExplorationRequest('cross_slide', distance_m=0.4, direction_rad=heading)
     with pytest.raises(MotionRefused, match='the length of each of two legs') as refused:
         cross_slide(request, home, TouchParams(), SafetyLimits())
-    allowed = float(str(refused.value).split()[-2])
+    allowed = float(str(refused.value).partition('is at most ')[2].split()[0])
     assert 0.0 < allowed < 0.3
     fitting = ExplorationRequest('cross_slide', distance_m=allowed, direction_rad=heading)
     cross_slide(fitting, home, TouchParams(), SafetyLimits())

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from texture_core.config import find, param
+from texture_core.config import find, param, place_of
 from texture_core.errors import (
     DeviceError,
     ExplorationError,
@@ -689,6 +689,12 @@ class Explorer:
             except TextureError:
                 self.counts['refused'] += 1
                 raise
+            except Exception as error:  # a fault of a user's planner; nothing has moved
+                self.counts['refused'] += 1
+                told = place_of(error, request.motion.partition(':')[0]) or f'{type(error).__name__}: {error}'
+                raise MotionRefused(
+                    f"planning '{request.motion}' failed with {told}; mend it there", ExplorationError.INVALID_REQUEST
+                ) from error
             self._current = exploration
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
             self._thread.start()
@@ -899,7 +905,8 @@ class Explorer:
     def _check_idle(self) -> None:
         if self._released:
             raise MotionRefused(
-                'the explorer has no control of the arm; configure and activate it (ros2 lifecycle set)',
+                'the explorer has no control of the arm; run `texture activate`, or '
+                '`ros2 lifecycle set` with configure and activate',
                 ExplorationError.NOT_ACTIVE,
             )
         if self.current is not None:

@@ -269,8 +269,7 @@ class SlopeObserver:
 # Stability limit of the force control: predicted from the sampled loop, and found by simulation.
 #
 # The contact integrates the velocity to a force, F' = −k·u; u is held for a period T and comes into effect after a
-# delay
-# of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on the force error e is exactly
+# delay of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on the force error e is exactly
 #
 #     e[n+1] = e[n] + k·T·((1 − γ)·u[n−m] + γ·u[n−m−1]),    s[n+1] = s[n] + T·e[n+1],    u[n] = −g·(e[n] + s[n] / Ti),
 #

@@ -406,7 +406,8 @@ def _check_linear_free_distance(
         allowed = min(allowed, MAX_DISTANCE_M)
         raise MotionRefused(
             f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m to gain and lose '
-            f'speed leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m'
+            f'speed leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m '
+            f'{limits.limits_ahead(home, request.direction_rad)}'
         )
 
 
@@ -565,7 +566,8 @@ def _check_legs(request: ExplorationRequest, home: Vector, limits: SafetyLimits,
     raise MotionRefused(
         f'{request.motion}: distance_m, the length of each of two legs, is {request.distance_m:g}, which with '
         f'{beside_m:.3f} m for the ramps and the corner leaves the workspace; allowed in this direction is at most '
-        f'{math.floor(low * 1000) / 1000:g} m'
+        f'{math.floor(low * 1000) / 1000:g} m '
+        f'{limits.limits_ahead(home, request.direction_rad, request.direction_rad + QUARTER_RAD)}'
     )
 
 

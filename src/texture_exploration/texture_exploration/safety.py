@@ -278,13 +278,21 @@ class SafetyLimits:
 
     def free_distance_m(self, start: Vector, direction_rad: float) -> float:
         """Return how far the finger can go from `start` along the surface before it leaves the workspace, m."""
+        return max(0.0, self._nearest_limit(start, direction_rad)[0])
+
+    def limits_ahead(self, start: Vector, *directions_rad: float) -> str:
+        """Return in words where the finger starts and which limits it meets first in these directions."""
+        names = [self._nearest_limit(start, direction_rad)[1] for direction_rad in directions_rad]
+        told = ' and '.join(f"'{name}' is {getattr(self, name):g} m" for name in dict.fromkeys(names))
+        return f'from x {start[0]:.3f} and y {start[1]:.3f} m, as {told}'
+
+    def _nearest_limit(self, start: Vector, direction_rad: float) -> tuple[float, str]:
         steps = (math.cos(direction_rad), math.sin(direction_rad))
-        rooms = [
-            ((high if step > 0 else low) - at) / step
-            for step, at, (low, high) in zip(steps, start, self.workspace.values(), strict=False)
+        return min(
+            (((high if step > 0 else low) - at) / step, f'{axis}_{"high" if step > 0 else "low"}_m')
+            for step, at, (axis, (low, high)) in zip(steps, start, self.workspace.items(), strict=False)
             if abs(step) > 1e-9
-        ]
-        return max(0.0, min(rooms))
+        )
 
     def force_violation(self, arm: ArmState) -> str:
         """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
@@ -774,7 +782,4 @@ class SignalWatch:
         if not silent:
             return ''
         named = ' and '.join(f"'{topic}'" for topic in silent)
-        return (
-            f'no samples have come on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor, or start the '
-            'explorer with watch_signal:=false to move without one'
-        )
+        return f'no samples have come on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'

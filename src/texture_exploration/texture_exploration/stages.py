@@ -1132,8 +1132,7 @@ class LiftStage(Stage):
 # Lift the finger before a motion begins: after a fault nobody knows whether it still presses.
 #
 # Nobody knows either whether frames and signs are what they are said to be, so that the lift begins with a probe, and
-# is
-# slow and watched to its end.
+# is slow and watched to its end.
 
 CALM_S = 0.15  # at rest; an arm that zeroes its force sensor does so now
 PROBE_M = 0.0005

@@ -303,11 +303,9 @@ def _crossing(load: Array, before: int, level: float) -> float:
 # --------------------
 # Onset of motion from the shift of the spectrum while the finger accelerates.
 #
-# At half the speed all lines of a texture stand at half the frequency. So the spectrum at steady speed, squeezed by
-# the
+# At half the speed all lines of a texture stand at half the frequency. So the spectrum at steady speed, squeezed by the
 # speed of the moment, tells what each short window of the ramp should hold, and the most likely moment of setting off
-# is
-# taken (Whittle's likelihood: the powers of a spectrum are exponentially distributed about their means).
+# is taken (Whittle's likelihood: the powers of a spectrum are exponentially distributed about their means).
 
 # What a vibration channel senses, and the powers of the speed with which the amplitude of one and the same wave of a
 # texture then grows: films that hold their charge and hydrophones feel the force, differentiating channels its change.
@@ -482,12 +480,9 @@ def _fit(powers: Array, expected: Array) -> Array:
 # Segmentation of sliding from tactile signals alone, without force sensor or robot state.
 #
 # A finger at rest gives the sensor's noise; a sliding one gives vibration that grows with its speed. So sliding is
-# where
-# the power stays above that of rest, and its steady part begins one ramp after the power began to grow as it does
-# while a
-# finger gains speed. It ends where the load on the finger begins to fall, or, without channels that follow the load,
-# one
-# ramp before the power is back at rest.
+# where the power stays above that of rest, and its steady part begins one ramp after the power began to grow as it does
+# while a finger gains speed. It ends where the load on the finger begins to fall, or, without channels that follow the
+# load, one ramp before the power is back at rest.
 
 # Rest and sliding are distinguished over 50 ms. A touch or a knock lasts a part of that, sliding most.
 SMOOTHED_PERCENTILE = 70

@@ -38,8 +38,7 @@ from texture_exploration.safety import CommandLimits
 # Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
 #
 # Its calls leave `is_using` set when they fail: one thread alone may use a bus, and after an error the port is made
-# again. Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock
-# to
+# again. Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock to
 # others.
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.

@@ -34,10 +34,8 @@ from texture_exploration.safety import CommandLimits
 # |
 #
 # A state comes 100 times a second. Modes of the pressing motor: 0 it holds (it locks itself), 1 it moves at `value`
-# µm/s,
-# positive away from the surface, 2 it presses until `value` mN are reached, and locks. A motor without an encoder
-# counts
-# the way it was told to go.
+# µm/s, positive away from the surface, 2 it presses until `value` mN are reached, and locks. A motor without an encoder
+# counts the way it was told to go.
 
 VERSION = 1
 MOVE, STOP, CLEAR, STATE = 0xA0, 0xA1, 0xA2, 0x20

@@ -136,9 +136,8 @@ class Watchdog:
 # Send commands to the arm through ur-rtde, one per cycle.
 #
 # All commands pass through the same registers of the controller, which its script reads every 2 ms. Commands that
-# stream
-# are not acknowledged: a second one would overwrite the first before it is read. So each cycle sends one of them, and
-# what must hold is said again and again.
+# stream are not acknowledged: a second one would overwrite the first before it is read. So each cycle sends one of
+# them, and what must hold is said again and again.
 
 TURN_NS = 100_000_000  # in which an arm has turned back
 
@@ -347,10 +346,8 @@ def _mode(ur_command: UrCommand | None) -> Mode:
 # The process that talks to the controller through ur-rtde, so that nothing ur-rtde waits for stops the node.
 #
 # The constructors of ur-rtde hold Python's global lock and wait without a limit, and a command may wait for minutes.
-# Here
-# an alarm of the kernel ends the process when it hangs; the watchdog of the controller then stops the arm. The
-# process
-# ends by itself, with the arm at rest, when its parent is gone.
+# Here an alarm of the kernel ends the process when it hangs; the watchdog of the controller then stops the arm. The
+# process ends by itself, with the arm at rest, when its parent is gone.
 
 VARIABLES = ['timestamp', 'actual_TCP_pose', 'actual_TCP_speed', 'actual_TCP_force', 'safety_mode', 'runtime_state']
 HANGING_S = 2.0  # no command takes so long
