@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sklearn.discriminant_analysis import QuadraticDiscriminantAnalysis
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from texture_benchmarks.disturbances import ROWS, TRAINED, disturbed, simulate
 from texture_benchmarks.places import NEW_PLACES, PATCH_M, SCENE, slides_at
 from texture_benchmarks.places import PLACES as PLACES_TRAINED
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked
-from texture_core.types import NANOSECONDS
+from texture_core.types import NANOSECONDS, Rejection, TextureEstimate
 from texture_estimation.recipe import FAST_TOPIC, Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
@@ -36,6 +39,8 @@ PEERS: Mapping[str, Mapping[str, Any]] = {
     'SVC on log bands': {'svm_rbf': {'c': 10.0}},
     '1-NN on log bands': {'sklearn': {'estimator': 'sklearn.neighbors:KNeighborsClassifier', 'n_neighbors': 1}},
 }
+# A control that sees no signal: whether the textures differ in how the robot slid over them.
+CONTROL = 'force and speed alone'
 PLACES = ('any-place', 'any-place-and-taxels')
 VIBRATION = (*PLACES, 'default', 'onset', 'fast', 'vibration-and-taxels', *PEERS)
 TAXELS = ('taxels-any-day', 'taxels', 'fast', *PEERS)  # `fast` and the peers read the taxels as channels of a vibration
@@ -113,7 +118,9 @@ def _biotac20(options: BenchmarkOptions) -> Iterator[BorderTrial]:
     for place in ('1/2', '2/2'):
         trained = halves.select(EARLIER, where=_having('place', place))
         tested = across_places(halves.select(LATER), trained)
-        yield BorderTrial('biotac20 halves', VIBRATION, trained, {**tested, FINGER: _with_other_finger(tested[SAME])})
+        yield BorderTrial(
+            'biotac20 halves', (*VIBRATION, CONTROL), trained, {**tested, FINGER: _with_other_finger(tested[SAME])}
+        )
     for place in ('1/4', '2/4', '3/4', '4/4'):
         trained = quarters.select(EARLIER, where=_having('place', place, but=True))
         other = {PLACE: across_places(quarters.select(LATER), trained)[PLACE]}
@@ -263,13 +270,39 @@ class SlideAnswer:
     result: SlideResult
 
 
+def control(trial: BorderTrial) -> dict[str, list[SlideAnswer]]:
+    """Return what a Gaussian for each texture says of slides by their mean force and speed; it never says known."""
+
+    def conditions(slides: SlideDataset) -> Any:
+        return np.array([(one.force_n, one.speed_m_s) for one in slides])
+
+    gaussians = make_pipeline(StandardScaler(), QuadraticDiscriminantAnalysis(reg_param=0.01))
+    gaussians.fit(conditions(trial.trained), trial.trained.labels)
+    found = {}
+    for border, slides in trial.tested.items():
+        said = zip(slides, gaussians.predict(conditions(slides)), strict=True)
+        found[border] = [_unknown(one, str(label)) for one, label in said]
+    return found
+
+
+def _unknown(slide: LabelledSlide, label: str) -> SlideAnswer:
+    estimate = TextureEstimate(0, slide.name, label, Rejection.NOVEL)
+    return SlideAnswer(_cluster(slide), SlideResult(slide.surface, [label], [estimate]))
+
+
+def _cluster(slide: LabelledSlide) -> str:
+    return f'{slide.surface} {slide.place or slide.session}'
+
+
 def _try(trials: Sequence[BorderTrial], job: tuple[int, str]) -> dict[str, list[SlideAnswer]]:
+    if job[1] == CONTROL:
+        return control(trials[job[0]])
     trial, recipe = trials[job[0]], recipe_of(job[1])
     model = train(recipe, training_examples(recipe, for_recipe(trial.trained, recipe)))
     found = {}
     for border, slides in trial.tested.items():
         features = for_recipe(slides, recipe).features(recipe.feature_set)
-        clusters = {one.name: f'{one.surface} {one.place or one.session}' for one in slides}
+        clusters = {one.name: _cluster(one) for one in slides}
         results = predict_slides(model, features)
         found[border] = [SlideAnswer(clusters[name], result) for name, result in results.items()]
     return found
@@ -292,6 +325,11 @@ def figures(tested: Sequence[SlideAnswer]) -> dict[str, Any]:
         'slides': len(tested),
         'clusters': len(names),
         **{name: float(np.mean(which)) for name, which in shares.items()},
+        # Where a fabric was recorded more often than others, its clusters are larger: here each counts alike.
+        'mean_of_clusters': {
+            name: float(np.mean(np.bincount(row, which) / np.bincount(row))) for name, which in shares.items()
+        },
+        'slides_of_clusters': dict(zip(names, np.bincount(row).tolist(), strict=True)),
         'decided_wrong': float(np.mean(wrong)),
         'interval': {
             name: interval(np.stack([np.bincount(row, which), np.bincount(row)], axis=1).astype(np.float64))

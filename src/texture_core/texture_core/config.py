@@ -106,7 +106,7 @@ def _import(name: str, kind: str) -> Any:
         if place and module not in sys.modules:  # else it was imported, and lacks the attribute
             raise UnknownName(f"no {kind} '{name}': its module fails with {place}; mend it there") from error
         raise UnknownName(
-            f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported"
+            f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported from PYTHONPATH"
         ) from error
 
 

@@ -212,7 +212,7 @@ def sentence(one: PairedComparison) -> str:
     return (
         f"'{one.second}' against '{one.first}' on {one.n_slides} slides: slides {slides}, windows {windows}; "
         f'{one.only_second} slides are right by it alone, {one.only_first} by the other alone: '
-        f'p = {one.p_value_adjusted:.2g} (exact McNemar test)'
+        f'p = {one.p_value:.2g} (exact McNemar test), {one.p_value_adjusted:.2g} adjusted for all comparisons (Holm)'
     )
 
 
@@ -247,8 +247,9 @@ def summary(report: EvaluationReport) -> list[str]:
         f'slides: {len(report.known)} over surfaces the model knows, {len(report.unknown)} over others',
         f'single windows right: {percent(figures["window_accuracy"])}',
         f'slides right: {", ".join(at) or "no slide is long enough to say"}',
-        f'as soon as decided: {percent(early["accuracy"])} right'
-        + (f', after {early["mean_s"]:.2f} s on average' if early['mean_s'] is not None else ''),
+        f'as soon as decided: {percent(early["accuracy"])} right, after {early["mean_s"]:.2f} s on average'
+        if any(estimate.decided and estimate.known for result in report.known for estimate in result.estimates)
+        else 'as soon as decided: never decided',
         f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
     wrong, unknown = figures['wrong_known'], figures['unknown']

@@ -165,7 +165,7 @@ def test_a_model_card_has_the_facts_and_ranges_of_the_training(tmp_path) -> None
         'recipe': {'description': 'Bands.'},
         'training': {'slides': 8, 'windows': 16, 'held_out_window_accuracy': 0.875},
         'decisions': {'domain': {
-            'sensors': ['tsf85/dynamic'], 'motions': ['linear_slide'], 'speed_m_s': [0.02, 0.1], 'force_n': [1.0, 2.0],
+            'sensors': ['tsf85/dynamic'], 'motions': ['linear_slide'], 'speed_m_s': [0.02, 0.1], 'force_n': None,
             'reach': {
                 'cork': {'sessions': 2, 'places': 3, 'fingers': 1}, 'felt': {'sessions': 1, 'places': 4, 'fingers': 1},
             },
@@ -176,5 +176,6 @@ def test_a_model_card_has_the_facts_and_ranges_of_the_training(tmp_path) -> None
     assert front(tmp_path / 'README.md')['license'] == 'apache-2.0'
     text = (tmp_path / 'README.md').read_text()
     assert '| speed (m/s) | 0.02 to 0.1 |' in text
+    assert '| force (N) | – |' in text  # not measured
     assert '| at least, of each surface | 1 sessions, 3 places, 1 fingers |' in text
     assert '87.5 %' in text

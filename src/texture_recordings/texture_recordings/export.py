@@ -458,8 +458,8 @@ def model_card(path: str | Path, licence: str = 'other') -> str:
             ('trained on', f'{training["slides"]} slides, {training["windows"]} windows'),
             ('sensors', ', '.join(domain['sensors'])),
             ('motions', ', '.join(domain['motions'])),
-            ('speed (m/s)', '{:g} to {:g}'.format(*domain['speed_m_s'])),
-            ('force (N)', '{:g} to {:g}'.format(*domain['force_n'])),
+            ('speed (m/s)', _range(domain['speed_m_s'])),
+            ('force (N)', _range(domain['force_n'])),
         ]
         reach = {name: min(one[name] for one in domain['reach'].values()) for name in ('sessions', 'places', 'fingers')}
         rows.append(('at least, of each surface', ', '.join(f'{count} {name}' for name, count in reach.items())))
@@ -479,6 +479,10 @@ def model_card(path: str | Path, licence: str = 'other') -> str:
 
 
 MAX_CARD_BYTES = 5_000_000
+
+
+def _range(edges: Sequence[float] | None) -> str:
+    return '{:g} to {:g}'.format(*edges) if edges else '–'
 
 
 def _card(facts: Mapping[str, Any], title: str, lines: Sequence[str]) -> str:

@@ -28,7 +28,7 @@ from texture_evaluation.cross_validation import (
 )
 from texture_evaluation.evaluate import evaluate, sentence, summary, table
 from texture_evaluation.workers import dask_backend
-from texture_recordings.dataset import SlideDataset
+from texture_recordings.dataset import SlideDataset, cut_slide
 
 
 def _configure_evaluate(parser: argparse.ArgumentParser) -> None:
@@ -76,6 +76,8 @@ def _cross_validate(options: argparse.Namespace) -> int:
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
     source = partial(_read, [str(Path(bag).absolute()) for bag in bags], options.slides, tuple(topics), split)
     dataset = source()
+    for recipe in recipes:  # one that lacks a stream is refused before the others are computed
+        cut_slide(dataset[0], recipe.feature_set)
     with dask_backend(options.dask) if options.dask else nullcontext():
         # The workers of a cluster read the bags themselves, which all its computers find at the same paths.
         jobs, there = (None, source) if options.dask else (options.jobs, None)
