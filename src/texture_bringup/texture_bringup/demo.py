@@ -497,10 +497,6 @@ def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: Pro
         Surfaces, slides and numbers.
     progress
         Takes what is printed.
-
-    Returns
-    -------
-    bool
     """
     _clear(out)
     progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')

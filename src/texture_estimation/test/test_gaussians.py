@@ -18,7 +18,7 @@ def trained(centres=((0.0, 0.0, 0.0), (6.0, 0.0, 0.0)), spread=1.0):
         [slide(centre, 100 * code + number, spread) for code, centre in enumerate(centres) for number in range(SLIDES)]
     )
     slides = np.repeat(np.arange(SLIDES * len(centres)), WINDOWS)
-    return SlideGaussians.fit(values, slides // SLIDES, slides, overlap=1.0)
+    return SlideGaussians.fit(values, slides // SLIDES, slides, hop_share=1.0)
 
 
 def best(gaussians, values, effective_windows=float(WINDOWS)):

@@ -231,10 +231,6 @@ class ConfidenceFloor:
             Probability of the best label, 0 to 1.
         effective_windows
             Effective window count so far.
-
-        Returns
-        -------
-        bool
         """
         return not self.log_odds or confidence >= 1.0 / (1.0 + math.exp(-self._at(effective_windows)))
 
@@ -320,8 +316,7 @@ class DomainMargins:
 # --------------------
 # How small an error rate the slides held out of a training can show.
 
-LEVEL = 0.05  # the error rate exceeds its upper bound in so many of all trainings
-PERCENT = 100.0
+SIGNIFICANCE = 0.05  # the error rate exceeds its upper bound in so many of all trainings
 MAX_SLIDES = 1_000_000
 
 
@@ -367,7 +362,7 @@ class ErrorBound:
     @cached_property
     def highest_confidence(self) -> float:
         """Largest confidence that the held-out slides can show; 1 if none was held out: nothing is calibrated then."""
-        return float(LEVEL ** (1.0 / self.slides)) if self.slides else 1.0
+        return float(SIGNIFICANCE ** (1.0 / self.slides)) if self.slides else 1.0
 
     @cached_property
     def slides_needed(self) -> float:
@@ -376,7 +371,7 @@ class ErrorBound:
             return 0
         if self.max_error_rate <= 0.0:
             return math.inf
-        return math.ceil(math.log(LEVEL) / math.log1p(-self.max_error_rate))
+        return math.ceil(math.log(SIGNIFICANCE) / math.log1p(-self.max_error_rate))
 
     @cached_property
     def shown(self) -> bool:
@@ -388,7 +383,7 @@ class ErrorBound:
         """Why no slide is ended early, in one sentence; '' if slides are."""
         if self.shown:
             return ''
-        rate = f'at most {PERCENT * self.max_error_rate:g} % wrong decisions'
+        rate = f'at most {100.0 * self.max_error_rate:g} % wrong decisions'
         if math.isinf(self.slides_needed):
             return f'no early stopping: {rate} cannot be shown'
         limit = f'; with {self.slides} the confidence is {self.highest_confidence:.2f} at most' if self.slides else ''
@@ -476,10 +471,6 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
         None if not known.
     margin
         Relative, at both ends.
-
-    Returns
-    -------
-    bool
     """
     if interval is None or math.isnan(value):
         return False
@@ -998,7 +989,7 @@ def slide_scores(
     return scores
 
 
-def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str, Array]:
+def space_means(values: Array, hidden: Array | None, hop_share: float) -> dict[str, Array]:
     """Return the mean of the windows of a slide in each space.
 
     Parameters
@@ -1007,7 +998,7 @@ def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str
         In temporal order.
     hidden : (n_windows, n_hidden) or None
         Outputs of the hidden layer.
-    overlap
+    hop_share
         Distance of two windows over their length, at most 1.
 
     Returns
@@ -1017,15 +1008,15 @@ def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str
     """
     by_space = {FEATURES: values, HIDDEN: hidden, ONSET: values}
     return {
-        space: own[: window_count(SPACES[space], overlap)].mean(axis=0)
+        space: own[: window_count(SPACES[space], hop_share)].mean(axis=0)
         for space, own in by_space.items()
         if own is not None
     }
 
 
-def window_count(effective_windows: float, overlap: float) -> int:
+def window_count(effective_windows: float, hop_share: float) -> int:
     """Return how many windows count as so many that do not overlap."""
-    return 1 + round((effective_windows - 1.0) / overlap)
+    return 1 + round((effective_windows - 1.0) / hop_share)
 
 
 def _conformal(novelty_scores: Array, false_rejection_rate: float) -> float:
@@ -1079,7 +1070,7 @@ class PredictionSets:
             return ''
         return (
             f'too few slides for a prediction set: a coverage of {100 * self.coverage:g} % needs '
-            f'{slides_needed(self.coverage)} slides or more to be held out of the training'
+            f'{slides_for_coverage(self.coverage)} slides or more to be held out of the training'
         )
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
@@ -1094,12 +1085,12 @@ class PredictionSets:
         """
         if not self.thresholds:
             return []
-        thresholds = min(
+        threshold = min(
             float(np.interp(effective_windows, self.effective_window_counts, self.thresholds)),
             float(probabilities.max()),
         )
         order = np.argsort(-probabilities, kind='stable')
-        return [int(number) for number in order if probabilities[number] >= thresholds]
+        return [int(number) for number in order if probabilities[number] >= threshold]
 
 
 def fit_prediction_sets(
@@ -1136,7 +1127,7 @@ def fit_prediction_sets(
     return PredictionSets(coverage, SETS_WINDOWS, tuple(thresholds))
 
 
-def slides_needed(coverage: float) -> int:
+def slides_for_coverage(coverage: float) -> int:
     """Return the smallest number of held-out slides from which sets of this coverage can be fitted."""
     number = max(1, round(1.0 / (1.0 - coverage)) - 1)
     return number if _rank(number, coverage) else number + 1
@@ -1205,10 +1196,6 @@ class StoppingRule:
             Effective window count so far.
         novelty_score
             Novelty score so far.
-
-        Returns
-        -------
-        bool
         """
         growing = EARLY_GROWTH ** (min(effective_windows, MAX_EARLY_WINDOWS) - 1.0)
         limit = min(self.novelty_score, self.early_novelty_score * growing)
@@ -1370,10 +1357,6 @@ class Decisions:
             Effective window count so far.
         novelty_score
             Novelty score so far.
-
-        Returns
-        -------
-        bool
         """
         return self.error_bound.shown and self.stopping_rule.decided(confidence, effective_windows, novelty_score)
 

@@ -186,7 +186,7 @@ class SlideGaussians:
     --------
     >>> values = np.array([0.0, 0.2, 0.1, 0.3, 5.0, 5.2, 5.1, 5.3])[:, None]
     >>> classes, slides = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
-    >>> gaussians = SlideGaussians.fit(values, classes, slides, overlap=1.0)
+    >>> gaussians = SlideGaussians.fit(values, classes, slides, hop_share=1.0)
     >>> three = gaussians.with_added([np.array([[9.0], [9.2]])], np.array([2]))
     >>> three.combined(np.array([0.5, 0.5]), three.window_shares(np.array([9.1]))).round(2).tolist()
     [0.0, 0.0, 1.0]
@@ -201,7 +201,7 @@ class SlideGaussians:
 
     @classmethod
     def fit(
-        cls, values: Array, codes: Codes, slides: Codes, overlap: float, compared: Array | float = 1.0
+        cls, values: Array, codes: Codes, slides: Codes, hop_share: float, compared: Array | float = 1.0
     ) -> SlideGaussians:
         """Return the Gaussians of the trained textures.
 
@@ -211,7 +211,7 @@ class SlideGaussians:
             Features of windows, in temporal order within each slide.
         codes, slides : (n,)
             Number of the texture, from 0, and of the slide of each.
-        overlap
+        hop_share
             Distance of two windows of a slide over their length.
         compared : (n_features,)
             0 for features that are left out.
@@ -227,7 +227,7 @@ class SlideGaussians:
         parts = np.split(values[order], first[1:])
         classes = codes[order][first]
         counts = np.bincount(classes)
-        typical = 1.0 + (float(np.median([len(part) for part in parts])) - 1.0) * overlap
+        typical = 1.0 + (float(np.median([len(part) for part in parts])) - 1.0) * hop_share
         whole = max(WHOLE * typical, LENGTHS[0])
         lengths = (*(length for length in LENGTHS if length < whole), whole)
         variance = SPREAD_FLOOR * np.mean([part.var(axis=0) for part in parts], axis=0)
@@ -243,11 +243,11 @@ class SlideGaussians:
             len(counts),
             np.empty(0, dtype=np.intp),
         )
-        described = [fitted._described(part, overlap) for part in parts]
+        described = [fitted._described(part, hop_share) for part in parts]
         starts = [GaussianClasses.fit(np.stack(rows), classes, counts) for rows in zip(*described, strict=True)]
         return replace(fitted, starts=tuple(map(_of_length, starts, lengths)))
 
-    def with_added(self, slides: Sequence[Array], codes: Codes, overlap: float = 1.0) -> SlideGaussians:
+    def with_added(self, slides: Sequence[Array], codes: Codes, hop_share: float = 1.0) -> SlideGaussians:
         """Return the Gaussians of the trained textures and of these added slides, in place of others added before.
 
         Parameters
@@ -256,7 +256,7 @@ class SlideGaussians:
             Features of the windows of each added slide, in temporal order.
         codes : (n_slides,)
             Number of the label of each.
-        overlap
+        hop_share
             Distance of two windows of a slide over their length.
 
         Returns
@@ -266,7 +266,7 @@ class SlideGaussians:
         added, groups = np.unique(codes, return_inverse=True)
         counts = np.bincount(groups)
         trained = self.trained
-        described = [self._described(values, overlap) for values in slides]
+        described = [self._described(values, hop_share) for values in slides]
         means = [group_means(np.stack(rows), groups) for rows in zip(*described, strict=True)]
         starts = tuple(start.with_classes(mean, counts) for start, mean in zip(trained.starts, means, strict=True))
         single = group_means(np.stack([values.mean(axis=0) for values in slides]), groups)
@@ -349,9 +349,9 @@ class SlideGaussians:
         if not all(np.isfinite(self.shares(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
             raise ValueError('its values are too large to be features')
 
-    def _described(self, values: Array, overlap: float) -> list[Array]:
+    def _described(self, values: Array, hop_share: float) -> list[Array]:
         """Return the descriptor of the start of a slide of each length; the last one is of the whole slide."""
-        ends = [*(window_count(length, overlap) for length in self.lengths[:-1]), len(values)]
+        ends = [*(window_count(length, hop_share) for length in self.lengths[:-1]), len(values)]
         parts = [values[:end] for end in ends]
         return [
             self._descriptor(part.mean(axis=0), part.var(axis=0), length)

@@ -228,11 +228,11 @@ class TextureModel(StoredModel):
             raise ModelMismatch(f"model '{self.name}' holds no training examples, so none can be added; train it again")
         known, windows = self.examples, self.recipe.training_windows
         kept = len(known.codes) / max(int(self.training.get('windows', 0)), len(known.codes))
-        overlap = min(windows.hop_s / windows.length_s / kept, 1.0)
+        hop_share = min(windows.hop_s / windows.length_s / kept, 1.0)
         compared = np.array(
             [name.rsplit('/', 1)[-1] != slide_onset.SLIDE_ONSET for name in self.names], dtype=np.float64
         )
-        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, overlap, compared)
+        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_share, compared)
 
     def validate(self) -> None:
         """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.

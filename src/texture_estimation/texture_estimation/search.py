@@ -273,15 +273,15 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
             kept[rows[deciding_rows(len(rows), rule.group)]] = True
         member, scores = member[kept], scores[kept]
     counts = np.bincount(member)
-    overlap = min(hop_share, 1.0)
+    hop_share = min(hop_share, 1.0)
     order = np.argsort(member, kind='stable')
     place = np.empty(len(member))
     place[order] = np.arange(len(member)) - np.repeat(np.cumsum(counts) - counts, counts)
-    weights = rule.window_weights(1.0 + overlap * place)
+    weights = rule.window_weights(1.0 + hop_share * place)
     evidence = weights[:, None] * rule.window_evidence(log_softmax(scores))
     sums = np.stack([np.bincount(member, weights=column) for column in evidence.T], axis=1)
     means = sums / np.bincount(member, weights=weights)[:, None]
-    effective_windows = 1.0 + overlap * (counts[:, None].astype(np.float64) - 1.0)
+    effective_windows = 1.0 + hop_share * (counts[:, None].astype(np.float64) - 1.0)
     return decisions(rule.log_posterior(means, effective_windows, 1.0)), first
 
 

@@ -356,7 +356,7 @@ def fit_novelty(
     enough = len(names) >= MIN_ALL_SLIDES or (len(names) + 1) * false_rejection_rate >= 1.0
     if fitted.held_out is None or len(counts) < 2 or counts.min() < MIN_NOVELTY_SLIDES or not enough:
         return None
-    overlap = min(examples.hop_s / examples.window_s, 1.0)
+    hop_share = min(examples.hop_s / examples.window_s, 1.0)
     slides = [
         _Slide(number, int(classes[first[number]]), examples.values, np.flatnonzero(groups == number))
         for number in range(len(names))
@@ -372,7 +372,7 @@ def fit_novelty(
             [slide for slide in slides if slide.group not in held_out],
             [copy for copy in copies if copy.group not in held_out],
             predictor,
-            overlap,
+            hop_share,
             compared=compared,
             scores=scores,
         )
@@ -387,7 +387,7 @@ def fit_novelty(
             else:
                 continue
             evidence = rule.window_evidence(log_probabilities)
-            means, effective_windows = _follow(rule, evidence, overlap, trusted)
+            means, effective_windows = _follow(rule, evidence, hop_share, trusted)
             activations = hidden(values) if hidden else None
             found = slide_scores(
                 distances, values, activations, evidence, means=means, effective_windows=effective_windows
@@ -395,7 +395,7 @@ def fit_novelty(
             traces.append(HeldOutSlide(slide.truth, means, effective_windows, found, slide.disturbance))
     final = learner.predictor(fitted.parameters)
     layered = final if hidden_layer(final) else None
-    distances = _fit_distances(slides, copies, layered, overlap, compared=compared, scores=scores)
+    distances = _fit_distances(slides, copies, layered, hop_share, compared=compared, scores=scores)
     held_out_scores = [_scores_at(traces, level) for level in NOVELTY_WINDOWS]
     if min(map(len, held_out_scores)) < MIN_NOVELTY_SLIDES:
         return None
@@ -448,7 +448,7 @@ def _fit_distances(
     slides: Sequence[_Slide],
     copies: Sequence[_Slide],
     predictor: Predictor | None,
-    overlap: float,
+    hop_share: float,
     *,
     compared: Array,
     scores: Collection[str],
@@ -459,7 +459,7 @@ def _fit_distances(
     """
     hidden = hidden_layer(predictor) if predictor is not None and HIDDEN in scores else None
     means, more = (
-        [_space_means(slide.values, hidden, overlap, compared) for slide in those] for those in (slides, copies)
+        [_space_means(slide.values, hidden, hop_share, compared) for slide in those] for those in (slides, copies)
     )
     classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
     spaces = [space for space in means[0] if space in scores]
@@ -473,10 +473,10 @@ def _fit_distances(
 
 
 def _space_means(
-    values: Array, hidden: Callable[[Array], Array] | None, overlap: float, compared: Array
+    values: Array, hidden: Callable[[Array], Array] | None, hop_share: float, compared: Array
 ) -> dict[str, Array]:
-    start = values[: window_count(NOVELTY_WINDOWS[-1], overlap)]  # later windows are in no mean
-    return space_means(compared * start, hidden(start) if hidden else None, overlap)
+    start = values[: window_count(NOVELTY_WINDOWS[-1], hop_share)]  # later windows are in no mean
+    return space_means(compared * start, hidden(start) if hidden else None, hop_share)
 
 
 def _scores_at(traces: Sequence[HeldOutSlide], effective_windows: float) -> Array:
@@ -497,7 +497,7 @@ DEFAULT_TEMPERING_EXPONENT = 0.5
 
 
 def held_out_slides(
-    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, overlap: float
+    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_share: float
 ) -> Sequence[HeldOutSlide]:
     """Return the slides, as evaluated when they were held out; none if nothing was.
 
@@ -509,7 +509,7 @@ def held_out_slides(
         Numbers of the labels and of the slides.
     rule
         Combines the windows of a slide.
-    overlap
+    hop_share
         Time between the starts of two windows over their length, at most 1.
 
     Returns
@@ -523,25 +523,25 @@ def held_out_slides(
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
         if rule.group:
-            followed = _follow_group(rule, window_evidence_rows[rows], overlap)
+            followed = _follow_group(rule, window_evidence_rows[rows], hop_share)
         else:
             trusted = 1.0 if fitted.trusted is None else fitted.trusted[rows]
-            followed = _follow(rule, window_evidence_rows[rows], overlap, trusted)
+            followed = _follow(rule, window_evidence_rows[rows], hop_share, trusted)
         slides.append(HeldOutSlide(int(codes[rows[0]]), *followed))
     return slides
 
 
-def _follow(rule: EvidenceRule, evidence: Array, overlap: float, trusted: Array | float) -> tuple[Array, Array]:
+def _follow(rule: EvidenceRule, evidence: Array, hop_share: float, trusted: Array | float) -> tuple[Array, Array]:
     """Return mean log-evidence and effective window count after each window of a slide."""
-    effective_window_counts = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
+    effective_window_counts = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share
     return running_means(rule, evidence, effective_window_counts, trusted), effective_window_counts
 
 
-def _follow_group(rule: EvidenceRule, evidence: Array, overlap: float) -> tuple[Array, Array]:
+def _follow_group(rule: EvidenceRule, evidence: Array, hop_share: float) -> tuple[Array, Array]:
     """Return the same for a rule by which only some of the windows decide."""
     parts = [deciding_rows(number, rule.group) for number in range(1, len(evidence) + 1)]
     deciding = np.array([len(evidence[part]) for part in parts], dtype=np.float64)
-    return np.stack([evidence[part].mean(axis=0) for part in parts]), 1.0 + (deciding - 1.0) * overlap
+    return np.stack([evidence[part].mean(axis=0) for part in parts]), 1.0 + (deciding - 1.0) * hop_share
 
 
 def fit_tempering_exponent(slides: Sequence[HeldOutSlide], rule: EvidenceRule) -> float:
@@ -672,8 +672,8 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     groups = np.unique(examples.groups, return_inverse=True)[1]
     trained = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
     fitted = fit_learner(trained, examples, codes, groups)
-    overlap = min(examples.hop_s / examples.window_s, 1.0)
-    slides_held_out = held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
+    hop_share = min(examples.hop_s / examples.window_s, 1.0)
+    slides_held_out = held_out_slides(fitted, codes, groups, recipe.evidence, hop_share)
     tempering_exponent = fit_tempering_exponent(slides_held_out, recipe.evidence)
     decisions = recipe.training
     rule, novelty_detector, floor = fit_open_set(trained, fitted, examples, slides_held_out, tempering_exponent)

@@ -766,14 +766,14 @@ class GoHomeStage(Stage):
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
         self._home = home
         self._touch = touch
-        self._timeout_s = limits.approach_timeout_s
+        self._base_timeout_s = limits.approach_timeout_s
         self._speed_m_s = touch.travel_m_s(limits.force_limit_n)
         self._free_n: Vector | None = None
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Allow the time that the way needs."""
         super().begin(time_ns, arm)
-        self.timeout_s = self._timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
+        self.timeout_s = self._base_timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Rise first; then speed up and slow down at half the allowed acceleration.
@@ -900,6 +900,11 @@ class Along(NamedTuple):
         """How long it takes to gain or lose the speed."""
         return self.touch.ramp_s(self.speed_m_s)
 
+    def slowing(self, time_s: float) -> tuple[float, float] | None:
+        """Return the velocity so long after the finger began to lose speed, None once it is at rest."""
+        share = time_s / self.ramp_s
+        return None if share >= 1.0 else self.follower.velocity(self.speed_m_s * smooth(1.0 - share))
+
 
 class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
@@ -1024,12 +1029,11 @@ class BrakeStage(Stage):
         """Follow the ramp down."""
         self._along.follower.update(time_ns, arm)
         touching = self._touches(arm)
-        share = self.elapsed_s(time_ns) / self._along.ramp_s
-        if share >= 1.0:
+        velocity = self._along.slowing(self.elapsed_s(time_ns))
+        if velocity is None:
             if not self._whole:
                 self._along.contact.refuse()
             return None
-        velocity = self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share))
         return ArmCommand(velocity, force_n=self._along.force_n if touching else None)
 
     def _touches(self, arm: ArmState) -> bool:
@@ -1052,10 +1056,8 @@ class Halt(Stage):
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp down."""
         self._along.follower.update(time_ns, arm)
-        share = self.elapsed_s(time_ns) / self._along.ramp_s
-        if share >= 1.0:
-            return None
-        return ArmCommand(self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share)))
+        velocity = self._along.slowing(self.elapsed_s(time_ns))
+        return None if velocity is None else ArmCommand(velocity)
 
 
 class LiftStage(Stage):
@@ -1077,7 +1079,7 @@ class LiftStage(Stage):
         self._goal_m = home[2]
         self._highest_m = home[2]
         self._touch = touch
-        self._timeout_s = limits.lift_timeout_s
+        self._base_timeout_s = limits.lift_timeout_s
         self._growth_n = max(touch.contact_force_n, limits.tangential_floor_n)
         self._gentle_m_s = min(touch.lift_speed_m_s, max(touch.approach_m_s(force_n), LEAST_LIFT_M_S))
         self._lowest_m = self._lowest_n = math.inf
@@ -1089,7 +1091,7 @@ class LiftStage(Stage):
         super().begin(time_ns, arm)
         self._highest_m = max(self._goal_m, arm.position[2] + self._touch.approach_travel_m)
         slower_s_m = 1.0 / self._gentle_m_s - 1.0 / self._touch.lift_speed_m_s
-        self.timeout_s = self._timeout_s + (self._highest_m - arm.position[2]) * slower_s_m
+        self.timeout_s = self._base_timeout_s + (self._highest_m - arm.position[2]) * slower_s_m
         self._lowest_m, self._proven = math.inf, False
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
@@ -1140,10 +1142,10 @@ PROBE_M_S = 0.002
 PROBE_TIMEOUT_S = 2.0
 STILL_M, STILL_S = 0.00005, 0.06  # an arm that moves less in this time stands still
 ASTRAY_M = 0.0002  # beside the commanded way: more than noise and play
-MET = 4.0  # times the change of before: a surface that is left lets the force change less and less
-MOST = 0.65  # of the force limit: no finger that was pressed as asked is left pressed harder
-BACK_S = 0.5
-NOWHERE = ArmState(0, (math.inf,) * 3, (0.0,) * 3, math.nan)
+MET_GROWTH = 4.0  # times the change of before: a surface that is left lets the force change less and less
+MOST_FORCE_SHARE = 0.65  # of the force limit: no finger that was pressed as asked is left pressed harder
+GO_BACK_S = 0.5
+UNKNOWN_STATE = ArmState(0, (math.inf,) * 3, (0.0,) * 3, math.nan)
 PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so where it stands
 
 
@@ -1180,8 +1182,8 @@ class Rise(Stage):
         super().__init__(Phase.APPROACH, limits.lift_timeout_s + longest_m / speed_m_s, 'the finger to be free')
         self._touch = touch
         self._speed_m_s, self._longest_m = speed_m_s, longest_m
-        self._first = NOWHERE
-        self._most_n = MOST * limits.force_limit_n
+        self._first = UNKNOWN_STATE
+        self._most_n = MOST_FORCE_SHARE * limits.force_limit_n
         self._impact_n = IMPACT * force_n
         self._signed = signed  # the sign of the force is not known to be wrong
         self._air = FreeAir(touch.clearance_m, touch.contact_force_n)
@@ -1272,7 +1274,7 @@ class Rise(Stage):
         newly_n = math.dist(arm.force_vector_n, middle.force_vector_n)
         before_n = math.dist(middle.force_vector_n, self._seen[0].force_vector_n)
         noise_n = self._touch.contact_force_n
-        if len(self._seen) == 4 and newly_n > MET * max(before_n, 0.5 * noise_n):
+        if len(self._seen) == 4 and newly_n > MET_GROWTH * max(before_n, 0.5 * noise_n):
             raise WrongWay(
                 f'the finger met something while it rose, the force changed by {newly_n:.2f} N; see what is above it, '
                 'and that the z axis of the surface points away from it',
@@ -1288,14 +1290,14 @@ class GoBack(Stage):
     """Go back down, until the force is again what it was before the rise."""
 
     def __init__(self, before_n: Vector, touch: TouchParams) -> None:
-        super().__init__(Phase.LIFT, BACK_S + 1.0, 'the finger to go back')
+        super().__init__(Phase.LIFT, GO_BACK_S + 1.0, 'the finger to go back')
         self._before_n = before_n
         self._touch = touch
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go down for a short time at most."""
         left_n = math.dist(arm.force_vector_n, self._before_n)
-        if left_n <= self._touch.contact_force_n or self.elapsed_s(time_ns) > BACK_S:
+        if left_n <= self._touch.contact_force_n or self.elapsed_s(time_ns) > GO_BACK_S:
             return None
         return ArmCommand(normal_m_s=-2 * PROBE_M_S)
 
