@@ -194,7 +194,8 @@ class GaussianProcess:
 
     The windows of a texture share its grade and its noise: they are one point, their mean. So three thousand windows of
     fifteen textures are fifteen opinions, not three thousand, and the standard deviation says so. The hyperparameters
-    maximise the marginal likelihood times a wide prior.
+    maximise the marginal likelihood times a wide prior. The line passes through the middle of the scale, 3, at the mean
+    of the training textures, so these should span the scale.
 
     Source: Rasmussen & Williams 2006, sections 2.1 and 5.4.1.
 
@@ -549,9 +550,9 @@ class RoughnessModel(StoredModel):
     >>> inputs = {'signal': {'features': ['mean']}}
     >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
     >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
-    >>> values = np.repeat([1.0, 2.0, 3.0, 4.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> values = np.repeat([1.0, 2.0, 4.0, 5.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
     >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
-    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 3.0, 'jute': 4.0}))
+    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 4.0, 'jute': 5.0}))
     >>> abs(float(model.grade(np.array([2.0]))[0]) - 2.0) < 0.5
     True
     """
@@ -658,9 +659,9 @@ class RoughnessAccumulator:
     >>> inputs = {'signal': {'features': ['mean']}}
     >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
     >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
-    >>> values = np.repeat([1.0, 2.0, 3.0, 4.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> values = np.repeat([1.0, 2.0, 4.0, 5.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
     >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
-    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 3.0, 'jute': 4.0}))
+    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 4.0, 'jute': 5.0}))
     >>> grader = RoughnessAccumulator(model)
     >>> window = FeatureVector(0, 'slide', 0.5, 0.1, ('signal/mean',), np.array([2.0]), feature_set='a1')
     >>> abs(grader.update(window).grade - 2.0) < 0.5

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, TextureError
-from texture_estimation import search
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search import SearchParams
+from texture_evaluation import optimise
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
 from texture_evaluation.train import train_from_bags
@@ -67,7 +67,7 @@ def test_pairs_that_cannot_be_joined_are_written_alone_and_it_is_said_why(
     def refuse(*_: object) -> None:
         raise InvalidParameter("the pairs differ in 'windows'")
 
-    monkeypatch.setattr(search, 'joined_recipe', refuse)
+    monkeypatch.setattr(optimise, 'joined_recipe', refuse)
     wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
     written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
     assert not (tmp_path / 'best.yaml').exists()

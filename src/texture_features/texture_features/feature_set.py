@@ -168,10 +168,10 @@ class InputFeatures:
 
     Examples
     --------
-    >>> item = InputFeatures('signal+signal_static', (('speed', Speed()),))
+    >>> item = InputFeatures('signal+signal_static', (('speed', temporal.Speed()),))
     >>> item.window_names, item.as_mapping()
     (('signal', 'signal_static'), {'features': [{'speed': {}}]})
-    >>> InputFeatures('signal#2', (('speed', Speed()),)).window_names
+    >>> InputFeatures('signal#2', (('speed', temporal.Speed()),)).window_names
     ('signal',)
     """
 
