@@ -260,17 +260,20 @@ MISSPELLED = 0.85
 def check_names(node: Any) -> None:
     """Refuse a parameter that was given and is nearly one of the node's; log a warning for others that are unknown.
 
+    Names in the node's `names_elsewhere`, if it has them, belong to what it did not choose: they are not misspelled.
+
     Raises
     ------
     InvalidParameter
         With the nearest name. A mistyped limit limits nothing, and the node would run with its default.
     """
     declared = set(node._parameters)
+    elsewhere = getattr(node, 'names_elsewhere', ())
     for name in sorted(set(node._parameter_overrides) - declared):
         if name.startswith('qos_overrides.'):
             continue
         near = difflib.get_close_matches(name, declared, n=1, cutoff=MISSPELLED)
-        if near:
+        if near and name not in elsewhere:
             raise InvalidParameter(
                 f"node '{node.get_name()}' has no parameter '{name}'; did you mean '{near[0]}'? Correct the name, or, "
                 "if it is another node's, give it in the section of that node"

@@ -20,7 +20,8 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
-from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, WaitingExecutor, to_msg, to_ns
+from texture_core.errors import InvalidParameter
+from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, WaitingExecutor, check_names, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph, killed_on_error
 from texture_core.types import FingerState, Phase, Rejection, TextureEstimate
 from texture_exploration.nodes.explorer import ExplorerNode
@@ -208,6 +209,12 @@ def test_a_parameter_that_only_counts_at_the_start_is_read_only(world):
     assert world.explorer.get_parameter('arm').value == 'simulated'
     [outcome] = world.explorer.set_parameters([Parameter('settle_s', value=0.2)])
     assert outcome.successful, outcome.reason
+
+
+def test_a_parameter_of_another_arm_is_no_misspelled_one(make_world):
+    check_names(make_world(connect_timeout_s=2.0).explorer)
+    with pytest.raises(InvalidParameter, match="no parameter 'x_hihg_m'; did you mean 'x_high_m'"):
+        check_names(make_world(x_hihg_m=0.1).explorer)
 
 
 def test_without_any_sensor_an_exploration_aborts_by_default_and_says_what_to_check(make_world):

@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
-from texture_core.config import find, param
+from texture_core.config import find, param, parameters_of
 from texture_core.errors import DeviceError, ExplorationError, InvalidData, InvalidParameter, MotionRefused, UnknownName
 from texture_core.ros import (
     ESTIMATE_QOS,
@@ -302,6 +302,11 @@ class ExplorerNode(PatientLifecycleNode):
         if current is not None:  # said here, while this node can still log
             outcome = current.outcome if current.ended.is_set() else STILL_MOVING
             self._log_end(current.exploration_id, outcome)
+
+    @property
+    def names_elsewhere(self) -> set[str]:
+        """Parameters of all arms: one file may serve several, and some names of one are near to ours."""
+        return {item.name for arm in ARMS.values() for item in parameters_of(arm.Params)}
 
     def _make_explorer(self, arm_name: str) -> Explorer:
         arm_class = find(ARMS, arm_name, 'arm')
