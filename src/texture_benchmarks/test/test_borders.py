@@ -4,7 +4,18 @@ from pathlib import Path
 import numpy as np
 
 from texture_benchmarks import borders
-from texture_benchmarks.borders import PEERS, SAME, SlideAnswer, across_places, figures, for_recipe, middles, recipe_of
+from texture_benchmarks.borders import (
+    PEERS,
+    SAME,
+    BorderTrial,
+    SlideAnswer,
+    across_places,
+    control,
+    figures,
+    for_recipe,
+    middles,
+    recipe_of,
+)
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.types import Rejection, TextureEstimate
 from texture_evaluation.metrics import SlideResult
@@ -56,6 +67,21 @@ def test_slides_of_one_track_count_once_for_the_interval() -> None:
     assert found['after_s']['1'] == {'slides': 100, 'right': 0.5, 'known_right': 0.5, 'known_wrong': 0.5}
     assert found['after_s']['5'] is None
     assert found['decided_wrong'] == 0.5
+
+
+def test_a_surface_that_was_recorded_more_often_counts_once_in_the_mean_of_clusters() -> None:
+    tested = [ended('cork', 'cork', known=True, cluster='cork monday')] * 9
+    found = figures([*tested, ended('felt', 'cork', known=True, cluster='felt monday')])
+    assert (found['right'], found['mean_of_clusters']['right']) == (0.9, 0.5)
+    assert found['slides_of_clusters'] == {'cork monday': 9, 'felt monday': 1}
+
+
+def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() -> None:
+    time_s = np.arange(400)[:, None] / RATE_HZ
+    labels, directions = ['cork', 'felt'] * 4, [0.0, 1.5] * 4
+    made = SlideDataset.from_arrays({'signal': [time_s] * 8}, labels, {'signal': RATE_HZ}, direction_rad=directions)
+    found = control(BorderTrial('d', (), made, {SAME: made}), 'direction alone')[SAME]
+    assert all(one.result.end.label == one.result.surface and not one.result.end.known for one in found)
 
 
 def test_a_rejected_slide_is_neither_known_and_right_nor_known_and_wrong() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -39,8 +40,11 @@ PEERS: Mapping[str, Mapping[str, Any]] = {
     'SVC on log bands': {'svm_rbf': {'c': 10.0}},
     '1-NN on log bands': {'sklearn': {'estimator': 'sklearn.neighbors:KNeighborsClassifier', 'n_neighbors': 1}},
 }
-# A control that sees no signal: whether the textures differ in how the robot slid over them.
-CONTROL = 'force and speed alone'
+# Controls that see no signal: whether the textures differ in how the robot slid over them.
+CONTROLS: Mapping[str, Callable[[LabelledSlide], tuple[float, ...]]] = {
+    'force and speed alone': lambda one: (one.force_n, one.speed_m_s),
+    'direction alone': lambda one: (math.cos(one.direction_rad), math.sin(one.direction_rad)),
+}
 PLACES = ('any-place', 'any-place-and-taxels')
 VIBRATION = (*PLACES, 'default', 'onset', 'fast', 'vibration-and-taxels', *PEERS)
 TAXELS = ('taxels-any-day', 'taxels', 'fast', *PEERS)  # `fast` and the peers read the taxels as channels of a vibration
@@ -119,7 +123,7 @@ def _biotac20(options: BenchmarkOptions) -> Iterator[BorderTrial]:
         trained = halves.select(EARLIER, where=_having('place', place))
         tested = across_places(halves.select(LATER), trained)
         yield BorderTrial(
-            'biotac20 halves', (*VIBRATION, CONTROL), trained, {**tested, FINGER: _with_other_finger(tested[SAME])}
+            'biotac20 halves', (*VIBRATION, *CONTROLS), trained, {**tested, FINGER: _with_other_finger(tested[SAME])}
         )
     for place in ('1/4', '2/4', '3/4', '4/4'):
         trained = quarters.select(EARLIER, where=_having('place', place, but=True))
@@ -270,17 +274,14 @@ class SlideAnswer:
     result: SlideResult
 
 
-def control(trial: BorderTrial) -> dict[str, list[SlideAnswer]]:
-    """Return what a Gaussian for each texture says of slides by their mean force and speed; it never says known."""
-
-    def conditions(slides: SlideDataset) -> Any:
-        return np.array([(one.force_n, one.speed_m_s) for one in slides])
-
+def control(trial: BorderTrial, name: str) -> dict[str, list[SlideAnswer]]:
+    """Return what a Gaussian for each texture says of slides by the conditions of a control; it never says known."""
+    conditions = CONTROLS[name]
     gaussians = make_pipeline(StandardScaler(), QuadraticDiscriminantAnalysis(reg_param=0.01))
-    gaussians.fit(conditions(trial.trained), trial.trained.labels)
+    gaussians.fit([conditions(one) for one in trial.trained], trial.trained.labels)
     found = {}
     for border, slides in trial.tested.items():
-        said = zip(slides, gaussians.predict(conditions(slides)), strict=True)
+        said = zip(slides, gaussians.predict([conditions(one) for one in slides]), strict=True)
         found[border] = [_unknown(one, str(label)) for one, label in said]
     return found
 
@@ -295,8 +296,8 @@ def _cluster(slide: LabelledSlide) -> str:
 
 
 def _try(trials: Sequence[BorderTrial], job: tuple[int, str]) -> dict[str, list[SlideAnswer]]:
-    if job[1] == CONTROL:
-        return control(trials[job[0]])
+    if job[1] in CONTROLS:
+        return control(trials[job[0]], job[1])
     trial, recipe = trials[job[0]], recipe_of(job[1])
     model = train(recipe, training_examples(recipe, for_recipe(trial.trained, recipe)))
     found = {}

@@ -6,6 +6,7 @@ import pytest
 
 from texture_core.types import Rejection, TextureEstimate
 from texture_evaluation import metrics
+from texture_evaluation.evaluate import EvaluationReport, summary
 from texture_evaluation.metrics import SlideResult
 
 
@@ -34,6 +35,15 @@ def test_window_accuracy_counts_every_window() -> None:
 @pytest.mark.parametrize(('seconds', 'accuracy'), [(0.5, 0.5), (0.6, 0.0), (0.64, 0.0), (0.7, 0.5), (1.0, 1.0)])
 def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float, accuracy: float) -> None:
     assert metrics.accuracy_at(RESULTS, seconds) == pytest.approx(accuracy)
+
+
+@pytest.mark.parametrize(
+    ('decided_from', 'line'),
+    [(2, 'as soon as decided: 100.0 % right, after 0.70 s on average'), (99, 'as soon as decided: never decided')],
+)
+def test_a_report_says_when_slides_were_decided_or_that_none_was(decided_from: int, line: str) -> None:
+    report = EvaluationReport(('a', 'b'), [slide('a', 'bbaa', decided_from=decided_from)], [], np.ones(4))
+    assert line in summary(report)
 
 
 def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
