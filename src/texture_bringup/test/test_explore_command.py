@@ -60,3 +60,9 @@ def test_the_help_lists_the_motions(capsys):
     with pytest.raises(SystemExit):
         main(['explore', '--help'])
     assert 'linear_slide, ' in ' '.join(capsys.readouterr().out.split())
+
+
+def test_a_check_without_its_model_is_refused_before_an_explorer_is_waited_for(monkeypatch, capsys):
+    monkeypatch.setattr('texture_bringup.commands.explore.slide_over_plate', lambda *_: pytest.fail('the robot moved'))
+    assert main(['check', 'absent']) != 0
+    assert 'absent' in capsys.readouterr().err

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import ModelMismatch
+from texture_core.types import Phase
 from texture_estimation.model import load_model
 from texture_evaluation.check import check_finger
 from texture_evaluation.train import train_from_bags
@@ -39,7 +40,7 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
         check_finger(model, slides[0])
     assert check_finger(model, slides[0], store=True)[0]
     as_trained, sentence = check_finger(model, slides[1])
-    assert as_trained and sentence.startswith('the finger is as trained: signal gain ')
+    assert as_trained and ': signal gain ' in sentence
 
     as_trained, sentence = check_finger(model, louder(slides[2], 2.0))
     assert not as_trained
@@ -59,3 +60,44 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     as_trained, sentence = check_finger(model, slides[4], correct=True)  # the old finger is back
     assert as_trained and sentence.endswith('its correction is removed')
     assert load_model(model).feature_set == plain.feature_set
+
+
+def approached_for_longer(slide, seconds=0.7):
+    """The slide with rest before it: its first samples, quiet, once more."""
+
+    def later(one):
+        quiet = np.random.default_rng(1).standard_normal((round(seconds * one.sampling_rate_hz), one.samples.shape[1]))
+        return replace(one, samples=np.concatenate([0.1 * quiet.astype(np.float32), one.samples]))
+
+    states = [
+        replace(one, stamp_ns=one.stamp_ns + round(seconds * 1e9) * (one.phase is not Phase.APPROACH))
+        for one in slide.states
+    ]
+    signals = {
+        topic: [later(batches[0]), *(replace(one, stamp_ns=one.stamp_ns + round(seconds * 1e9)) for one in batches[1:])]
+        for topic, batches in slide.signals.items()
+    }
+    signals = {
+        topic: [replace(one, first_sample=n) for n, one in zip(starts(batches), batches, strict=True)]
+        for topic, batches in signals.items()
+    }
+    return replace(slide, states=states, signals=signals)
+
+
+def starts(batches):
+    return np.cumsum([0, *(len(one.samples) for one in batches[:-1])]).tolist()
+
+
+def test_noise_and_drift_are_measured_where_there_is_rest_and_else_said_not_to_be(trained):
+    model, slides = trained
+    stored = check_finger(model, slides[0], store=True)[1]
+    assert 'noise and drift were not measured' in stored
+    assert 'NaN' not in model.with_name('three.reference.json').read_text()
+    as_trained, sentence = check_finger(model, slides[1])
+    assert as_trained and sentence.startswith('gain and response are as trained, noise and drift were not measured')
+    assert 'nan' not in sentence
+
+    assert 'not measured' not in check_finger(model, approached_for_longer(slides[0]), store=True)[1]
+    as_trained, sentence = check_finger(model, approached_for_longer(slides[1]))
+    assert as_trained and sentence.startswith('the finger is as trained: signal gain ')
+    assert 'noise × 1.0, drift 0.0 rms' in sentence

@@ -18,6 +18,8 @@ from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
     REFERENCE,
+    RESPONSE_DB,
+    SEGMENT_S,
     Correction,
     InputComparison,
     InputStatistics,
@@ -28,6 +30,8 @@ from texture_features.correction import (
 from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
+REST_S = 1.0  # after the end of the slide, free of the surface
+UNMEASURED = 'noise and drift were not measured, for too little was recorded in free air'
 
 
 def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
@@ -48,14 +52,25 @@ def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, Inpu
 
 
 def _at_rest(slide: LabelledSlide, topic: str) -> Array:
-    """Return the samples before the touch, (n, n_channels); none where the approach was not recorded."""
+    """Return the samples in free air, (n, n_channels): before the touch, or, after a short approach, after the end."""
     approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
     touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
-    batches = slide.signals[topic]
+    ended = [one.stamp_ns for one in slide.states if one.phase is Phase.DONE]
     # The rest ends where the approach does; without an approach nobody knows what was rest.
     until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
-    rest = [one.samples for one in batches if one.end_ns <= until_ns]
-    return np.concatenate(rest).astype(np.float64) if rest else np.empty((0, len(batches[0].channels)))
+    before = _between(slide, topic, 0, until_ns)
+    if len(before) >= SEGMENT_S * slide.signals[topic][0].sampling_rate_hz or not ended:
+        return before
+    return _between(slide, topic, ended[0], ended[0] + round(REST_S * 1e9))
+
+
+def _between(slide: LabelledSlide, topic: str, start_ns: int, end_ns: int) -> Array:
+    """Return the samples between two times: by sample, for the batches of a slide are joined to long ones."""
+    parts = []
+    for one in slide.signals[topic]:
+        first, last = (max(0, int((at - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for at in (start_ns, end_ns))
+        parts.append(one.samples[first:last])
+    return np.concatenate(parts).astype(np.float64)
 
 
 def check_finger(
@@ -84,7 +99,8 @@ def check_finger(
     path = file_beside(model, REFERENCE)
     if store:
         write_json({topic: one.as_mapping() for topic, one in today.items()}, path)
-        return True, f"the slide is stored as the reference of the finger, '{path}'"
+        unknown = '' if all(np.isfinite(one.rest_rms).all() for one in today.values()) else f'; {UNMEASURED}'
+        return True, f"the slide is stored as the reference of the finger, '{path}'{unknown}"
     reference = read_reference(model)
     if missing := sorted(set(topics) - set(reference)):
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
@@ -96,7 +112,9 @@ def check_finger(
         removed = correct and correction.exists()
         if removed:
             correction.unlink()
-        return True, f'the finger is as trained: {_numbers(found)}{"; its correction is removed" if removed else ""}'
+        known = all(one.rest_is_known for one in found.values())
+        claim = 'the finger is as trained' if known else f'gain and response are as trained, {UNMEASURED}'
+        return True, f'{claim}: {_numbers(found)}{"; its correction is removed" if removed else ""}'
     sentence = f'the finger is not as trained: {"; ".join(faults)}'
     if not correct:
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
@@ -106,8 +124,9 @@ def check_finger(
 
 def _numbers(found: Mapping[str, InputComparison]) -> str:
     return ', '.join(
-        f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB, noise '
-        f'× {one.noise_ratio:.1f}, drift {one.drift:.1f} rms'
+        f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB and '
+        f'{one.uneven_db:.1f} dB rms, of which {RESPONSE_DB:g} is allowed'
+        + (f', noise × {one.noise_ratio:.1f}, drift {one.drift:.1f} rms' if one.rest_is_known else '')
         for topic, one in found.items()
     )
 

@@ -111,8 +111,10 @@ class InputStatistics:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return it in the form of JSON."""
+        # JSON has no NaN: what was not measured is null, which numpy reads as NaN.
         return {
-            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in asdict(self).items()
+            name: np.where(np.isnan(value), None, value).tolist() if isinstance(value, np.ndarray) else value
+            for name, value in asdict(self).items()
         }
 
     @classmethod
@@ -161,10 +163,20 @@ class InputComparison:
     dead: tuple[str, ...]
 
     @property
+    def rest_is_known(self) -> bool:
+        """Whether noise and drift were measured."""
+        return math.isfinite(self.noise_ratio) and math.isfinite(self.drift)
+
+    @property
+    def uneven_db(self) -> float:
+        """Difference of the frequency response without the gain, dB rms."""
+        return float(np.sqrt(np.mean((self.response_db - self.gain_db) ** 2)))
+
+    @property
     def faults(self) -> list[str]:
-        """What is not as trained, each in a few words; none if all is."""
+        """What is not as trained, each in a few words; none if all that was measured is."""
         uneven = self.response_db - self.gain_db
-        uneven_db, gain_db = float(np.sqrt(np.mean(uneven**2))), float(np.median(self.gain_db))
+        uneven_db, gain_db = self.uneven_db, float(np.median(self.gain_db))
         at = np.unravel_index(np.abs(uneven).argmax(), uneven.shape)
         found = {
             f'the gain changed by {gain_db:+.1f} dB': abs(gain_db) > GAIN_DB,

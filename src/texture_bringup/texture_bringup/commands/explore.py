@@ -7,6 +7,7 @@ import argparse
 import math
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -29,9 +30,10 @@ from texture_core.types import (
 )
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.next_motion import NextTouchModel, slide_values
-from texture_evaluation.check import adapt_to_today, check_finger
+from texture_evaluation.check import REST_S, adapt_to_today, check_finger
 from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
+from texture_features.correction import read_reference
 from texture_recordings.dataset import SlideDataset
 
 # Option, field of the request, unit or '', meaning.
@@ -298,6 +300,9 @@ def _check(options: argparse.Namespace) -> int:
     if options.today or options.trained:
         print(adapt_to_today(options.model, options.trained or (), options.today or ())[1])
         return 0
+    load_model(options.model)  # what is missing is said before the robot moves
+    if not options.store:
+        read_reference(options.model)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(options.bag) if options.bag else Path(folder) / 'plate'
         if not options.bag:
@@ -321,6 +326,7 @@ def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str) -> 
         operator.wait_for_explorer(10.0)
         with recorder(operator, bag, namespace):
             explored = operator.explore(request)
+            time.sleep(REST_S)  # what the finger says in free air
         if not explored.success:
             raise MotionAborted(f'the slide over the plate failed: {explored.message}')
 
