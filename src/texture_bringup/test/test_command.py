@@ -99,8 +99,8 @@ def test_every_sub_command_explains_itself(name, capsys) -> None:
         (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),
         (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
         (['identify', 'm', '--most', '0'], '--most is 0'),
-        (['identify', '/nowhere'], "model card '/nowhere.json' cannot be read"),
-        (['identify', '/nowhere.npz'], "'/nowhere.npz' was given"),
+        (['identify', '/nowhere'], "there is no model '/nowhere'"),
+        (['identify', '/nowhere.npz'], "there is no model '/nowhere.npz'"),
     ],
 )
 def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:

@@ -19,6 +19,7 @@ from texture_bringup.launcher import (
 )
 from texture_bringup.operator import Operator
 from texture_core import config as resources
+from texture_core.errors import InvalidLaunch, UnknownName
 
 DEADLINE_S = 60.0
 SURFACE = 'ridge_2mm_deep'
@@ -96,9 +97,17 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, two_surfaces, 
 @pytest.mark.parametrize('robot', ROBOTS)
 def test_a_real_robot_comes_without_anything_emulated(robot):
     path = find_launch_file(robot)
-    emulated, real = (read(path, {'emulated': value}, {}) for value in ('true', 'false'))
+    device = {'device': '/dev/finger'}
+    emulated, real = (read(path, {'emulated': value, **device}, {}) for value in ('true', 'false'))
+    with pytest.raises(InvalidLaunch, match="argument 'device' is required"):  # not the place of an emulated one
+        read(path, {'emulated': 'false'}, {})
     assert {node.package for node in emulated} - {node.package for node in real} == {'texture_simulation'}
     assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
+
+
+def test_an_unknown_preset_gets_the_nearest():
+    with pytest.raises(UnknownName, match="'moveit_servo'"):
+        read(find_launch_file('ros_controllers'), {'preset': 'moveit_serv'}, {})
 
 
 @pytest.mark.parametrize('robot', ROBOTS)

@@ -669,7 +669,6 @@ ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
     'launch': (('version',), None),
     'arg': (('name', 'default', 'description', *CONDITIONS), ('choice',)),
     'arg of an include': (('name', 'value'), ()),
-    'choice': (('value',), ()),
     'let': (('name', 'value', *CONDITIONS), ()),
     'set_env': (('name', 'value', *CONDITIONS), ()),
     'push_ros_namespace': (('namespace', *CONDITIONS), ()),
@@ -988,6 +987,9 @@ def _parameters(element: Element, scope: Scope) -> Path | dict[str, Any]:
     if 'name' in element.attrib:
         raise InvalidLaunch(f"<param from='{path}'> has a name, too; the file holds the names")
     if not path.is_file():
+        shipped = path.is_relative_to(config.folder('texture_bringup', 'config'))
+        if shipped:
+            raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
         raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
     return path
 

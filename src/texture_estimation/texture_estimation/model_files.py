@@ -301,6 +301,8 @@ def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
     try:
         card = load_json(path, MAX_CARD_BYTES)
     except (OSError, ValueError) as error:
+        if isinstance(error, FileNotFoundError) and not Path(given).exists():  # else the card alone is missing
+            raise ModelMismatch(f"there is no model '{given}'; give the path of a trained model") from error
         raise ModelMismatch(
             f"model card '{path}' cannot be read: {error}; '{given}' was given; give the path of a trained model"
         ) from error

@@ -19,7 +19,6 @@ from texture_features.correction import (
     CORRECTION,
     REFERENCE,
     RESPONSE_DB,
-    SEGMENT_S,
     Correction,
     InputComparison,
     InputStatistics,
@@ -30,8 +29,7 @@ from texture_features.correction import (
 from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
-REST_S = 1.0  # after the end of the slide, free of the surface
-UNMEASURED = 'noise and drift were not measured, for too little was recorded in free air'
+UNMEASURED = 'noise and drift were not measured, for too little was recorded before the touch'
 
 
 def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
@@ -52,25 +50,15 @@ def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, Inpu
 
 
 def _at_rest(slide: LabelledSlide, topic: str) -> Array:
-    """Return the samples in free air, (n, n_channels): before the touch, or, after a short approach, after the end."""
+    """Return the samples before the touch, (n, n_channels); none where the approach was not recorded."""
     approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
     touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
-    ended = [one.stamp_ns for one in slide.states if one.phase is Phase.DONE]
+    batches = slide.signals[topic]
     # The rest ends where the approach does; without an approach nobody knows what was rest.
     until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
-    before = _between(slide, topic, 0, until_ns)
-    if len(before) >= SEGMENT_S * slide.signals[topic][0].sampling_rate_hz or not ended:
-        return before
-    return _between(slide, topic, ended[0], ended[0] + round(REST_S * 1e9))
-
-
-def _between(slide: LabelledSlide, topic: str, start_ns: int, end_ns: int) -> Array:
-    """Return the samples between two times: by sample, for the batches of a slide are joined to long ones."""
-    parts = []
-    for one in slide.signals[topic]:
-        first, last = (max(0, int((at - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for at in (start_ns, end_ns))
-        parts.append(one.samples[first:last])
-    return np.concatenate(parts).astype(np.float64)
+    # By sample, not by batch: the batches of a slide are joined, so one holds the rest and the touch.
+    counts = [max(0, int((until_ns - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for one in batches]
+    return np.concatenate([one.samples[:count] for one, count in zip(batches, counts, strict=True)]).astype(np.float64)
 
 
 def check_finger(

@@ -113,7 +113,7 @@ class InputStatistics:
         """Return it in the form of JSON."""
         # JSON has no NaN: what was not measured is null, which numpy reads as NaN.
         return {
-            name: np.where(np.isnan(value), None, value).tolist() if isinstance(value, np.ndarray) else value
+            name: np.where(np.isnan(value), np.array(None), value).tolist() if isinstance(value, np.ndarray) else value
             for name, value in asdict(self).items()
         }
 

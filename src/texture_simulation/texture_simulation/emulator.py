@@ -275,7 +275,7 @@ class EmulatorParams:
         choices=('', *LIVE_SENSORS),
     )
     sensor_link: str = param(
-        '/tmp/texture/tsf85',
+        '/tmp/tactile_texture/tsf85',
         'Path of the symbolic link to the emulated sensor, which is the device path of the sensor node.',
     )
     finger: int = param(0, 'Index of the finger of a TSF-85 that touches the surface.', low=0, high=1)

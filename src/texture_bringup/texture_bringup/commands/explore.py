@@ -7,7 +7,6 @@ import argparse
 import math
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -30,7 +29,7 @@ from texture_core.types import (
 )
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.next_motion import NextTouchModel, slide_values
-from texture_evaluation.check import REST_S, adapt_to_today, check_finger
+from texture_evaluation.check import adapt_to_today, check_finger
 from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
 from texture_features.correction import read_reference
@@ -326,7 +325,6 @@ def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str) -> 
         operator.wait_for_explorer(10.0)
         with recorder(operator, bag, namespace):
             explored = operator.explore(request)
-            time.sleep(REST_S)  # what the finger says in free air
         if not explored.success:
             raise MotionAborted(f'the slide over the plate failed: {explored.message}')
 

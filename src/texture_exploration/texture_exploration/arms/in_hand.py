@@ -43,7 +43,7 @@ class InHandParams(CommandLimits):
         high=30.0,
     )
     profile: str = param('leap', 'Profile of a Dynamixel hand: the name of a shipped one or the path of a file.')
-    device: str = param('/tmp/texture/dynamixel', 'Path of the serial device of a Dynamixel hand.')
+    device: str = param('/tmp/tactile_texture/dynamixel', 'Path of the serial device of a Dynamixel hand.')
     torque_off_on_fault: bool = param(
         False,
         'Switches the torque of a Dynamixel hand off, so that it releases the object, when a motor reports a fault.',

@@ -66,7 +66,7 @@ class RailsParams(CommandLimits):
     """Where the rails are, and what their encoders count."""
 
     device: str = param(
-        '/tmp/texture/rails',
+        '/tmp/tactile_texture/rails',
         'Path of the serial device of the rails; the default is that of the emulated rails.',
     )
     baud: int = param(

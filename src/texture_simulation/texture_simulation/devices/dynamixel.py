@@ -420,7 +420,7 @@ def main() -> None:
     """Run an emulated LEAP hand until Ctrl-C, as in `python -m texture_simulation.devices.dynamixel`."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument(
-        'link', type=Path, nargs='?', default=Path('/tmp/texture/dynamixel'), help='device path to make'
+        'link', type=Path, nargs='?', default=Path('/tmp/tactile_texture/dynamixel'), help='device path to make'
     )
     options = parser.parse_args()
     EmulatedDynamixelBus(options.link, leap_hand()).serve_forever()

@@ -327,9 +327,11 @@ class EmulatedRails(EmulatedSerialRobot):
 
 
 def main() -> None:
-    """Run the emulated rails until Ctrl-C, as in `python -m texture_simulation.devices.rails /tmp/texture/rails`."""
+    """Run the emulated rails until Ctrl-C, as in `python -m texture_simulation.devices.rails /tmp/rails`."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument('link', type=Path, nargs='?', default=Path('/tmp/texture/rails'), help='device path to make')
+    parser.add_argument(
+        'link', type=Path, nargs='?', default=Path('/tmp/tactile_texture/rails'), help='device path to make'
+    )
     parser.add_argument('--finger-port', type=int, default=0, help='UDP port of the emulator; 0: none')
     options = parser.parse_args()
     EmulatedRails(options.link, finger_port=options.finger_port).serve_forever()

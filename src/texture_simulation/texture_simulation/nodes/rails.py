@@ -20,7 +20,7 @@ class RailsLinkParams(FingerPortParams):
     """Where the rails are reached, and whom they tell where the finger is."""
 
     link: str = param(
-        '/tmp/texture/rails',
+        '/tmp/tactile_texture/rails',
         'Path of the symbolic link to the emulated rails, which is the device path of the arm.',
     )
 
