@@ -97,4 +97,4 @@ def test_the_finger_is_checked_by_a_slide_over_the_plate(operator, folder, capsy
     assert main(['check', model, '--store', *PLATE]) == 0
     assert 'is stored as the reference of the finger' in capsys.readouterr().out
     assert main(['check', model, *PLATE]) == 0
-    assert 'the finger is as trained' in capsys.readouterr().out
+    assert 'as trained' in capsys.readouterr().out  # a short approach leaves noise and drift unmeasured
