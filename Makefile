@@ -30,6 +30,7 @@ lint: setup
 	@$(RUN) ruff format --check .
 	@$(RUN) mypy
 	@$(RUN) python tools/figures.py --check
+	@$(RUN) python tools/words.py > /dev/null || $(RUN) python tools/words.py
 
 # The checks run beside the tests that need no clock: most of them use one core.
 test: setup

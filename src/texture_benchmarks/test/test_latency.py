@@ -15,7 +15,7 @@ def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_p
         run_benchmark('latancy', BenchmarkOptions(tmp_path))
     for data in (None, tmp_path):
         with pytest.raises(InvalidData, match='no recorded data'):
-            BENCHMARKS['recipes'](BenchmarkOptions(tmp_path, data))
+            BENCHMARKS['borders'](BenchmarkOptions(tmp_path, data))
 
 
 @pytest.mark.benchmark

@@ -70,9 +70,11 @@ def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tm
     figures = json.loads((tmp_path / 'demo/evaluation.json').read_text())
     assert figures['labels'] == ['glass', 'ridge_2mm_deep']
     assert (figures['untrained_speed']['known'], figures['untrained_speed']['decided']) == (False, False)
-    sentence = 'outside what was trained: speed 0.02 m/s, trained 0.05'
-    assert figures['untrained_speed']['message'].startswith(sentence)
-    assert sentence in out.getvalue()
+    message = figures['untrained_speed']['message']
+    slow = re.match(r'outside what was trained: speed ([\d.]+) m/s, trained 0\.05', message)
+    assert slow is not None, message
+    assert float(slow[1]) == pytest.approx(0.02, rel=0.1)
+    assert slow[0] in out.getvalue()
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 
 
@@ -92,7 +94,8 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
         demo.send_signal(signal.SIGINT)
         _, said = demo.communicate(timeout=DEADLINE_S)
     assert demo.returncode == 130
-    assert said == 'texture: interrupted\n'
+    assert said.endswith('texture: interrupted\n')  # a slow start has said what it waits for
+    assert 'Traceback' not in said
     assert len(pids) == 5
     assert not any(Path(f'/proc/{pid}').exists() for pid in pids)
 

@@ -151,7 +151,7 @@ def test_a_model_may_be_given_later_and_a_bad_one_changes_nothing(graph, case, t
     assert node.report()[0] == 'WARN'
     refused = node.set_model(tmp_path / 'none.npz')
     assert not refused.successful
-    assert 'cannot be read' in refused.reason
+    assert 'there is no model' in refused.reason
     assert node.set_model(path).successful
     assert recognised(node.ask(vectors)[-1])
     assert not node.set_model(tmp_path / 'none.npz').successful
@@ -189,7 +189,7 @@ def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_again(g
 
 
 def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
-    with pytest.raises(ModelMismatch, match='cannot be read'):
+    with pytest.raises(ModelMismatch, match='there is no model'):
         NodeUnderTest(graph, case[0], tmp_path / 'none.npz')
 
 

@@ -81,7 +81,7 @@ def refused(path, match):
 
 
 def test_missing_files_are_refused(saved):
-    refused(saved.parent / 'none.npz', 'cannot be read')
+    refused(saved.parent / 'none.npz', 'there is no model')
     saved.unlink()
     refused(saved, 'belongs beside its card')
 

@@ -189,5 +189,5 @@ def test_a_wrong_recipe_model_or_choice_of_channels_is_refused(simulated: Path, 
         train_from_bags('defalt', [simulated])
     with pytest.raises(InvalidParameter, match="'fast' or 'all'"):
         train_from_bags('default', [simulated], channels='slow')
-    with pytest.raises(ModelMismatch, match='cannot be read'):
+    with pytest.raises(ModelMismatch, match='there is no model'):
         load_model(tmp_path / 'none')
