@@ -987,8 +987,7 @@ def _parameters(element: Element, scope: Scope) -> Path | dict[str, Any]:
     if 'name' in element.attrib:
         raise InvalidLaunch(f"<param from='{path}'> has a name, too; the file holds the names")
     if not path.is_file():
-        shipped = path.is_relative_to(config.folder('texture_bringup', 'config'))
-        if shipped:
+        if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
             raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
         raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
     return path
