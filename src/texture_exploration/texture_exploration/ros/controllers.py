@@ -233,7 +233,8 @@ COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fit
 MEASURED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # fits every publisher
 MOST = 10  # messages that are taken at once: only the newest counts
 ARRIVAL_S = 0.2
-DISCOVERY_S = 1.0  # before this node is seen to publish, it looks who else does
+DISCOVERY_S = 1.0  # once the controller is found, and before this node is seen to publish, it looks who else does
+STALL_S = 4.0  # participants announce themselves every 3 s: a controller that is not found by then is not there
 LOOKING_S = 0.05
 UNNAMED = '_NODE_NAME_UNKNOWN_'  # of rmw, until the name of a publisher's node has come, too
 UNNAMED_S = 1.0
@@ -389,11 +390,19 @@ class RosTopics:
 
     def _wait_for_the_command(self) -> None:
         """Take the topics only once nobody else is there; who commands must not be disturbed by being looked at."""
-        begin_s = time.monotonic()
-        while (other := self._other_commander()) or self._unnamed_s or time.monotonic() - begin_s < DISCOVERY_S:
-            if other and time.monotonic() - begin_s > self._params.connect_timeout_s:
+        begin_s, found_s = time.monotonic(), 0.0
+        while True:
+            other, now_s = self._other_commander(), time.monotonic()
+            waited_s = now_s - begin_s
+            if other and waited_s > self._params.connect_timeout_s:
                 self._leave()
                 raise DeviceError(f'{other}; end it first. One of another user that was killed is forgotten after 20 s')
+            # Discovery stalls for seconds after a process was killed: an empty graph is no proof that nobody commands.
+            is_found = self._node.count_subscribers(self._commanded_topics[0])
+            if not found_s and (is_found or waited_s > min(STALL_S, self._params.connect_timeout_s)):
+                found_s = now_s
+            if found_s and now_s - found_s >= DISCOVERY_S and not other and not self._unnamed_s:
+                return
             time.sleep(LOOKING_S)
 
     def _other_commander(self, own: tuple[str, ...] = ()) -> str:
