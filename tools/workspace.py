@@ -143,7 +143,8 @@ def install_packages(sourced: str) -> None:
         missing.write_text('\n'.join(missing_requirements()))
         run(*pip, '-r', missing)
         return
-    run(*pip, '--require-hashes', '-r', LOCK)
+    # The lock is whole. If pip looks for dependencies, it refuses one with extras as soon as a newer release is out.
+    run(*pip, '--no-deps', '--require-hashes', '-r', LOCK)
     # Another package may have brought a newer empy, which shares its folder: the pinned one has the last word.
     empy = VENV / 'empy.txt'
     empy.write_text(re.findall(r'^empy==(?:.*\\\n)*.*\n', LOCK.read_text(), re.MULTILINE)[0])
