@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rules for every test of the repository."""
+"""Rules for every test of the repository, and examples on which tests of several packages train."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 # Files that hold no such test are not imported by `-m realtime` and `-m benchmark`: each worker saves seconds.
@@ -73,3 +75,85 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     if os.environ.get('CI') and skipped and exitstatus == pytest.ExitCode.OK:
         reporter.write_line(f'{len(skipped)} tests were skipped; on the build server every test must run', red=True)
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+FINGERPRINT = 'abcd1234 signal=1000Hz*1'
+SIMULATED_SURFACES = ('glass', 'leather', 'ridge_2mm_deep')
+
+
+def gaussian_examples(
+    *,
+    seed: int = 0,
+    labels: Sequence[str] = ('cork', 'felt', 'wood', 'slate'),
+    slides: int = 4,
+    windows: int = 8,
+    spread: float = 1.0,
+    features: int = 6,
+) -> Any:
+    """Return windows around a centre for each label, with something in common within each slide."""
+    from texture_features.examples import LabelledFeatures  # noqa: PLC0415  # tests of drivers and tools need none
+
+    rng = np.random.default_rng(seed)
+    centres = 2.0 * np.random.default_rng(99).normal(size=(len(labels), features))
+    values, names, groups = [], [], []
+    for centre, label in zip(centres, labels, strict=True):
+        for slide in range(slides):
+            common = centre + 0.3 * spread * rng.normal(size=features)
+            values.append(common + spread * rng.normal(size=(windows, features)))
+            names += [label] * windows
+            groups += [f'{label}/{slide}'] * windows
+    return LabelledFeatures(
+        values=np.concatenate(values),
+        labels=np.array(names),
+        groups=np.array(groups),
+        names=tuple(f'signal/f{number}' for number in range(features)),
+        feature_set=FINGERPRINT,
+        window_s=0.5,
+        hop_s=0.25,
+    )
+
+
+@pytest.fixture(scope='session')
+def make_examples() -> Any:
+    """Return the function that makes labelled windows."""
+    return gaussian_examples
+
+
+@pytest.fixture(scope='session')
+def examples() -> Any:
+    """Return labelled windows of four surfaces."""
+    return gaussian_examples()
+
+
+@pytest.fixture(scope='session')
+def model(examples: Any) -> Any:
+    """Return the default recipe, trained on `examples`."""
+    from texture_estimation.recipe import load_recipe  # noqa: PLC0415
+    from texture_estimation.training import train  # noqa: PLC0415
+
+    return train(load_recipe('default'), examples)
+
+
+@pytest.fixture(scope='session')
+def graded_windows() -> Any:
+    """Return a function that gives values, grades and textures: the first feature tells the grade, the second nothing."""
+
+    def made(n_textures: int = 15, windows: int = 20, spread: float = 0.3, seed: int = 0) -> Any:
+        rng = np.random.default_rng(seed)
+        textures = np.repeat(np.arange(n_textures), windows)
+        grades = (1.0 + np.arange(n_textures) % 5)[textures]
+        values = np.stack([3.0 * grades, np.zeros(len(grades))], axis=1) + spread * rng.normal(size=(len(grades), 2))
+        return values, grades, textures
+
+    return made
+
+
+@pytest.fixture(scope='session')
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of bags: six slides of 1.2 s over each of three simulated surfaces."""
+    from texture_simulation.offline import SlidePlan, write_simulated  # noqa: PLC0415
+
+    folder = tmp_path_factory.mktemp('simulated')
+    plan = SlidePlan(slides=6, slide_s=1.2)
+    write_simulated(folder, plan, np.random.default_rng(5), surfaces=SIMULATED_SURFACES)
+    return folder

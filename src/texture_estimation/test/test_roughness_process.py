@@ -8,23 +8,14 @@ from texture_estimation.roughness import GaussianProcess, RoughnessRecipe, read_
 INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}
 
 
-def graded_windows(n_textures=15, windows=20, spread=0.3, seed=0):
-    """Return values, grades and textures: the first feature tells the grade, the second nothing."""
-    rng = np.random.default_rng(seed)
-    textures = np.repeat(np.arange(n_textures), windows)
-    grades = (1.0 + np.arange(n_textures) % 5)[textures]
-    values = np.stack([3.0 * grades, np.zeros(len(grades))], axis=1) + spread * rng.normal(size=(len(grades), 2))
-    return values, grades, textures
-
-
-def test_far_from_all_textures_the_process_is_less_sure() -> None:
+def test_far_from_all_textures_the_process_is_less_sure(graded_windows) -> None:
     regressor = GaussianProcess()
     predictor = regressor.predictor(regressor.fit(*graded_windows()))
     near, far = (float(predictor(np.array(place))[1]) for place in ([9.0, 0.0], [9.0, 30.0]))
     assert far > near + 0.2
 
 
-def test_more_windows_of_the_same_textures_make_the_process_no_surer() -> None:
+def test_more_windows_of_the_same_textures_make_the_process_no_surer(graded_windows) -> None:
     regressor = GaussianProcess()
     opinions = np.random.default_rng(5).normal(scale=0.8, size=15)
     stds = []
@@ -36,7 +27,7 @@ def test_more_windows_of_the_same_textures_make_the_process_no_surer() -> None:
     assert stds[1] > 0.5
 
 
-def test_a_single_texture_cannot_be_trained_on() -> None:
+def test_a_single_texture_cannot_be_trained_on(graded_windows) -> None:
     with pytest.raises(InvalidData, match='one texture'):
         GaussianProcess().fit(*graded_windows(n_textures=1))
 

@@ -21,15 +21,6 @@ SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/roug
 HEADS = (*REGRESSORS.values(), Ann1, Ann5, Svm5)
 
 
-def graded_windows(n_textures=15, windows=20, spread=0.3, seed=0):
-    """Return values, grades and textures: the first feature tells the grade, the second nothing."""
-    rng = np.random.default_rng(seed)
-    textures = np.repeat(np.arange(n_textures), windows)
-    grades = (1.0 + np.arange(n_textures) % 5)[textures]
-    values = np.stack([3.0 * grades, np.zeros(len(grades))], axis=1) + spread * rng.normal(size=(len(grades), 2))
-    return values, grades, textures
-
-
 def test_the_grade_is_the_mean_of_those_that_fire_and_none_if_none_does() -> None:
     votes = np.array([[0, 0, 1, 0, 0], [0, 1, 1, 0, 0], [1, 0, 0, 0, 1], [0, 0, 0, 0, 0]], dtype=bool)
     np.testing.assert_array_equal(mean_of_votes(votes), [3.0, 2.5, 3.0, np.nan])
@@ -37,7 +28,7 @@ def test_the_grade_is_the_mean_of_those_that_fire_and_none_if_none_does() -> Non
 
 
 @pytest.mark.parametrize('head', HEADS)
-def test_a_head_grades_textures_like_those_it_was_shown(head) -> None:
+def test_a_head_grades_textures_like_those_it_was_shown(head, graded_windows) -> None:
     regressor = head()
     parameters = regressor.fit(*graded_windows())
     kinds = {value.dtype.kind for value in parameters.values() if isinstance(value, np.ndarray)}
@@ -50,7 +41,7 @@ def test_a_head_grades_textures_like_those_it_was_shown(head) -> None:
     assert (std >= 0.0).all()
 
 
-def test_the_machines_decide_as_those_of_scikit_learn() -> None:
+def test_the_machines_decide_as_those_of_scikit_learn(graded_windows) -> None:
     values, grades, textures = graded_windows(spread=3.0)
     regressor = Svm5(c=2.0, kernel_scale=1.5)
     parameters = regressor.fit(values, grades, textures)

@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 
 from texture_core.config import find
+from texture_core.errors import InvalidParameter
+from texture_estimation.search import space_for
 from texture_papers import hu_experiment, jamali_experiment, kaboli_experiment, rispal_experiment, roberge_experiment
 from texture_papers.protocol import Experiment, ExperimentResult, Run, over_seeds
 from texture_papers.report import charts_of, digests, run
@@ -44,6 +46,18 @@ DIGESTS: Mapping[str, Callable[[], Mapping[str, str]]] = {
 __all__ = ['DIGESTS', 'EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment', 'run_over_seeds']
 
 
+def _run_of(name: str, experiment: Experiment) -> Run:
+    """Return what runs an experiment; refused is a search where the paper has none."""
+    found = find(EXPERIMENTS, name, 'experiment')
+    recipes = {method.recipe for task in PROTOCOLS[name].tasks for method in task.methods} if name in PROTOCOLS else ()
+    searches = name == 'roughness' or any(space_for('recipes', recipe) for recipe in recipes)
+    if experiment.tune and not searches:
+        raise InvalidParameter(
+            f"experiment '{name}' has nothing to tune: its paper searches for no parameters; leave --tune out"
+        )
+    return found
+
+
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
     """Run one experiment; return its result and the JSON file, beside which its charts lie.
 
@@ -52,7 +66,7 @@ def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult,
     TextureError
         If there is no such experiment or it cannot be run.
     """
-    result = find(EXPERIMENTS, name, 'experiment')(experiment)
+    result = _run_of(name, experiment)(experiment)
     return result, result.write(experiment.out)
 
 
@@ -78,7 +92,7 @@ def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[Exper
     TextureError
         If there is no such experiment, it cannot be run, or there are fewer than two seeds.
     """
-    result = over_seeds(find(EXPERIMENTS, name, 'experiment'), name, experiment, count, DIGESTS[name]())
+    result = over_seeds(_run_of(name, experiment), name, experiment, count, DIGESTS[name]())
     if name in PROTOCOLS:
         result = replace(result, charts=charts_of(PROTOCOLS[name], result.numbers, name, experiment.out))
     return result, result.write(experiment.out)

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_papers.hu import principal_components
 from texture_papers.protocol import (
@@ -100,15 +99,7 @@ Counts = Mapping[str, Mapping[str, Mapping[str, int]]]  # by scale, direction an
 
 
 def run_components(experiment: Experiment) -> ExperimentResult:
-    """Count the components of each linen in each direction, of magnitudes, powers and their logarithms.
-
-    Raises
-    ------
-    InvalidParameter
-        If a search is asked for.
-    """
-    if experiment.tune:
-        raise InvalidParameter(f"experiment '{NAME}' has nothing to tune; leave --tune out")
+    """Count the components of each linen in each direction, of magnitudes, powers and their logarithms."""
     [task] = PROTOCOL.tasks
     task = replace(task, surfaces=QUICK) if experiment.quick else task
     slides = gather(load_scene(PROTOCOL.scene), task, experiment.seed, slow=False)

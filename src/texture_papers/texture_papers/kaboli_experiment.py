@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes
 from texture_papers.protocol import (
@@ -259,15 +258,7 @@ OLD, NEW = 15, 5  # objects that are trained, and those added later
 
 
 def run_online(experiment: Experiment) -> ExperimentResult:
-    """Train on 15 objects, add one slide of each of five others in turn, and test all: forgetting and cost.
-
-    Raises
-    ------
-    InvalidParameter
-        If a search is asked for.
-    """
-    if experiment.tune:
-        raise InvalidParameter("experiment 'kaboli-online' has nothing to tune; leave --tune out")
+    """Train on 15 objects, add one slide of each of five others in turn, and test all: forgetting and cost."""
     task = RecognitionTask(ALL, VISITS, (), ROUND + VARIOUS)
     slides = gather(load_scene('kaboli'), reduced(task, 40) if experiment.quick else task, experiment.seed, slow=True)
     recipe = recipe_of(Method(PA, learner={'passes': PASSES[-1]}))

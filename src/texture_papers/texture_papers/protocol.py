@@ -107,18 +107,6 @@ def mean(values: Array) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
-def mean_share(values: Array) -> Interval:
-    """Return the mean of shares, such as those of several draws; its interval is cut where no share can lie.
-
-    Parameters
-    ----------
-    values : (n,)
-        Shares, 0 to 1.
-    """
-    found = mean(values)
-    return Interval(found.value, max(found.low, 0.0), min(found.high, 1.0))
-
-
 def apart(first: Array, second: Array) -> Interval:
     """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,).
 
@@ -1095,11 +1083,7 @@ def searched(protocol: PaperProtocol, scene: Scene, params: SearchParams, *, qui
     Returns
     -------
     TunedRecipes
-
-    Raises
-    ------
-    InvalidParameter
-        If the paper searches for none.
+        By task and recipe; empty if the paper searches for none.
     """
     methods = {
         (task.name, method.recipe): (task, method)
@@ -1107,10 +1091,6 @@ def searched(protocol: PaperProtocol, scene: Scene, params: SearchParams, *, qui
         for method in reversed(task.methods)  # of several with one recipe, the first
         if space_for('recipes', method.recipe)
     }
-    if not methods:
-        raise InvalidParameter(
-            f"experiment '{protocol.name}' has nothing to tune: its paper searches for no parameters; leave --tune out"
-        )
     found = {}
     for key, (task, method) in methods.items():
         slides, trained_on = _gathered(protocol, task, scene, params.seed, quick=quick)

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_papers.protocol import (
     BY_WINDOW,
@@ -287,15 +286,7 @@ FRICTION_VISITS = tuple(
 
 
 def run_friction(experiment: Experiment) -> ExperimentResult:
-    """Recognise sheets that differ in friction without it, and with it as a wrench with errors gives it.
-
-    Raises
-    ------
-    InvalidParameter
-        If a search is asked for.
-    """
-    if experiment.tune:
-        raise InvalidParameter("experiment 'friction' has nothing to tune; leave --tune out")
+    """Recognise sheets that differ in friction without it, and with it as a wrench with errors gives it."""
     scene = load_scene(FRICTION_SCENE)
     task = RecognitionTask(FRICTION_TASK, FRICTION_VISITS, ())
     slides = gather(
