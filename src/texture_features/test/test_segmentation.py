@@ -1,6 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-import heapq
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from texture_core.types import NANOSECONDS, Phase, TactileSignal
 from texture_features.segmentation import (
     OnsetModel,
     SegmentationParams,
-    SlideSegmenter,
     find_contacts,
     find_sliding,
     segment_recording,
@@ -156,48 +153,22 @@ def spans(states):
     return [(begun[name], ended[name]) for name in begun]
 
 
-def live(signals, segmenter):
-    """Feed batches in the order of arrival; return the states with the time at which each was told."""
-    tracks = [[(batch.end_ns, topic, batch) for batch in track] for topic, track in signals.items()]
-    reported = [
-        (end_ns, state)
-        for end_ns, topic, batch in heapq.merge(*tracks, key=lambda item: item[0])
-        for state in segmenter.add_signal(topic, batch)
-    ]
-    return reported, segmenter.finish()
-
-
-def test_states_of_a_recording_and_states_reported_live_agree():
+def test_slides_of_a_recording_are_told_with_their_starts_and_ends():
     slides = ((1.0, 2.5), (4.0, 5.0))
     fast, slow = recording(slides, 6.5)
     signals = {'signal': batches(fast, RATE_HZ), 'signal_static': batches(slow, SLOW_HZ)}
-    np.testing.assert_allclose(spans(segment_recording(signals, SegmentationParams())), slides, atol=0.03)
-    reported, rest = live(signals, SlideSegmenter(SegmentationParams()))
-    np.testing.assert_allclose(spans([state for _, state in reported] + rest), slides, atol=0.04)
-    assert not rest  # all was told while the recording went on
-
-
-def test_live_states_come_soon_and_guarantee_only_what_was_measured():
-    fast, slow = recording(((1.0, 3.0),), 4.0)
-    signals = {'signal': batches(fast, RATE_HZ), 'signal_static': batches(slow, SLOW_HZ)}
-    reported, _ = live(signals, SlideSegmenter(SegmentationParams()))
-    sliding = [(at_ns, state) for at_ns, state in reported if state.phase is Phase.SLIDE]
-    assert (sliding[0][0] - START_NS) / NANOSECONDS < 1.7
-    for at_ns, state in sliding:
-        assert state.stamp_ns + state.steady_s * NANOSECONDS <= at_ns
-    ends = [round(state.stamp_ns + state.steady_s * NANOSECONDS) for _, state in sliding]
-    starts = [state.stamp_ns for _, state in sliding]
-    np.testing.assert_allclose(starts[1:], ends[:-1], atol=2)  # what is covered has no gaps
+    states = segment_recording(signals, SegmentationParams())
+    np.testing.assert_allclose(spans(states), slides, atol=0.03)
+    guaranteed_s = [state.steady_s for state in states if state.phase is Phase.SLIDE]
+    np.testing.assert_allclose(guaranteed_s, [end - start for start, end in spans(states)], atol=1e-8)
 
 
 def test_a_sensor_that_restarts_and_one_that_says_nothing_are_survived():
-    segmenter = SlideSegmenter(SegmentationParams())
-    assert segmenter.finish() == []
+    assert segment_recording({'signal': []}, SegmentationParams()) == []
     fast, _ = recording()
-    first = batches(fast, RATE_HZ)
     again = batches(fast, RATE_HZ, START_NS + 10 * NANOSECONDS)
-    states = [state for batch in (*first, *again) for state in segmenter.add_signal('signal', batch)]
-    assert len(spans(states + segmenter.finish())) == 2
+    states = segment_recording({'signal': [*batches(fast, RATE_HZ), *again]}, SegmentationParams())
+    np.testing.assert_allclose(spans(states), [(1.0, 2.0), (11.0, 12.0)], atol=0.03)
 
 
 ONSET_RATE_HZ, RAMP_S, SETS_OFF_S, LENGTH_S = 1000.0, 0.2, 0.3, 1.2
