@@ -136,7 +136,7 @@ def model(examples: Any) -> Any:
 
 @pytest.fixture(scope='session')
 def graded_windows() -> Any:
-    """Return a function that gives values, grades and textures: the first feature tells the grade, the second nothing."""
+    """Return a function that gives values, grades and textures: the first feature tells the grade, the other none."""
 
     def made(n_textures: int = 15, windows: int = 20, spread: float = 0.3, seed: int = 0) -> Any:
         rng = np.random.default_rng(seed)

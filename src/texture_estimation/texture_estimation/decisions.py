@@ -219,8 +219,7 @@ class ConfidenceFloor:
         if not self.log_odds:
             return np.ones(len(confidences), dtype=bool)
         least = np.interp(effective_windows, self.effective_window_counts, self.log_odds)
-        above: Mask = confidences >= 1.0 / (1.0 + np.exp(-least))
-        return above
+        return confidences >= 1.0 / (1.0 + np.exp(-least))
 
     def reached(self, confidence: float, effective_windows: float) -> bool:
         """Return whether a known surface may have so little confidence.
@@ -407,8 +406,7 @@ class ErrorBound:
         if highest <= limit:
             return probabilities
         kept = (limit - equal) / (highest - equal)
-        mixed: Array = equal + kept * (probabilities - equal)
-        return mixed
+        return equal + kept * (probabilities - equal)
 
 
 # --------------------

@@ -86,8 +86,7 @@ class EvidenceRule:
 
     def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
         """Return the probabilities of which `log_posterior` gives the logarithms, (..., n_labels)."""
-        probabilities: Array = np.exp(self.log_posterior(mean_evidence, effective_windows, tempering_exponent))
-        return probabilities
+        return np.exp(self.log_posterior(mean_evidence, effective_windows, tempering_exponent))
 
 
 @dataclass(frozen=True)
@@ -171,8 +170,7 @@ class MajorityVote(EvidenceRule):
         """Return 1 for the best label and 0 for the others; 0 for all if several are best."""
         best = log_probabilities == np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
         alone = np.count_nonzero(best, axis=-1, keepdims=True) == 1
-        votes: Array = (best & alone).astype(np.float64)
-        return votes
+        return (best & alone).astype(np.float64)
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.

@@ -122,8 +122,7 @@ def _scale(samples: Array, deviations: Array, freedom: int) -> Array:
     overall = samples.var(axis=0)
     constant = np.sqrt(overall) <= CONSTANT * np.abs(samples).max(axis=0)
     within = np.square(deviations).sum(axis=0) / max(freedom, 1)
-    scale: Array = np.sqrt(np.where(constant, np.inf, np.maximum(within, MIN_VARIANCE * overall)))
-    return scale
+    return np.sqrt(np.where(constant, np.inf, np.maximum(within, MIN_VARIANCE * overall)))
 
 
 def _projection(deviations: Array, freedom: int, scale: Array) -> Array:
@@ -131,19 +130,16 @@ def _projection(deviations: Array, freedom: int, scale: Array) -> Array:
     from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
 
     if deviations.shape[1] > MAX_CORRELATED:
-        diagonal: Array = 1.0 / scale
-        return diagonal
+        return 1.0 / scale
     products = deviations.T @ deviations / max(freedom, 1)
     covariance = shrunk_covariance(products, PRIOR_SAMPLES / (freedom + PRIOR_SAMPLES))
     np.fill_diagonal(covariance, 1.0)
     variances, directions = eigh(covariance)
-    full: Array = directions / np.sqrt(variances) / scale[:, None]
-    return full
+    return directions / np.sqrt(variances) / scale[:, None]
 
 
 def _projected(samples: Array, projection: Array) -> Array:
-    projected: Array = samples * projection if projection.ndim == 1 else samples @ projection
-    return projected
+    return samples * projection if projection.ndim == 1 else samples @ projection
 
 
 # --------------------

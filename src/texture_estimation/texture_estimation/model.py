@@ -172,8 +172,7 @@ class TextureModel(StoredModel):
         if self.slide_gaussians is None or not self.added_slides:
             return trained
         combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_shares(X))
-        log_probabilities: Array = np.log(np.maximum(combined, LEAST_PROBABILITY))
-        return log_probabilities
+        return np.log(np.maximum(combined, LEAST_PROBABILITY))
 
     def decide(self, X: Array) -> list[str]:
         """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good.

@@ -346,8 +346,7 @@ def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:
     usable = [vector.values for vector in vectors if np.isfinite(vector.values).all()]
     if not usable:
         raise InvalidData(f'none of the {len(vectors)} windows of the slide could be used; slide longer')
-    mean: Array = np.mean(usable, axis=0)
-    return mean
+    return np.mean(usable, axis=0)
 
 
 def _check(made: Sequence[SlideMotion], names: AnyArray, slid: AnyArray) -> None:
@@ -413,8 +412,7 @@ def _scale(values: Array, off: Array, freedom: int) -> Array:
     """Return how much each feature differs between slides, (n_features,); infinite where it is constant."""
     variance = values.var(axis=0)
     constant = np.sqrt(variance) <= 1e-12 * np.abs(values).max(axis=0)
-    scale: Array = np.where(constant, np.inf, np.sqrt((off * off).sum(axis=0) / freedom + SMALLEST * variance))
-    return scale
+    return np.where(constant, np.inf, np.sqrt((off * off).sum(axis=0) / freedom + SMALLEST * variance))
 
 
 def _parts(cells: AnyArray) -> AnyArray:

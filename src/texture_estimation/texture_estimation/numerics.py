@@ -94,8 +94,7 @@ def log_softmax(scores: Array) -> Array:
         Logarithms of probabilities that add up to 1.
     """
     shifted = scores - np.maximum.reduce(scores, axis=-1, keepdims=True)
-    result: Array = shifted - np.log(np.add.reduce(np.exp(shifted), axis=-1, keepdims=True))
-    return result
+    return shifted - np.log(np.add.reduce(np.exp(shifted), axis=-1, keepdims=True))
 
 
 def softmax(scores: Array) -> Array:
@@ -128,8 +127,7 @@ def is_tied(log_probabilities: Array) -> NDArray[np.bool_]:
         True where nothing is decided.
     """
     best = np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
-    shared: NDArray[np.bool_] = np.count_nonzero(log_probabilities == best, axis=-1) > 1
-    return shared
+    return np.count_nonzero(log_probabilities == best, axis=-1) > 1
 
 
 def log_loss(log_probabilities: Array, codes: NDArray[np.intp]) -> float:

@@ -232,8 +232,7 @@ class GaussianProcess:
 
         def covariance(logs: Array) -> Array:
             slope, noise = np.exp(logs)
-            found: Array = slope**2 * products + (noise**2 + JITTER) * np.eye(len(products))
-            return found
+            return slope**2 * products + (noise**2 + JITTER) * np.eye(len(products))
 
         def loss(logs: Array) -> float:
             surprise, of_targets = (logs - PRIOR_MEANS) / PRIOR_SPREAD, covariance(logs)
@@ -508,8 +507,7 @@ class Calibration:
         array of the same shape
             Square of grades.
         """
-        variance: Array = self.scale**2 * (np.square(regressor_std) + self.base_std**2)
-        return variance
+        return self.scale**2 * (np.square(regressor_std) + self.base_std**2)
 
     def window_std(self, regressor_std: Array) -> Array:
         """Return the standard deviation of the grade of a single window.

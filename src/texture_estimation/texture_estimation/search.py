@@ -288,8 +288,7 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
 def nearness(grades: Array, true: Array) -> Array:
     """Return 1 - |error| / 4 of each grade, (n,); 0 for NaN, which is no grade."""
     worst = ROUGH - SMOOTH
-    near: Array = 1.0 - np.minimum(np.abs(np.nan_to_num(grades, nan=np.inf) - true), worst) / worst
-    return near
+    return 1.0 - np.minimum(np.abs(np.nan_to_num(grades, nan=np.inf) - true), worst) / worst
 
 
 @dataclass(frozen=True, eq=False)

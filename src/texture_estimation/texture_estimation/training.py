@@ -122,8 +122,7 @@ def _touch_differences(_recipe: Recipe, examples: LabelledFeatures, _codes: Code
     means = group_means(examples.values, groups)
     unknown = np.full(means.shape[1], np.nan)
     touches = [examples.touches.get(slide, unknown) for slide in np.unique(examples.groups).tolist()]
-    differences: Array = means - np.stack(touches)
-    return differences
+    return means - np.stack(touches)
 
 
 def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:

@@ -144,8 +144,7 @@ def _last_step(rank: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     complete = np.maximum(rank[..., 1:], rank[..., :-1])
     pairs = np.add.reduce(complete[..., None] <= steps, axis=-2)
     peaks = np.minimum(steps + 1 - pairs, count)
-    last: NDArray[np.intp] = peaks.argmax(axis=-1)
-    return last
+    return peaks.argmax(axis=-1)
 
 
 def _largest(inside: Array, owner: NDArray[np.intp], count: int) -> Array:
@@ -281,8 +280,7 @@ def _halve(rows: Array) -> Array:
     """Return the two halves of the spectrum of rows at half the rate, (..., ceil(n_samples / 2), 2)."""
     half = (rows.shape[-1] + 1) // 2
     taps = np.minimum((2 * np.arange(half)[:, None] + np.arange(len(DB4)) - 3) % (2 * half), rows.shape[-1] - 1)
-    halves: Array = np.take(rows, taps, axis=-1) @ FILTERS
-    return halves
+    return np.take(rows, taps, axis=-1) @ FILTERS
 
 
 _PATTERNS = {length: tuple(permutations(range(length))) for length in range(2, 6)}
@@ -471,5 +469,4 @@ def bins_of(values: Array, edges: Array) -> Codes:
     (..., n_features)
         Whole numbers, 0 to n_edges.
     """
-    above: Codes = np.count_nonzero(values[..., None] > edges, axis=-1)
-    return above
+    return np.count_nonzero(values[..., None] > edges, axis=-1)

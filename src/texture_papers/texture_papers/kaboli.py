@@ -99,8 +99,7 @@ class MeanHjorth:
         values = self._per_channel(windows)
         if self.omit:
             values = values[..., windows.without(self.omit), :]
-        means: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
-        return means
+        return np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
 
 
 TINY = 1e-150
@@ -165,8 +164,7 @@ def cell_means(rows: Array, count: int) -> Array:
     if length == count:
         return rows
     starts = -(-np.arange(count) * length // count)
-    means: Array = np.add.reduceat(rows, starts, axis=-1) / np.diff(np.append(starts, length))
-    return means
+    return np.add.reduceat(rows, starts, axis=-1) / np.diff(np.append(starts, length))
 
 
 def ranks(rows: Array) -> Array:
@@ -198,8 +196,7 @@ def _until_next(begins: NDArray[np.bool_], place: NDArray[np.intp]) -> NDArray[n
     ends = np.ones_like(begins)
     ends[..., :-1] = begins[..., 1:]
     backwards = np.where(ends, place, place[-1])[..., ::-1]
-    last: NDArray[np.intp] = np.minimum.accumulate(backwards, axis=-1)[..., ::-1]
-    return last
+    return np.minimum.accumulate(backwards, axis=-1)[..., ::-1]
 
 
 def _mean_correlation(inputs: Sequence[Array]) -> Array:
@@ -212,8 +209,7 @@ def _mean_correlation(inputs: Sequence[Array]) -> Array:
     if not chosen.any():
         return np.zeros(units.shape[:-2])
     products = (units @ units.swapaxes(-1, -2))[..., first[chosen], second[chosen]]
-    mean: Array = np.add.reduce(np.ascontiguousarray(products), axis=-1) / products.shape[-1]
-    return mean
+    return np.add.reduce(np.ascontiguousarray(products), axis=-1) / products.shape[-1]
 
 
 def _unit(rows: Array) -> Array:
@@ -224,8 +220,7 @@ def _unit(rows: Array) -> Array:
     largest = np.abs(rows).max(axis=-1)
     varies = spread > 1e-12 * largest
     scale = np.where(varies, 1.0 / (spread + TINY), 0.0) / np.sqrt(rows.shape[-1])
-    unit: Array = difference * scale[..., None]
-    return unit
+    return difference * scale[..., None]
 
 
 ITERATIONS = 100_000  # of libsvm: a pair that cannot be separated need not be fitted to the last digit
@@ -334,8 +329,7 @@ class LinearPairsPredictor:
         (..., n_pairs)
             Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
         """
-        decisions: Array = (X - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
-        return decisions
+        return (X - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
 
 
 def _svc(standard: Array, y: Codes, c: float) -> Any:

@@ -184,8 +184,7 @@ class MethodResult:
         table = np.zeros((n, n + 1))
         true, said = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
         np.add.at(table, (true, np.where(said == UNDECIDED, n, said)), 1.0)
-        shares: AnyArray = table / np.maximum(table.sum(axis=1, keepdims=True), 1.0)
-        return shares
+        return table / np.maximum(table.sum(axis=1, keepdims=True), 1.0)
 
     def right(self, of: NDArray[np.bool_] | None = None) -> Array:
         """Return how often each slide was recognised when held out, (n_tested,); `of` (n_slides,) chooses.
@@ -252,8 +251,7 @@ class MethodResult:
     def _tested(self, events: NDArray[np.bool_], of: NDArray[np.bool_] | None = None) -> Array:
         chosen = self.tested if of is None else self.tested & of
         times = (~self.trained_on).sum(axis=0)[chosen]
-        shares: Array = (events & ~self.trained_on).sum(axis=0)[chosen] / times
-        return shares
+        return (events & ~self.trained_on).sum(axis=0)[chosen] / times
 
 
 Mask = NDArray[np.bool_]
@@ -504,10 +502,9 @@ def folds(count: int, repeats: int) -> Splitter:
     """Return what holds out each part of the slides in turn, each surface assigned at random, several times."""
 
     def splitter(quick: bool, seed: int) -> BaseCrossValidator:
-        of_all: BaseCrossValidator = RepeatedStratifiedKFold(
+        return RepeatedStratifiedKFold(
             n_splits=2 if quick else count, n_repeats=1 if quick else repeats, random_state=seed
         )
-        return of_all
 
     return _of(splitter)
 
@@ -521,8 +518,7 @@ def training_in(condition: str) -> Splitter:
     """Return what is trained on the slides of one condition and tests on all others."""
 
     def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        trained_on: Mask = (conditions == condition)[None, :]
-        return trained_on
+        return (conditions == condition)[None, :]
 
     return divide
 

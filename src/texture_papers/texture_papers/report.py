@@ -628,5 +628,4 @@ def shares_of(table: Table | None) -> AnyArray:
     counts = np.asarray(table, dtype=np.float64)
     if counts.shape[1] == counts.shape[0]:
         counts = np.column_stack((counts, np.zeros(len(counts))))
-    shares: AnyArray = counts / counts.sum(axis=1, keepdims=True)
-    return shares
+    return counts / counts.sum(axis=1, keepdims=True)

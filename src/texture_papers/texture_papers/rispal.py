@@ -68,8 +68,7 @@ def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
     """
     count = votes.sum(axis=-1)
     total = votes @ GRADES
-    mean: Array = np.divide(total, count, out=np.full(np.shape(total), np.nan), where=count > 0)
-    return mean
+    return np.divide(total, count, out=np.full(np.shape(total), np.nan), where=count > 0)
 
 
 def grade_membership(grades: Array) -> NDArray[np.bool_]:
@@ -84,8 +83,7 @@ def grade_membership(grades: Array) -> NDArray[np.bool_]:
     -------
     (n, 5) bool
     """
-    member: NDArray[np.bool_] = np.rint(grades)[:, None] == GRADES
-    return member
+    return np.rint(grades)[:, None] == GRADES
 
 
 # One of so many windows of each texture tells when to stop: MATLAB holds out 15 %.
@@ -128,8 +126,7 @@ class RegressionNetworks:
             (X - self.mean) / self.scale @ self.hidden.T + self.hidden_bias
         )
         by_network = active.reshape(*active.shape[:-1], *self.out.shape)
-        outputs: Array = (by_network * self.out).sum(axis=-1) + self.out_bias
-        return outputs
+        return (by_network * self.out).sum(axis=-1) + self.out_bias
 
 
 def fit_networks(

@@ -171,8 +171,7 @@ def by_frequency(peaks: Array) -> Array:
         The same in another order.
     """
     found = np.where(peaks[..., 1:] > 0, peaks[..., :1], np.inf)
-    ordered: Array = np.take_along_axis(peaks, np.argsort(found, axis=-2, kind='stable'), axis=-2)
-    return ordered
+    return np.take_along_axis(peaks, np.argsort(found, axis=-2, kind='stable'), axis=-2)
 
 
 def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array]:
@@ -262,8 +261,7 @@ class PairVotes:
         (..., n_labels)
             Whole numbers, 0 to n_labels - 1.
         """
-        wins: Array = first_wins @ self._swing + self._second_wins_all  # type: ignore[attr-defined]
-        return wins
+        return first_wins @ self._swing + self._second_wins_all  # type: ignore[attr-defined]
 
     def counted(self, decisions: Array | NDArray[np.float32], ties: str) -> Array:
         """Return the pairs won, (..., n_labels), of decisions, (..., n_pairs); `ties` is one of TIES.
@@ -298,8 +296,7 @@ class PairVotes:
         Source: scikit-learn's SVC with break_ties and decision_function_shape 'ovr'.
         """
         clearness = decisions @ self._swing  # type: ignore[attr-defined]
-        wins: Array = self.won(decisions > 0) + clearness / (3.0 * (np.abs(clearness) + 1.0))
-        return wins
+        return self.won(decisions > 0) + clearness / (3.0 * (np.abs(clearness) + 1.0))
 
 
 # As MATLAB's trainlm: damping at the start, its steps and its end, and failures on what is held out.
@@ -394,8 +391,7 @@ class Network:
 
     def __call__(self, X: Array) -> Array:
         """Return the output, (n,) of (n, n_features)."""
-        output: Array = self.active(X) @ self.out + self.out_bias
-        return output
+        return self.active(X) @ self.out + self.out_bias
 
     def jacobian(self, values: Array) -> tuple[Array, Array]:
         """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`.

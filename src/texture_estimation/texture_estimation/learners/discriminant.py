@@ -263,16 +263,14 @@ class ForceDiscriminantPredictor:
         """Return how much each window counts, (...) of (..., n_features): less outside the trained forces."""
         force = _log_force(X, self.column)
         beyond = np.maximum(np.maximum(self.trained[0] - force, force - self.trained[1]), 0.0)
-        share: Array = np.exp(-np.minimum(beyond / self.reach, FURTHEST))
-        return share
+        return np.exp(-np.minimum(beyond / self.reach, FURTHEST))
 
 
 def _log_force(X: Array, column: int) -> Array:
     """Return the logarithm of the force of each window, (...); the same for all where none is a feature."""
     if column == UNBOUND:
         return np.zeros(X.shape[:-1])
-    forces: Array = np.log(np.maximum(X[..., column], CONSTANT))
-    return forces
+    return np.log(np.maximum(X[..., column], CONSTANT))
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,7 @@ def hidden_layer(predictor: Predictor) -> Callable[[Array], Array] | None:
     callable or None
         Takes (..., n_features), returns (..., n_hidden).
     """
-    found: Callable[[Array], Array] | None = getattr(predictor, 'activations', None)
-    return found
+    return getattr(predictor, 'activations', None)
 
 
 def trust(predictor: Predictor, X: Array) -> Array:
@@ -176,8 +175,7 @@ def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
     'differences' for what sets slides apart without being of their texture, 'parts' for the sessions, places or fingers
     whose slides are held out together. Most learners take none.
     """
-    names: tuple[str, ...] = getattr(learner, 'extras', ())
-    return names
+    return getattr(learner, 'extras', ())
 
 
 # --------------------

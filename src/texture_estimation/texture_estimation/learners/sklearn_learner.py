@@ -181,16 +181,14 @@ class SklearnPredictor:
         rows = ((X - self.mean) / self.scale).reshape(-1, len(self.mean))
         scores = np.full((len(rows), self.n_labels), np.log(FLOOR / self.n_labels))
         scores[:, self.estimator.classes_] = self._scores(rows)
-        result: Array = log_softmax(scores / self.temperature).reshape(*X.shape[:-1], self.n_labels)
-        return result
+        return log_softmax(scores / self.temperature).reshape(*X.shape[:-1], self.n_labels)
 
     def _scores(self, rows: Array) -> Array:
         if not self.floor:
             return np.asarray(self.estimator.predict_log_proba(rows), dtype=np.float64)
         if hasattr(self.estimator, 'predict_proba'):
             probabilities = np.asarray(self.estimator.predict_proba(rows), dtype=np.float64)
-            scores: Array = np.log((1.0 - self.floor) * probabilities + self.floor / self.n_labels)
-            return scores
+            return np.log((1.0 - self.floor) * probabilities + self.floor / self.n_labels)
         decisions = np.asarray(self.estimator.decision_function(rows), dtype=np.float64)
         return np.stack((-decisions, decisions), axis=-1) if decisions.ndim == 1 else decisions
 

@@ -91,8 +91,7 @@ class PairCoupling:
         against[..., n_pairs:] = margins
         np.minimum(against, LARGEST, out=against)
         odds = np.exp(against, out=against)
-        scores: Array = -np.log1p(odds @ self._sides)  # type: ignore[attr-defined]
-        return scores
+        return -np.log1p(odds @ self._sides)  # type: ignore[attr-defined]
 
 
 def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
@@ -343,8 +342,7 @@ def within_class_whitening(X: Array, y: Codes, groups: Codes, ridge: float, diff
 
 def _mean_square(deviations: Array) -> Array:
     """Return the mean outer product, (n_features, n_features)."""
-    product: Array = deviations.T @ deviations / max(1, len(deviations))
-    return product
+    return deviations.T @ deviations / max(1, len(deviations))
 
 
 # --------------------
