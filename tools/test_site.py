@@ -233,9 +233,10 @@ def said(path: Path) -> Iterator[str]:
 
 def test_the_sentences_in_troubleshooting_are_those_of_the_programs() -> None:
     spoken = '\n'.join(text for path in ROOT.glob('src/texture_*/texture_*/**/*.py') for text in said(path))
-    troubleshooting = (DOCS / 'operate.md').read_text().partition('## Troubleshooting')[2]
-    quoted = re.findall(r'^\| `([^`]+)`', troubleshooting, re.MULTILINE)
-    assert len(quoted) > 20
+    tables = (('operate', '## Troubleshooting'), ('integrate', '## The first ten faults'))
+    rows = '\n'.join((DOCS / f'{page}.md').read_text().partition(heading)[2] for page, heading in tables)
+    quoted = re.findall(r'^\| `([^`]+)`', rows, re.MULTILINE)
+    assert len(quoted) > 30
     assert [sentence for sentence in quoted if sentence not in spoken] == []
 
 

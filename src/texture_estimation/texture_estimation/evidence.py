@@ -74,7 +74,7 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
     return ['' if none else model.labels[index] for index, none in zip(best, tied, strict=True)]
 
 
-NEVER_KNOWN = "recipe '{}' calls nothing known or decided: its features tell the mounting as well as the surface"
+NEVER_KNOWN = "recipe '{}' calls nothing known or decided: its features depend on mounting and surface"
 
 
 class EvidenceAccumulator:

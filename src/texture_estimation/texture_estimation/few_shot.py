@@ -117,7 +117,7 @@ def _covariances(
             across.append(np.sqrt(len(centres) / (len(centres) - 1)) * (np.array(centres) - classes[-1]))
     if not across:
         raise InvalidData(
-            'the training has one session of each surface, which tells nothing of how days differ; train on several '
+            'the training has one session of each surface, which does not show how days differ; train on several '
             'days, or train again with the slides of today'
         )
     deviations, shifts = np.concatenate(inside), np.concatenate(across)

@@ -202,7 +202,7 @@ def read(path: str | Path, *, of: str) -> dict[str, Any]:
         content = read_bounded(arrays_path, MAX_BYTES)
     except (OSError, FileRefused) as error:
         raise ModelMismatch(
-            f"model file '{arrays_path}' cannot be read: {error}; it belongs beside its card"
+            f"model file '{arrays_path}' cannot be read: {error}; it belongs next to its card"
         ) from error
     if hashlib.sha256(content).hexdigest() != tree.get('sha256'):
         raise ModelMismatch(

@@ -138,8 +138,9 @@ class DecisionParams(TrainingParams):
     )
     known: bool = param(
         True,
-        'States whether an estimate may say that a surface is known and decided; false for features that tell a '
-        'mounting as well as a surface: no novelty detector rejects most of their errors on another day.',
+        'States whether an estimate may say that a surface is known and decided; false for features that '
+        'depend on the mounting as well as on the surface: no novelty detector rejects most of their errors on another '
+        'day.',
     )
     low_confidence_rejection_rate: float = param(
         0.0,

@@ -240,7 +240,7 @@ class Wanted:
 
     def __post_init__(self) -> None:
         if self.grades and self.per_pair:
-            raise InvalidParameter('grades are not told pair by pair; leave --per-pair or --grades out')
+            raise InvalidParameter('grades are not decided pair by pair; leave --per-pair or --grades out')
 
 
 def _named_windows(dataset: SlideDataset, plan: FeatureSet) -> Iterator[CutWindow]:

@@ -126,7 +126,7 @@ class SafetyLimits:
     )
     tangential_floor_n: float = param(
         1.0,
-        'Force along the surface that is allowed beside friction; it must exceed the noise of the force sensor.',
+        'Force along the surface that is allowed beyond friction; it must exceed the noise of the force sensor.',
         unit='N',
         low=0.05,
         high=20.0,

@@ -41,7 +41,7 @@ def refuse_other_publishers(node: Node, outputs: Iterable[Publisher], bag: str) 
     if taken:
         raise InvalidData(
             f"another node publishes '{taken[0]}', and the samples of both would be mixed; stop it and start `texture "
-            f'launch replay bag:={bag}`, or play the bag beside it by `texture launch replay bag:={bag} '
+            f'launch replay bag:={bag}`, or play the bag next to it with `texture launch replay bag:={bag} '
             'namespace:=replay`'
         )
 

@@ -284,8 +284,8 @@ class EmulatorParams:
         'Lets the TSF-85 send 64-bit stamps as firmware from 1.1.7 on does; false sends the 16-bit stamps '
         'of older firmware.',
     )
-    daq_link: str = param('', "Path of the link to a data acquisition finger beside the sensor; '' leaves it out.")
-    pvdf_link: str = param('', "Path of the link to a PVDF finger beside the sensor; '' leaves it out.")
+    daq_link: str = param('', "Path of the link to a data acquisition finger next to the sensor; '' leaves it out.")
+    pvdf_link: str = param('', "Path of the link to a PVDF finger next to the sensor; '' leaves it out.")
     plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
     unplugged_finger: int = param(
         -1,

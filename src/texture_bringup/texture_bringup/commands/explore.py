@@ -280,7 +280,7 @@ def _collect(options: argparse.Namespace) -> int:
 
 
 def _configure_check(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument('model', help='path of the model, beside which reference and correction lie')
+    parser.add_argument('model', help='path of the model; reference and correction are next to it')
     parser.add_argument('--store', action='store_true', help='store this slide as that of the finger of the training')
     parser.add_argument('--correct', action='store_true', help='write the correction of gain and response, if needed')
     parser.add_argument('--bag', help='take the last labelled slide of a bag instead of sliding now')

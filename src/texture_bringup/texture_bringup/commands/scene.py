@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture scene`: draw a simulated surface, the way over it, the signal and its spectrum."""
+"""`texture scene`: draw a simulated surface, the path over it, the signal and its spectrum."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RELIEF_COLOURS = 'cividis'
 
 
 def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
-    """Draw surfaces, one in each row: relief with the way of the finger, profile, signal and spectrum.
+    """Draw surfaces, one in each row: relief with the path of the finger, profile, signal and spectrum.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
             _signal(signal, view)
             _spectrum(spectrum, view)
         power = 'its power' + ('; dotted: speed / pitch' if any(view.lines_hz for view in views) else '')
-        for axes, name in zip(rows[0][1:], ('height along the way', 'signal', power), strict=True):
+        for axes, name in zip(rows[0][1:], ('height along the path', 'signal', power), strict=True):
             axes.set_title(name)
         rows[0][1].legend(loc='upper center', bbox_to_anchor=(0.5, -0.3), ncols=2, fontsize=7)
     return Path(path)
@@ -70,7 +70,7 @@ def caption(name: str, sensor: str, plan: ViewPlan) -> str:
     sensor
         Name of the sensor.
     plan
-        Speed, force and way of the finger.
+        Speed, force and path of the finger.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def _relief(axes: Any, view: SceneView) -> Any:
 def _profile(axes: Any, view: SceneView) -> None:
     axes.plot(MM * view.along_m, UM * view.sharp_m, color=COLOURS[4], linewidth=0.8, label='as it is')
     axes.plot(MM * view.along_m, UM * view.blurred_m, color=COLOURS[0], linewidth=1.2, label='as the skin measures it')
-    axes.set(xlabel='way (mm)', ylabel='height (µm)')
+    axes.set(xlabel='path (mm)', ylabel='height (µm)')
     axes.set_xlim(0, MM * view.along_m[-1])
 
 

@@ -112,7 +112,7 @@ def _activating(active: bool) -> tuple[Callable[[argparse.ArgumentParser], None]
 
 
 activate = Command('configure and activate nodes: sensor and arm begin to work', *_activating(True))
-deactivate = Command('deactivate nodes: sensor and arm are let go, the nodes stay', *_activating(False))
+deactivate = Command('deactivate nodes: sensor and arm are released, the nodes stay', *_activating(False))
 
 # --------------------
 # Parameters.

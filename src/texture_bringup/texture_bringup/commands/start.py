@@ -114,4 +114,4 @@ launch = Command('start the nodes of a launch file', _configure_launch, _launch)
 dashboard = Command(
     'show a web page of the live estimates, with buttons to explore and stop', _configure_dashboard, _dashboard
 )
-demo = Command('the whole thing on an emulator: explore, learn, recognise, report', _configure_demo, _demo)
+demo = Command('run everything on an emulator: explore, train, recognise, report', _configure_demo, _demo)

@@ -311,7 +311,7 @@ class SklearnLearner:
             estimator = cls()
         except TypeError as error:
             raise InvalidParameter(
-                f"'{self.estimator}' needs other estimators as parameters ({error}); name one that stands alone"
+                f"'{self.estimator}' needs other estimators as parameters ({error}); name one that works alone"
             ) from error
         known = estimator.get_params()
         for name, _ in self.parameters:

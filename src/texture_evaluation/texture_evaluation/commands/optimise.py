@@ -32,7 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--all-halves', action='store_true', help='evaluate every individual on all, not only the best')
     parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
     add_dask(parser)
-    parser.add_argument('--resume', action='store_true', help='go on from the checkpoint beside FILE')
+    parser.add_argument('--resume', action='store_true', help='continue from the checkpoint next to FILE')
     add_slides(parser)
     add_channels(parser)
     add_seed(parser)

@@ -80,4 +80,4 @@ def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
 
 
 def _saved_as(out: Path) -> str:
-    return f'saved as {out.with_name(out.name.removesuffix(".npz"))}.npz, with its card beside it'
+    return f'saved as {out.with_name(out.name.removesuffix(".npz"))}.npz, with its card next to it'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture experiment`: rebuild a paper's experiment: its figures beside ours."""
+"""`texture experiment`: rebuild a paper's experiment: its figures next to ours."""
 
 from __future__ import annotations
 

@@ -299,7 +299,7 @@ class PtyPort:
             self.unplug()
             raise DeviceError(
                 f"the link '{self.link}' to the emulated device cannot be made: {error}; choose a path in a folder "
-                'that you may write to, where no other file stands'
+                'that you may write to, where there is no other file'
             ) from error
 
     def unplug(self) -> None:
