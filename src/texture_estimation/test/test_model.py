@@ -83,7 +83,7 @@ def refused(path, match):
 def test_missing_files_are_refused(saved):
     refused(saved.parent / 'none.npz', 'there is no model')
     saved.unlink()
-    refused(saved, 'belongs beside its card')
+    refused(saved, 'belongs next to its card')
 
 
 @pytest.mark.parametrize('keep', [0, 10, 1000])
