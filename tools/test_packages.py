@@ -77,7 +77,7 @@ for name in sys.argv[2:]:
 OPTIONAL = {
     'texture_recordings': {
         'python3-scipy': {'public_sets', 'tables'},
-        'texture_features': {'commands.convert', 'dataset', 'segment', 'tables'},
+        'texture_features': {'commands.convert', 'dataset', 'segment'},
     }
 }
 # What launch files need, which no module imports.

@@ -29,7 +29,7 @@ from texture_recordings.bags import (
     encode,
     find_bags,
     read_bag,
-    read_raw,
+    read_named,
     topics_in,
     typestore,
 )
@@ -114,7 +114,7 @@ def test_topics_are_chosen_by_the_last_part_of_their_name(tmp_path: Path) -> Non
         bag.write('signal', signal(), 1)
         bag.write('features', VALUES[2][1], 2)
     assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', ('features',))] == ['features']
-    assert [message.topic for message in read_raw(tmp_path / 'bag')] == ['/left/signal', '/left/features']
+    assert [message.topic for _, message in read_named(tmp_path / 'bag')] == ['/left/signal', '/left/features']
 
 
 def test_of_several_namespaces_one_must_be_named(tmp_path: Path) -> None:
@@ -237,7 +237,7 @@ def test_a_last_chunk_whose_content_never_reached_the_disk_is_left_out(tmp_path:
 def test_a_bag_that_was_cut_or_has_a_flipped_bit_is_refused_or_read_as_it_was_written(tmp_path: Path) -> None:
     bag = write(tmp_path / 'bag')
     file = bag / 'bag.mcap'
-    good, written = file.read_bytes(), list(read_raw(bag))
+    good, written = file.read_bytes(), list(read_named(bag))
     random = np.random.default_rng(3)
     damaged = [good[:size] for size in random.integers(0, len(good), 20)]
     for place, bit in zip(random.integers(0, len(good), 150), random.integers(0, 8, 150), strict=True):
@@ -246,7 +246,7 @@ def test_a_bag_that_was_cut_or_has_a_flipped_bit_is_refused_or_read_as_it_was_wr
     for content in damaged:
         file.write_bytes(content)
         try:
-            assert list(read_raw(bag)) == written
+            assert list(read_named(bag)) == written
         except InvalidData:
             refused += 1
     assert refused > len(damaged) // 2

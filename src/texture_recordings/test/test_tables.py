@@ -108,16 +108,6 @@ def test_a_row_of_names_or_units_within_a_slide_is_malformed_and_ends_none(tmp_p
     assert report.malformed_rows == 2 * 6
 
 
-def test_short_holes_are_interpolated_if_wanted(tmp_path: Path) -> None:
-    mapping = mapping_of(tmp_path, ('unit: g\n', 'unit: g\n    repair_s: 0.02\n'))
-    report = run(
-        tmp_path, mapping, {FIRST_STROKE + 10: 'x;stroke 1;1;1;2;150', FIRST_STROKE + 11: 'x;stroke 1;x;1;2;150'}
-    )
-    assert report.streams['signal'].repaired == 1 * 6  # an unreadable time alone makes no sample bad
-    [samples, *_], _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
-    assert samples[11, 0] == pytest.approx((samples[10, 0] + samples[12, 0]) / 2, abs=1e-6)
-
-
 def test_a_gap_in_time_is_a_jump_of_the_index_and_counted(tmp_path: Path, mapping: TableMapping) -> None:
     recorded = recordings(files=1, jitter_ms=0.5)
     for one in recorded:
@@ -134,20 +124,6 @@ def test_times_that_go_back_within_a_slide_are_left_out_and_counted(tmp_path: Pa
     recorded[0].time_ms[FIRST_STROKE + 50] -= 500.0
     report = import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
     assert report.streams['signal'].disordered == 1
-
-
-def test_interpolation_believes_the_times(tmp_path: Path) -> None:
-    mapping = mapping_of(
-        tmp_path,
-        ('{column: t, unit: ms}', '{column: t, unit: ms, spacing: interpolated}'),
-        ('unit: g\n', 'unit: g\n    rate_hz: 100\n'),
-    )
-    recorded = recordings(files=1, jitter_ms=3.0)
-    for one in recorded:  # a ramp by the times as stamped
-        one.channels[:, 0] = one.time_ms - 5e6
-    import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
-    samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
-    np.testing.assert_allclose(np.diff(samples[0][:, 0]), 0.01, atol=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -192,7 +168,7 @@ def test_a_label_that_changes_within_a_slide_is_refused_with_its_row(tmp_path: P
             {'streams': {'signal': {'columns': ['a'], 'time': {'unit': 'h'}}}},
             'time: parameter .unit. is .h.; allowed is',
         ),
-        ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, time, detection'),
+        ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, time'),
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
         ({'files': '{a}{b}.csv'}, 'fields without text between'),
         ([], 'a mapping of parameter names to values is needed'),
@@ -267,20 +243,6 @@ def test_a_pause_or_a_time_that_begins_again_ends_a_slide(tmp_path: Path) -> Non
         'slides': {'by': 'pause', 'pause_s': 1.0},
     })  # fmt: skip
     assert lengths(save(tmp_path, x=np.arange(370.0), t=time_s), mapping) == [100, 150, 120]
-
-
-def test_sliding_is_detected_where_the_signal_is_above_that_at_rest(tmp_path: Path) -> None:
-    rng = np.random.default_rng(0)
-    sliding = np.zeros(8000, dtype=bool)
-    sliding[1500:3500] = sliding[5000:7000] = True
-    samples = rng.normal(size=8000) * np.where(sliding, 20.0, 1.0)
-    mapping = mapping_from({
-        'streams': {'signal': {'columns': ['x'], 'rate_hz': 1000.0}}, 'label': {'value': 'cork'},
-        'slides': {'by': 'detection'},
-    })  # fmt: skip
-    found = lengths(save(tmp_path, x=samples), mapping)
-    assert len(found) == 2
-    assert all(1400 <= length <= 2100 for length in found)
 
 
 def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> None:

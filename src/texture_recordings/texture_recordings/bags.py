@@ -10,7 +10,9 @@ import struct
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any, BinaryIO, NamedTuple, get_type_hints
 from zlib import crc32
@@ -548,10 +550,10 @@ def _no_bag(path: Path) -> str:
     return f"'{path}' is no bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
 
 
-def read_raw(
+def read_named(
     path: str | Path, namespace: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
-) -> Iterator[RawMessage]:
-    """Yield every message of a bag in the order of its log times, undecoded.
+) -> Iterator[tuple[str, RawMessage]]:
+    """Yield every message of a bag in the order of its log times, undecoded, with the name of its topic.
 
     Parameters
     ----------
@@ -564,36 +566,13 @@ def read_raw(
 
     Yields
     ------
-    RawMessage
-        Topic, type, log time in ns and bytes.
+    (str, RawMessage)
+        Name below the namespace, 'signal' or 'finger0/signal', and the message: topic, type, log time in ns and bytes.
 
     Raises
     ------
     InvalidData
         If there is no bag, it is damaged or foreign, or has several namespaces and none was named.
-    """
-    return (message for _, message in read_named(path, namespace, start_ns, stop_ns))
-
-
-def read_named(
-    path: str | Path, namespace: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
-) -> Iterator[tuple[str, RawMessage]]:
-    """Yield what `read_raw` yields, each with the name of its topic below its namespace, 'signal' or 'finger0/signal'.
-
-    Parameters
-    ----------
-    path, namespace, start_ns, stop_ns
-        As of `read_raw`.
-
-    Yields
-    ------
-    (str, RawMessage)
-        Name below the namespace, and the message.
-
-    Raises
-    ------
-    InvalidData
-        As `read_raw` does.
     """
     return _read(Path(path), lambda connection, name: True, namespace, start_ns, stop_ns)
 
@@ -609,7 +588,7 @@ def read_bag(
 
     Only messages of the suite are read. Topics are named as below their namespace, 'signal' for '/left/signal' and
     'finger0/signal' for the first of several fingers, in `topics` as in the answer; samples are views of the bytes
-    read. The other arguments are those of `read_raw`.
+    read. The other arguments are those of `read_named`.
 
     Parameters
     ----------
@@ -655,12 +634,12 @@ def topics_in(path: str | Path, namespace: str | None = None) -> list[str]:
     Parameters
     ----------
     path, namespace
-        As of `read_raw`.
+        As of `read_named`.
 
     Raises
     ------
     InvalidData
-        As `read_raw` does.
+        As `read_named` does.
     """
     names: set[str] = set()
 
@@ -784,6 +763,50 @@ class Continuity:
 
 
 # --------------------
+# Slides of others, which have no log times and mostly no stamps: these are made up.
+
+START_NS, PAUSE_NS = 1_000_000_000 * NANOSECONDS, NANOSECONDS  # where the first slide begins, and between two of them
+BATCH_S = 0.1
+DELAY_NS = 100_000  # a batch is logged this long after its last sample
+
+
+def slide_batches(
+    like: TactileSignal,
+    samples: Array,
+    index: NDArray[Any],
+    start_ns: int,
+    *,
+    batch_s: float = BATCH_S,
+    edges: Iterable[int] = (),
+) -> Iterator[TactileSignal]:
+    """Yield the samples of a slide in batches; each loss and each edge begins a new one.
+
+    Parameters
+    ----------
+    like
+        Names sensor, channels, units, rate and frame; its first sample is the running index of the start.
+    samples : (n, n_channels)
+        Of the whole slide.
+    index : (n,)
+        Place of each on an even grid from the start of the slide on; it jumps where samples were lost.
+    start_ns
+        Start of the slide.
+    batch_s
+        Longest time that a batch covers.
+    edges
+        Rows at which phases begin.
+    """
+    rate_hz, first = like.sampling_rate_hz, like.first_sample
+    step = max(1, round(batch_s * rate_hz))
+    borders = {0, *edges, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
+    for begin, end in pairwise(sorted(borders)):
+        for row in range(begin, end, step):
+            place, part = int(index[row]), samples[row : min(row + step, end)].astype(np.float32)
+            stamp_ns = start_ns + round(place / rate_hz * NANOSECONDS)
+            yield replace(like, stamp_ns=stamp_ns, first_sample=first + place, samples=part)
+
+
+# --------------------
 # Write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed.
 
 FOREVER = QosTime(2147483647, 4294967295)
@@ -876,6 +899,11 @@ class BagWriter:
             Time at which it is logged, ns.
         """
         self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
+
+    def write_all(self, messages: Iterable[tuple[int, str, Any]]) -> None:
+        """Write (log time in ns, topic, data class) in the order of the log times."""
+        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
+            self.write(topic, value, log_ns)
 
     def write_raw(self, message: RawMessage) -> None:
         """Write a message that is CDR already."""

@@ -9,7 +9,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +18,7 @@ from texture_core.cli import progress
 from texture_core.config import Arrays, open_regular, unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal
-from texture_recordings.bags import BagWriter
+from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, slide_batches
 from texture_recordings.dataset import parse_selection
 
 # --------------------
@@ -100,11 +99,9 @@ PAC_PER_FRAME = 22
 PAC_COLUMNS = slice(3, 3 + PAC_PER_FRAME)
 STATIC_CHANNELS = ('tdc', 'tac', 'pdc', *(f'electrode{i}' for i in range(1, 20)))
 STATIC_COLUMNS = (0, 1, 2, *range(25, 44))
-BATCH_FRAMES = 2
+BIOTAC_BATCH_S = 0.02
 STATE_BATCHES = 5  # a state every 0.1 s
 LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a loss
-PAUSE_NS = NANOSECONDS
-DELAY_NS = 100_000  # a batch is logged this long after its last sample
 FIELDS = ('frames', 'frame_time', 'velocity', 'wrench')
 
 
@@ -205,55 +202,45 @@ def restore_sign(rectified: AnyArray) -> Array:
 
 
 def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices: AnyArray, channels: str) -> None:
-    """Write one slide: a state, then the samples of each batch, then the end; `indices` number the frames."""
-    frames = recording.frames[: len(indices)]
-    vibration = restore_sign(frames[:, PAC_COLUMNS].ravel()).astype(np.float32)[:, None]
-    static = frames[:, STATIC_COLUMNS].astype(np.float32)
-    named = recording.named()
-    stop_ns = start_ns + int(indices[-1] - indices[0] + 1) * FRAME_NS
-    for count, part in enumerate(_batches(indices)):
-        first = int(indices[part.start])
-        stamp_ns = start_ns + (first - int(indices[0])) * FRAME_NS
-        end_ns = stamp_ns + (part.stop - part.start) * FRAME_NS
-        if count % STATE_BATCHES == 0:
-            until_ns = min(stamp_ns + STATE_BATCHES * BATCH_FRAMES * FRAME_NS, stop_ns)
-            speed_m_s, force_n = recording.speed_and_force((stamp_ns - start_ns) / NANOSECONDS)
-            state = replace(
-                named, stamp_ns=stamp_ns, steady_s=(until_ns - stamp_ns) / NANOSECONDS, speed_m_s=speed_m_s,
-                force_n=force_n, progress=(stamp_ns - start_ns) / (SLIDE_FRAMES * FRAME_NS),
-            )  # fmt: skip
-            bag.write('exploration', state, stamp_ns)
-        fast = vibration[part.start * PAC_PER_FRAME : part.stop * PAC_PER_FRAME]
-        bag.write('signal', _signal('pac', ('pac',), stamp_ns, first * PAC_PER_FRAME, fast), end_ns + DELAY_NS)
-        if channels == 'all':
-            slow = _signal('slow', STATIC_CHANNELS, stamp_ns, first, static[part])
-            bag.write('signal_static', slow, end_ns + 2 * DELAY_NS)
+    """Write one slide: a state every 0.1 s, the samples, then the end; `indices` number the frames."""
+    frames, first = recording.frames[: len(indices)], int(indices[0])
+    places = indices - first
+    vibration, fast_places = restore_sign(frames[:, PAC_COLUMNS].ravel())[:, None], np.arange(PAC_PER_FRAME)
+    streams = {
+        'signal': (_like('pac', ('pac',), first), vibration, np.add.outer(PAC_PER_FRAME * places, fast_places).ravel()),
+        'signal_static': (_like('slow', STATIC_CHANNELS, first), frames[:, STATIC_COLUMNS], places),
+    }
+    messages: list[tuple[int, str, Any]] = []
+    for topic, (like, samples, index) in streams.items() if channels == 'all' else [('signal', streams['signal'])]:
+        batches = list(slide_batches(like, samples, index, start_ns, batch_s=BIOTAC_BATCH_S))
+        messages += [(batch.end_ns + DELAY_NS, topic, batch) for batch in batches]
+    named, stop_ns = recording.named(), start_ns + (int(places[-1]) + 1) * FRAME_NS
+    for stamp_ns in (batch.stamp_ns for batch in batches[::STATE_BATCHES]):
+        since_s = (stamp_ns - start_ns) / NANOSECONDS
+        speed_m_s, force_n = recording.speed_and_force(since_s)
+        steady_s = min(STATE_BATCHES * BIOTAC_BATCH_S, (stop_ns - stamp_ns) / NANOSECONDS)
+        state = replace(
+            named, stamp_ns=stamp_ns, steady_s=steady_s, speed_m_s=speed_m_s, force_n=force_n,
+            progress=since_s / (SLIDE_FRAMES * FRAME_NS / NANOSECONDS),
+        )  # fmt: skip
+        messages.append((stamp_ns, 'exploration', state))
     for count, phase in enumerate((Phase.LIFT, Phase.DONE)):
-        after_ns = stop_ns + count * BATCH_FRAMES * FRAME_NS
-        state = replace(named, stamp_ns=after_ns, phase=phase, progress=1.0)
-        bag.write('exploration', state, after_ns + 3 * DELAY_NS)
+        after_ns = stop_ns + count * round(BIOTAC_BATCH_S * NANOSECONDS)
+        messages.append(
+            (after_ns + 2 * DELAY_NS, 'exploration', replace(named, stamp_ns=after_ns, phase=phase, progress=1.0))
+        )
+    bag.write_all(messages)
 
 
-def _batches(indices: AnyArray) -> Iterator[slice]:
-    """Yield slices of consecutive frames, BATCH_FRAMES long or shorter before a gap and at the end."""
-    starts = [0, *(np.flatnonzero(np.diff(indices) > 1) + 1).tolist(), len(indices)]
-    for begin, end in pairwise(starts):
-        for first in range(begin, end, BATCH_FRAMES):
-            yield slice(first, min(first + BATCH_FRAMES, end))
-
-
-def _signal(part: str, channels: tuple[str, ...], stamp_ns: int, first: int, samples: AnyArray) -> TactileSignal:
-    rate_hz = 2200.0 if part == 'pac' else 100.0
-    return TactileSignal(
-        stamp_ns, f'biotac/{part}', channels, ('count',) * len(channels), rate_hz, first, samples, 'biotac'
-    )
+def _like(part: str, channels: tuple[str, ...], first_frame: int) -> TactileSignal:
+    per_frame = PAC_PER_FRAME if part == 'pac' else 1
+    none, units = np.empty((0, len(channels)), dtype=np.float32), ('count',) * len(channels)
+    rate_hz = per_frame * NANOSECONDS / FRAME_NS
+    return TactileSignal(0, f'biotac/{part}', channels, units, rate_hz, per_frame * first_frame, none, 'biotac')
 
 
 # --------------------
 # Sets whose slides lie in .npz files, of evenly spaced samples at a constant speed and force.
-
-START_NS = 1_000_000_000 * NANOSECONDS
-BATCH_S = 0.1
 
 
 class SteadySlide(NamedTuple):
@@ -395,26 +382,18 @@ class SlideSet:
         count = len(slide.samples)
         steady = slide.steady or range(count)
         at_ns = [start_ns + round(index * NANOSECONDS / self.rate_hz) for index in range(count + 1)]
-        step, units = max(1, round(BATCH_S * self.rate_hz)), (self.unit,) * len(self.channels)
+        none, units = np.empty((0, len(self.channels)), dtype=np.float32), (self.unit,) * len(self.channels)
+        like = TactileSignal(0, self.sensor, self.channels, units, self.rate_hz, first, none, self.sensor)
+        batches = slide_batches(like, slide.samples, np.arange(count), start_ns, edges=(steady.start, steady.stop))
+        messages: list[tuple[int, str, Any]] = [(batch.end_ns + DELAY_NS, self.topic, batch) for batch in batches]
         phases = [(Phase.CONTACT, 0, steady.start), (Phase.SLIDE, steady.start, steady.stop)]
-        for phase, begin, end in [*phases, (Phase.LIFT, steady.stop, count)]:
-            if phase is Phase.CONTACT and begin == end:
-                continue
+        for phase, begin, end in [*phases[not steady.start :], (Phase.LIFT, steady.stop, count)]:
             guaranteed_s = (at_ns[end] - at_ns[begin]) / NANOSECONDS
-            state = replace(
-                named, stamp_ns=at_ns[begin], phase=phase, steady_s=guaranteed_s, progress=begin / len(slide.samples)
-            )
+            state = replace(named, stamp_ns=at_ns[begin], phase=phase, steady_s=guaranteed_s, progress=begin / count)
             # A state before the first batch it covers, and after the last batch of the phase before.
-            bag.write('exploration', state, at_ns[begin] + (DELAY_NS if begin else 0))
-            for index in range(begin, end, step):
-                after = min(index + step, end)
-                samples = slide.samples[index:after].astype('float32')
-                batch = TactileSignal(
-                    at_ns[index], self.sensor, self.channels, units, self.rate_hz, first + index, samples, self.sensor
-                )
-                bag.write(self.topic, batch, at_ns[after] + DELAY_NS)
+            messages.append((at_ns[begin] + (2 * DELAY_NS if begin else 0), 'exploration', state))
         done = replace(named, stamp_ns=at_ns[count], phase=Phase.DONE, progress=1.0)
-        bag.write('exploration', done, at_ns[count] + 2 * DELAY_NS)
+        bag.write_all([*messages, (at_ns[count] + 3 * DELAY_NS, 'exploration', done)])
         return at_ns[count]
 
 

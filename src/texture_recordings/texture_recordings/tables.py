@@ -57,7 +57,17 @@ from texture_core.types import (
     TactileSignal,
     checked_label,
 )
-from texture_recordings.bags import BagWriter, RawMessage, is_bag, read_foreign, typestore
+from texture_recordings.bags import (
+    DELAY_NS,
+    PAUSE_NS,
+    START_NS,
+    BagWriter,
+    RawMessage,
+    is_bag,
+    read_foreign,
+    slide_batches,
+    typestore,
+)
 from texture_recordings.dataset import STREAMS
 
 try:
@@ -122,8 +132,7 @@ def template_fields(template: str, name: str) -> dict[str, str] | None:
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
-BORDERS = ('file', 'column', 'pause', 'time', 'detection')
-SPACINGS = ('even', 'interpolated')
+BORDERS = ('file', 'column', 'pause', 'time')
 
 
 @dataclass(frozen=True)
@@ -157,15 +166,6 @@ class TimeColumn:
 
     column: str = param('', "Names the column of time; '' takes rows as evenly spaced at `rate_hz`.")
     unit: str = param('s', 'Names the unit of the column of time.', choices=tuple(TIME_UNITS))
-    spacing: str = param(
-        'even',
-        "Says what jittering times mean: 'even' takes samples as evenly spaced between gaps, as from a device whose "
-        "host stamps late; 'interpolated' believes each time and interpolates onto an even grid.",
-        choices=SPACINGS,
-    )
-    gap: float = param(
-        1.75, 'Steps of time longer than so many sampling intervals are gaps, whose samples count as lost.', low=1.1
-    )
 
 
 @dataclass(frozen=True)
@@ -183,10 +183,6 @@ class StreamColumns:
     rate_hz: float = param(
         0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
     )
-    repair_s: float = param(
-        0.0, 'Longest hole by malformed rows that is interpolated; windows over longer ones are left out.',
-        unit='s', low=0.0, high=10.0,
-    )  # fmt: skip
     time: TimeColumn = field(default_factory=TimeColumn)
 
     def __post_init__(self) -> None:
@@ -217,7 +213,7 @@ class SlideBorders:
     by: str = param(
         'file',
         "Says what ends a slide: 'file' (each file or table is one slide), 'column' (a value changes), 'pause' (time "
-        "jumps by `pause_s` or back), 'time' (every `length_s`) or 'detection' (found in the signal).",
+        "jumps by `pause_s` or back) or 'time' (every `length_s`).",
         choices=BORDERS,
     )
     column: str = param('', "Names the column whose value changes between slides, for 'column'.")
@@ -230,8 +226,6 @@ class SlideBorders:
     start_s: float = param(0.0, 'Time at the start of each slide that is left out.', unit='s', low=0.0)
     end_s: float = param(0.0, 'Time at the end of each slide that is left out.', unit='s', low=0.0)
     min_s: float = param(0.2, 'Shortest slide that is kept; shorter ones are counted.', unit='s', low=0.0)
-    on: float = param(6.0, "Power over that at rest above which sliding begins, for 'detection'.", low=1.0, high=1e6)
-    off: float = param(3.0, "Power over that at rest below which sliding ends, for 'detection'.", low=1.0, high=1e6)
 
 
 @dataclass(frozen=True)
@@ -1204,6 +1198,7 @@ MAPPED: Mapping[str, Sequence[str]] = {'table': tuple(kind for kind in READERS i
 
 SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
 ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
+GAP = 1.75  # steps of time longer than so many sampling intervals are gaps, whose samples count as lost
 
 
 @dataclass(frozen=True, eq=False)
@@ -1249,14 +1244,16 @@ def estimated_rate_hz(time_s: Array) -> float:
     steps = steps[steps > 0]
     if not len(steps):
         return float('nan')
-    usual = steps[steps < 1.75 * np.median(steps)]
+    usual = steps[steps < GAP * np.median(steps)]
     rate_hz = 1.0 / float(usual.mean())
     simple = float(f'{rate_hz:.2g}')
     return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
 
 
-def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float, interpolated: bool) -> GridRows:
-    """Return the rows of one slide on a grid that begins with its first row.
+def on_grid(samples: Array, time_s: Array | None, rate_hz: float) -> GridRows:
+    """Return the rows of one slide on a grid that begins with its first row, evenly spaced between gaps.
+
+    Jitter of the times is that of the host that stamped them, and not of the device that sampled.
 
     Parameters
     ----------
@@ -1266,10 +1263,6 @@ def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float,
         Time of each row, NaN where it is unknown; None: rows are evenly spaced.
     rate_hz
         Rate of the grid.
-    gap
-        Steps longer than so many intervals are gaps.
-    interpolated
-        Whether samples are interpolated at the times of the grid; else they are taken as evenly spaced between gaps.
 
     Returns
     -------
@@ -1278,44 +1271,15 @@ def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float,
     """
     if time_s is None or len(samples) < 2:
         return GridRows(samples, np.arange(len(samples)))
-    times = _known(time_s) if interpolated else _spread(_known(time_s))
+    times = _spread(_known(time_s))
     later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
     samples, times = samples[later], times[later]
     steps = np.diff(times) * rate_hz
-    gaps = steps > gap
+    gaps = steps > GAP
     missing = np.where(gaps, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
+    index = np.concatenate(([0], np.cumsum(1 + missing)))
     jitter = (steps[~gaps] - 1.0) / rate_hz
-    disordered = int((~later).sum())
-    if not interpolated:
-        index = np.concatenate(([0], np.cumsum(1 + missing)))
-        return GridRows(samples, index, jitter, int(gaps.sum()), int(missing.sum()), disordered)
-    parts = [
-        _interpolated(samples[rows], (times[rows] - times[0]) * rate_hz)
-        for rows in np.split(np.arange(len(times)), np.flatnonzero(gaps) + 1)
-    ]
-    index = np.concatenate([own for own, _ in parts])
-    lost = int(index[-1] + 1 - len(index)) if len(index) else 0
-    return GridRows(np.concatenate([x for _, x in parts]), index, jitter, int(gaps.sum()), lost, disordered)
-
-
-def repaired(rows: GridRows, longest: int) -> tuple[GridRows, int]:
-    """Return rows whose holes of bad samples, up to `longest` of them, are interpolated, and how many samples that are.
-
-    Holes at the edges of the slide and beside lost samples stay.
-    """
-    bad = np.logical_or.reduce(np.isnan(rows.samples), axis=1)
-    if not longest or not bad.any() or bad.all():
-        return rows, 0
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], bad, [0])).astype(int))).reshape(-1, 2)
-    fill = np.zeros(len(bad), dtype=bool)
-    for first, last in edges.tolist():
-        inside = first > 0 and last < len(bad)
-        if inside and last - first <= longest and rows.index[last] - rows.index[first - 1] == last - first + 1:
-            fill[first:last] = True
-    samples = rows.samples.copy()
-    for channel in samples.T:
-        channel[fill] = np.interp(rows.index[fill], rows.index[~bad], channel[~bad])
-    return replace(rows, samples=samples), int(fill.sum())
+    return GridRows(samples, index, jitter, int(gaps.sum()), int(missing.sum()), int((~later).sum()))
 
 
 def _known(time_s: Array) -> Array:
@@ -1342,12 +1306,6 @@ def _spread(times: Array) -> Array:
     return spread
 
 
-def _interpolated(samples: Array, place: Array) -> tuple[AnyArray, Array]:
-    grid = np.arange(np.ceil(place[0] - 1e-6), np.floor(place[-1] + 1e-6) + 1)
-    values = np.stack([np.interp(grid, place, channel) for channel in samples.T], axis=1)
-    return grid.astype(np.int64), values
-
-
 @dataclass
 class StreamCounts:
     """Counts of one stream over all slides."""
@@ -1357,18 +1315,16 @@ class StreamCounts:
     gaps: int = 0
     lost: int = 0
     disordered: int = 0
-    repaired: int = 0
     steps: int = 0
     jitter_sum_s2: float = 0.0
     jitter_max_s: float = 0.0
 
-    def add(self, rows: GridRows, repaired: int) -> None:
+    def add(self, rows: GridRows) -> None:
         """Count one slide."""
         self.samples += len(rows.samples)
         self.gaps += rows.gaps
         self.lost += rows.lost
         self.disordered += rows.disordered
-        self.repaired += repaired
         self.steps += len(rows.jitter_s)
         self.jitter_sum_s2 += float(np.square(rows.jitter_s).sum())
         self.jitter_max_s = max(self.jitter_max_s, float(np.abs(rows.jitter_s).max(initial=0.0)))
@@ -1412,24 +1368,20 @@ class ImportReport:
             said.append(
                 f'{name}: {stream.samples} samples at {stream.rate_hz:g} Hz; jitter {1e3 * stream.jitter_s:.2f} ms '
                 f'rms, {1e3 * stream.jitter_max_s:.2f} ms at most; {stream.lost} samples lost in {stream.gaps} gaps, '
-                f'{stream.disordered} rows out of order left out, {stream.repaired} samples interpolated'
+                f'{stream.disordered} rows out of order left out'
             )
         if self.short_slides:
             said.append(f'slides too short, left out: {self.short_slides}')
         return said
 
 
-DETECTION_BATCH = 1000  # rows
-
-
 class SlideRows(NamedTuple):
-    """The rows of one stream by which slides are cut: times (NaN where unknown), samples (n, n_channels), and keys.
+    """The rows by which slides are cut: their times (NaN where unknown), rate and keys.
 
     `keys`, (n,), are the values of the column that changes between slides, if one does; `place` is for sentences.
     """
 
     time_s: Array
-    samples: Array
     rate_hz: float
     keys: AnyArray | None
     place: str
@@ -1481,41 +1433,14 @@ def _by_time(rows: SlideRows, borders: SlideBorders) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(edges) if b - a >= whole]
 
 
-def _by_detection(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    # These need scipy, which reading and writing of bags does without.
-    from texture_features.segmentation import SegmentationParams, segment_recording  # noqa: PLC0415
-
-    params = SegmentationParams(on=borders.on, off=borders.off, min_duration_s=max(borders.min_s, 0.05))
-    channels = tuple(str(number) for number in range(rows.samples.shape[1]))
-    samples = rows.samples.astype(np.float32)
-    batches = [
-        TactileSignal(
-            round(first / rows.rate_hz * NANOSECONDS), '', channels, (), rows.rate_hz, first,
-            samples[first : first + DETECTION_BATCH],
-        )
-        for first in range(0, len(samples), DETECTION_BATCH)
-    ]  # fmt: skip
-    states = segment_recording({'signal': batches}, params)
-    return [
-        slice(*(round(at * rows.rate_hz / NANOSECONDS) for at in (s.stamp_ns, s.stamp_ns + s.steady_s * NANOSECONDS)))
-        for s in states
-        if s.phase.value == 'slide'
-    ]
-
-
 CUTTING_RULES: Mapping[str, Callable[[SlideRows, SlideBorders], list[slice]]] = {
     'file': _by_file,
     'column': _by_column,
     'pause': _by_pause,
     'time': _by_time,
-    'detection': _by_detection,
 }
 
 
-START_NS = 1_000_000_000 * NANOSECONDS
-PAUSE_NS = NANOSECONDS
-DELAY_NS = 100_000  # a batch is logged this long after its last sample
-BATCH_S = 0.1
 MAX_BAGS = 500
 Message = tuple[int, str, TactileSignal | ExplorationState]  # log time, topic, value
 
@@ -1595,10 +1520,15 @@ class SlideBags:
         bag = self._bag(session)
         end_ns = self._now_ns + round(slide.duration_s * NANOSECONDS)
         messages: list[Message] = [*self._states(slide, end_ns)]
+        sensor = self._mapping.sensor
         for topic, (stream, grid) in slide.streams.items():
-            messages += self._batches(session, topic, stream, grid)
-        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
-            bag.write(topic, value, log_ns)
+            first, units = self._next.get((session, topic), 0), (stream.params.unit,) * len(stream.channels)
+            none = np.empty((0, len(units)), dtype=np.float32)
+            like = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz, first, none, sensor)
+            for batch in slide_batches(like, grid.samples, grid.index, self._now_ns):
+                messages.append((batch.end_ns + DELAY_NS, topic, batch))
+                self._next[session, topic] = batch.next_sample
+        bag.write_all(messages)
         self._now_ns = max(end_ns, *(log_ns for log_ns, _, _ in messages)) + PAUSE_NS
 
     def _bag(self, session: str) -> BagWriter:
@@ -1627,23 +1557,6 @@ class SlideBags:
             yield stamp_ns, 'exploration', state
         for count, phase in enumerate((Phase.LIFT, Phase.DONE), 1):
             yield end_ns + (2 + count) * DELAY_NS, 'exploration', replace(named, phase=phase)
-
-    def _batches(self, session: str, topic: str, stream: Stream, grid: GridRows) -> Iterator[Message]:
-        first = self._next.get((session, topic), 0)
-        step = max(1, round(BATCH_S * stream.rate_hz))
-        bounds = [0, *(np.flatnonzero(np.diff(grid.index) != 1) + 1).tolist(), len(grid.index)]
-        samples, units = grid.samples.astype(np.float32), (stream.params.unit,) * len(stream.channels)
-        sensor = self._mapping.sensor
-        for begin, end in pairwise(bounds):
-            for row in range(begin, end, step):
-                part, place = samples[row : min(row + step, end)], int(grid.index[row])
-                stamp_ns = self._now_ns + round(place / stream.rate_hz * NANOSECONDS)
-                batch = TactileSignal(
-                    stamp_ns, sensor, stream.channels, units, stream.rate_hz, first + place, part, sensor
-                )
-                yield batch.end_ns + DELAY_NS, topic, batch
-        if len(grid.index):
-            self._next[session, topic] = first + int(grid.index[-1]) + 1
 
     def __enter__(self) -> SlideBags:
         return self
@@ -1776,14 +1689,13 @@ class _TableSlides:
         reference = next(iter(self._streams.values()))
         keys = self._text(borders.column) if borders.by == 'column' else None
         if keys is None:
-            rows = SlideRows(reference.time_s, reference.samples, reference.rate_hz, None, place)
-            return reference, spans(rows, borders)
+            return reference, spans(SlideRows(reference.time_s, reference.rate_hz, None, place), borders)
         clock = self._clocks.get(borders.column, '')
         same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
         if same:
-            return same[0], spans(SlideRows(same[0].time_s, same[0].samples, same[0].rate_hz, keys, place), borders)
+            return same[0], spans(SlideRows(same[0].time_s, same[0].rate_hz, keys, place), borders)
         times = self._times_of(borders.column, len(keys))
-        rows = SlideRows(times, keys[:, None], estimated_rate_hz(times), keys, place)
+        rows = SlideRows(times, estimated_rate_hz(times), keys, place)
         return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in spans(rows, borders)]
 
     def _slide(self, reference: Stream, span: slice, number: int) -> tuple[str, ImportedSlide]:
@@ -1808,24 +1720,16 @@ class _TableSlides:
                 f"'{self._place}' has no samples of '{name}' from {cut.begin_s:g} to {cut.end_s:g} s of a slide; "
                 'look at the times of the streams'
             )
-        self._refuse_jumps(name, times if stream.timed else None, rows)
-        time = stream.params.time
-        grid = on_grid(
-            samples, times if stream.timed else None, stream.rate_hz,
-            gap=time.gap, interpolated=time.spacing == 'interpolated',
-        )  # fmt: skip
-        grid, count = repaired(grid, round(stream.params.repair_s * stream.rate_hz))
-        self._report.streams[name].add(grid, count)
-        return stream, grid
-
-    def _refuse_jumps(self, name: str, times: Array | None, rows: slice) -> None:
-        steps = np.diff(times[np.isfinite(times)]) if times is not None else np.empty(0)
+        steps = np.diff(times[np.isfinite(times)]) if stream.timed else np.empty(0)
         if steps.max(initial=0.0) > LONGEST_GAP_S:
             row = self._columns.row(rows.start + int(steps.argmax()) + 1)
             raise InvalidData(
-                f"'{self._place}', row {row}, column '{self._mapping.streams[name].time.column}': time jumps by "
+                f"'{self._place}', row {row}, column '{stream.params.time.column}': time jumps by "
                 f'{steps.max():g} s within a slide; look at the unit of time and at `slides` in the mapping'
             )
+        grid = on_grid(samples, times if stream.timed else None, stream.rate_hz)
+        self._report.streams[name].add(grid)
+        return stream, grid
 
     def _stream(self, name: str, params: StreamColumns) -> Stream:
         names = self._chosen[name]
