@@ -113,7 +113,7 @@ def test_force_speed_and_circle_are_kept_and_the_limit_is_foretold(tmp_path: Pat
         assert row['overshoot'] <= targets['overshoot']
         assert row['speed_error'] <= targets['speed_error']
         assert row.get('radius_error_m', 0.0) <= targets['radius_error_m']
-    late = [row for rows in numbers['undeclared_lag'].values() for row in rows.values()]
+    late = [row for rows in numbers['hazards']['none'].values() for row in rows.values()]
     assert max(row['overshoot'] for row in late) <= targets['overshoot']
     for name, by_lag in numbers['hazards'].items():
         for row in (row for rows in by_lag.values() for row in rows.values()):

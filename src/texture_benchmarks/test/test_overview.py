@@ -84,4 +84,3 @@ def test_later_slides_are_recognised_and_every_figure_is_there(tmp_path: Path) -
         assert 0 < cell['latency_us']['median'] <= cell['latency_us']['p99']
         assert cell['train_s'] > 0
     assert result.numbers[VIBRATION]['jamali-naive-bayes-5']['ends_when_decided'] is None
-    assert set(result.numbers['window_lengths']) == {'0.25 s'}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter, lfilter_zi, resample_poly
 
-from texture_core.types import Array, TactileSignal
+from texture_core.types import Array, TactileSignal, join_batches
 from texture_features.augmentation import Augmentation, smooth_response
 from texture_recordings.dataset import LabelledSlide, SlideDataset
 from texture_simulation.offline import simulate_slide_streams
@@ -174,22 +174,11 @@ def disturbed(item: LabelledSlide, row: DisturbanceSweep, strength: float, rng: 
     """Return a slide under a disturbance of this strength; what nothing is done to stays as it came."""
     changes = {topic: row.change if topic == VIBRATION else row.slow for topic in item.signals}
     signals = {
-        topic: [_changed(run, change, strength, rng) for run in _whole(item.signals[topic])]
+        topic: [_changed(run, change, strength, rng) for run in join_batches(item.signals[topic])]
         for topic, change in changes.items()
         if change
     }
     return dataclasses.replace(item, signals={**item.signals, **signals})
-
-
-def _whole(batches: Sequence[TactileSignal]) -> list[TactileSignal]:
-    """Return the batches between losses as one each."""
-    runs: list[list[TactileSignal]] = []
-    for batch in batches:
-        if runs and batch.first_sample == runs[-1][-1].next_sample:
-            runs[-1].append(batch)
-        else:
-            runs.append([batch])
-    return [dataclasses.replace(run[0], samples=np.concatenate([batch.samples for batch in run])) for run in runs]
 
 
 def _changed(run: TactileSignal, change: Change, strength: float, rng: np.random.Generator) -> TactileSignal:

@@ -6,15 +6,13 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.types import Array
-from texture_estimation.model import TextureModel
 from texture_estimation.roughness import (
     TEST,
     TRAIN,
@@ -26,14 +24,11 @@ from texture_estimation.roughness import (
 )
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_features.windows import CutWindow, WindowEvent
+from texture_features.windows import CutWindow
 from texture_papers.rispal_experiment import FORCE_N, SPEED_M_S, USED_S, SimulatedTextures
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
-
-if TYPE_CHECKING:
-    from texture_benchmarks.ros.graph import LiveLatency
 
 RECIPES = ('default', 'vibration-and-taxels')
 CLASSES = 10
@@ -58,60 +53,32 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         surfaces = tuple(load_scene('twelve_textures').surfaces)[:CLASSES]
         bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(options.seed), surfaces=surfaces)
         timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), options) for recipe in RECIPES}
-    driver = driver_cpu()
+    driver = round(100 * driver_cpu(), 1)
+    for timing in timings.values():
+        cpu = {'sensor': driver, **timing['dds'].pop('cpu_percent')}
+        timing['cpu_percent'] = {**cpu, 'all': round(sum(cpu.values()), 1)}
     return BenchmarkResult(
         name='latency',
         measured=run.__doc__,
         data='simulated TSF-85, scene bench',
         split=f'trained on slides 1-{plan.slides - 1} of each surface; timed on slide {plan.slides}, live on a new one',
-        numbers={'targets': TARGETS, **{recipe: timing.numbers(driver) for recipe, timing in timings.items()}},
+        numbers={'targets': TARGETS, **timings},
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Timing:
-    """Times of one recipe: in one process, with and without novelty detection in turn, and through the graph."""
-
-    alone_us: Array
-    without_novelty_us: Array
-    live: LiveLatency
-
-    def numbers(self, driver: float) -> Mapping[str, Any]:
-        median, p99 = np.percentile(self.alone_us, (50, 99))
-        without = float(np.median(self.without_novelty_us))
-        live = self.live.numbers()
-        cpu = {'sensor': round(100 * driver, 1), **live.pop('cpu_percent')}
-        return {
-            'in_process': {'windows': len(self.alone_us), 'median_us': float(median), 'p99_us': float(p99)},
-            'novelty': {'median_us_without': without, 'ratio': float(median) / without},
-            'dds': live,
-            'cpu_percent': {**cpu, 'all': round(sum(cpu.values()), 1)},
-        }
-
-
-def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: BenchmarkOptions) -> _Timing:
+def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: BenchmarkOptions) -> dict[str, Any]:
+    """Return the figures of one recipe: in one process, and through the graph."""
     from texture_benchmarks.ros.graph import LiveSlide, measure  # noqa: PLC0415
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
     cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
-    undetected = replace(model, decisions=replace(model.decisions, novelty_detector=None))
-    alone_us, without_us = _in_turn((model, undetected), cut)
+    # The last of each slide is its end, which is no window; the first pass warms up.
+    passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
+    alone_us = np.concatenate([own for timed in passes[1:] for own in timed])
+    median, p99 = np.percentile(alone_us, (50, 99)).tolist()
     slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
     [live] = measure(folder / f'{recipe}.npz', slide).values()
-    return _Timing(alone_us, without_us, live)
-
-
-def _in_turn(models: Sequence[TextureModel], cut: Sequence[Sequence[WindowEvent]]) -> list[Array]:
-    """Return the times of the windows of slides by each model, µs; the models take turns, so load meets them alike.
-
-    The last of each slide is its end, which is no window; the first pass warms up.
-    """
-    taken: list[list[Array]] = [[] for _ in models]
-    for number in range(1 + PASSES):
-        for place, model in enumerate(models):
-            timed = [run_model(model, events)[2][:-1] for events in cut]
-            taken[place] += timed if number else []
-    return [np.concatenate(own) for own in taken]
+    return {'in_process': {'windows': len(alone_us), 'median_us': median, 'p99_us': p99}, 'dds': live.numbers()}
 
 
 HAND_SCENE, HAND_CLASSES = 'kaboli', 10

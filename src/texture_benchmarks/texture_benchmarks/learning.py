@@ -53,7 +53,6 @@ class IncrementalRun:
     old: dict[int, Score]
     before: Score
     add_s: Array
-    predict_us: tuple[float, float]
 
 
 def run_incremental(
@@ -72,9 +71,7 @@ def run_incremental(
     base = train(recipe, examples.take(training & ~is_new))
     base.save(path)
     incremental_classifier, add_s = IncrementalClassifier(base, path), []
-    incremental_run = IncrementalRun(
-        {}, {}, {}, {}, _score(base, examples.take(test & ~is_new)), np.empty(0), (0.0, 0.0)
-    )
+    incremental_run = IncrementalRun({}, {}, {}, {}, _score(base, examples.take(test & ~is_new)), np.empty(0))
     for stage, before in zip(stages, (0, *stages), strict=False):
         for number in range(before + 1, stage + 1):
             for label in new:
@@ -88,12 +85,7 @@ def run_incremental(
             (incremental_run.old, incremental_classifier.model, test & ~is_new),
         ):
             scores[stage] = _score(model, examples.take(which))
-    window = examples.X[0]
-    return replace(
-        incremental_run,
-        add_s=np.array(add_s),
-        predict_us=(_predict_us(base, window), _predict_us(incremental_classifier.model, window)),
-    )
+    return replace(incremental_run, add_s=np.array(add_s))
 
 
 def _add_examples(incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, slide: str) -> float:
@@ -125,16 +117,6 @@ def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> Textu
     return final
 
 
-def _predict_us(model: TextureModel, window: Array, repeats: int = 200) -> float:
-    """Return the median time of classifying one window, µs."""
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        model.predict_log_proba(window)
-        times.append(time.perf_counter() - began)
-    return 1e6 * float(np.median(times))
-
-
 RECIPE = 'default'
 TRAINED, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3
 QUICK_SLIDES, QUICK_TRAINED, QUICK_STAGES = '1-3,31-32', 3, (1, 2)
@@ -147,7 +129,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on 15 materials, add 5 more, test on later slides of all; several draws of the five.
 
     Share of test windows and of whole test slides (final estimate) that are right, mean over the draws; processor
-    time of adding a slide, stored on disk; time to classify a window.
+    time of adding a slide, stored on disk.
     """
     recipe = load_recipe(RECIPE)
     if isinstance(recipe.learner, Mlp):
@@ -213,9 +195,6 @@ def _numbers(runs: Sequence[IncrementalRun], draws: Sequence[Any], stages: Seque
             '95 %': round(float(np.percentile(add_ms, 95)), 1),
             'longest': round(float(add_ms.max()), 1),
         },
-        'predict_us': dict(
-            zip(('retrained', 'incremental'), np.median([one.predict_us for one in runs], axis=0).round(1), strict=True)
-        ),
     }
 
 

@@ -228,7 +228,6 @@ def hazard_trials(name: str, stiffnesses_n_m: Sequence[float], lags_s: Sequence[
     }
 
 
-SPEEDS_M_S = (0.1, 0.07, 0.05, 0.035, 0.025, 0.018, 0.0125, 0.01, 0.007, 0.005)
 TARGETS = {
     'force_rms': 0.05,
     'overshoot': 0.2,
@@ -414,16 +413,6 @@ def typical_trial(name: str, stiffness_n_m: float, request: ExplorationRequest, 
 STYLES = list(zip(COLOURS, 'o^vsDP', strict=False))
 Trials = Mapping[float, ForceControlMetrics]  # by stiffness in N/m
 
-STRAIGHT = ('linear_slide', 'in_hand_sliding')
-
-# What is drawn of each robot: motions (the first that it does), number, what it is called, in what unit times how much.
-PANELS = (
-    (STRAIGHT, 'force_rms', 'force error, rms (%)', 100),
-    (STRAIGHT, 'overshoot', 'overshoot of the force (%)', 100),
-    (('circular',), 'speed_error', 'largest speed error on the circle (%)', 100),
-    (('circular',), 'radius_error_m', 'largest error of the radius (mm)', 1000),
-)
-
 
 def _over_stiffness(
     axes: Any, lines: Mapping[str, tuple[Sequence[float], Sequence[float]]], title: str, target: float
@@ -505,7 +494,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         name: {k: simulate_force_controlled_slide(replace(ARM, stiffness_n_m=k), shape=shape) for k in fine}
         for name, shape in SURFACES.items()
     }
-    lags = hazard_trials('none', fine, lags_s)
     hazards = {name: hazard_trials(name, hazard.stiffnesses_n_m[:most], lags_s) for name, hazard in HAZARDS.items()}
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S)
     robots = {
@@ -536,9 +524,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'targets': TARGETS,
             'robots': robots,
             'surfaces_velocities_only': {name: _rows(trials) for name, trials in surfaces.items()},
-            'undeclared_lag': _by_lag(lags),
             'hazards': {name: _by_lag(by_lag) for name, by_lag in hazards.items()},
-            'bump_speed_m_s': {f'{k:.0f} N/m': bump_speed_m_s(k) for k in stiffnesses},
             'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
             'margin': margins(),
         },
@@ -555,16 +541,6 @@ def _by_lag(lags: Mapping[float, Trials]) -> dict[str, Any]:
 
 def _rows(trials: Trials) -> dict[str, Any]:
     return {f'{stiffness:.0f} N/m': _row(trial) for stiffness, trial in trials.items()}
-
-
-def bump_speed_m_s(stiffness_n_m: float) -> float:
-    """Return the highest of `SPEEDS_M_S` at which a bump of 2 mm is followed as well as asked, without a force mode."""
-    arm, shape = replace(ARM, stiffness_n_m=stiffness_n_m), SURFACES['bump of 2 mm']
-    for speed_m_s in SPEEDS_M_S:
-        trial = simulate_force_controlled_slide(arm, replace(SLIDE, speed_m_s=speed_m_s), shape=shape)
-        if trial.force_rms <= TARGETS['force_rms']:
-            return speed_m_s
-    return 0.0
 
 
 def _row(trial: ForceControlMetrics) -> dict[str, Any]:

@@ -68,7 +68,6 @@ RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
 }
 QUICK_RECIPES = {'default', 'jamali-naive-bayes-5', 'kaboli-pa', 'vibration-and-taxels'}
 AUTHORS = {'ets': 'Roberge et al.', 'hu': 'Hu et al.', 'jamali': 'Jamali & Sammut', 'kaboli': 'Kaboli et al.'}
-LENGTHS_S, QUICK_LENGTHS_S = (0.1, 0.25, 1.0, 2.0), (0.25,)  # of the windows of `default`, besides its own
 FIRST = {False: 30 / 40, True: 4 / 6}  # fraction of the slides of each material that trains, by whether it is quick
 AT_S = 3.0  # the longest window of a paper is complete
 TIMED_SLIDES, LATENCY_ROUNDS = 40, 5  # the round with the lowest median counts, as other work only adds
@@ -142,7 +141,6 @@ class _Job(NamedTuple):
     channels: str
     kind: str
     name: str
-    length_s: float | None = None  # of the windows; None for those of the recipe
 
 
 class _Tried(NamedTuple):
@@ -170,14 +168,11 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         tried = dict(zip(jobs, map_forked(partial(_try, dataset, split, options.seed), jobs), strict=True))
         with single_blas_thread():
             rounds = [{job: one.time_us() for job, one in tried.items()} for _ in range(LATENCY_ROUNDS)]
-    numbers: dict[str, Any] = {VIBRATION: {}, ALL_CHANNELS: {}, 'window_lengths': {}}
+    numbers: dict[str, Any] = {VIBRATION: {}, ALL_CHANNELS: {}}
     for job, one in tried.items():
         median, p99 = min((np.percentile(own[job], (50, 99)).tolist() for own in rounds), key=itemgetter(0))
-        cell = {**one.figures, 'latency_us': {'median': round(median, 1), 'p99': round(p99, 1)}}
-        if job.length_s:
-            numbers['window_lengths'][f'{job.length_s:g} s'] = cell
-        else:
-            numbers[job.channels][job.name] = cell
+        latency_us = {'median': round(median, 1), 'p99': round(p99, 1)}
+        numbers[job.channels][job.name] = {**one.figures, 'latency_us': latency_us}
     return BenchmarkResult(
         name='overview',
         measured=run.__doc__,
@@ -203,8 +198,7 @@ def jobs_of(quick: bool) -> list[_Job]:
         for name in names
         if not quick or name in QUICK_RECIPES
     ]
-    lengths = [_Job(VIBRATION, OURS, 'default', s) for s in (QUICK_LENGTHS_S if quick else LENGTHS_S)]
-    return [*peers, *recipes, *lengths]
+    return [*peers, *recipes]
 
 
 def _try(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
@@ -215,9 +209,6 @@ def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
     recipe = recipe_of(job.name)
     if job.kind != OURS:
         recipe = trained_apart(recipe)
-    if job.length_s:
-        windows = replace(recipe.feature_set.windows, length_s=job.length_s)
-        recipe = replace(recipe, feature_set=replace(recipe.feature_set, windows=windows, _layouts={}))
     [fold] = (found := cross_validate(recipe, dataset, split.splitter)).folds
     results = found.pooled
     times = sorted({round(e.evidence_s, 6) for result in results for e in result.decisions})
@@ -231,7 +222,7 @@ def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
             ]
     figures = {
         'kind': job.kind,
-        **({} if job.length_s or job.kind == PEERS else {'definition': digest_of(job.name)}),
+        **({} if job.kind == PEERS else {'definition': digest_of(job.name)}),
         'window_accuracy': metrics.window_accuracy(results),
         'unclassified_windows': metrics.unclassified_windows(results),
         **_over_time(right, [result.surface for result in results]),

@@ -342,26 +342,17 @@ def _sliding(touch_protocol: TouchProtocol, count: int, turned_rad: float) -> Si
 
 SCAN_S = 0.5
 SLIDE = SimulatedSlide(0.1, 2.0, SCAN_S)
-MANY = 100  # slides at once
 
 
-@dataclass(frozen=True)
-class ScanCost:
-    """Milliseconds of computing for a slide of 0.5 s with all its channels: medians over all surfaces of a scene.
+def scan_cost(scene: Scene, surfaces: Sequence[str], repeats: int, many: int) -> dict[str, float]:
+    """Return the ms of computing for a slide of 0.5 s with all channels; `repeats` is that of single slides.
 
-    `alone`: one slide at a time; `together`: each of many at once; `worst`: the dearest surface, together.
+    Medians over surfaces, of one slide at a time and of each of many at once; and the dearest surface, together.
     """
-
-    alone_ms: float
-    together_ms: float
-    worst_ms: float
-
-
-def scan_cost(scene: Scene, surfaces: Sequence[str], repeats: int, many: int = MANY) -> ScanCost:
-    """Return what slides over some surfaces of a scene cost; `repeats` is that of single slides."""
     alone = [_scan_ms(scene, name, 1, repeats) for name in surfaces]
     together = [_scan_ms(scene, name, many, max(1, repeats // 5)) for name in surfaces]
-    return ScanCost(float(np.median(alone)), float(np.median(together)), max(together))
+    medians = {'alone_ms': float(np.median(alone)), 'together_ms': float(np.median(together))}
+    return {**medians, 'worst_ms': max(together)}
 
 
 def _scan_ms(scene: Scene, surface: str, count: int, repeats: int) -> float:
@@ -376,31 +367,24 @@ def _scan_ms(scene: Scene, surface: str, count: int, repeats: int) -> float:
     return 1000 * float(np.median(times)) / count
 
 
-@dataclass(frozen=True)
-class Paper:
-    """A paper's experiment, its slides divided less often than there, and the method by which its scene was set."""
-
-    protocol: PaperProtocol
-    method: str
-
-
-# Scenes in which the quick learner is too good, or too bad, to see all that the paper's method sees.
-PAPERS: Mapping[str, Paper] = {
-    'ets_linear': Paper(replace(roberge_experiment.LINEAR, divide=halves(4)), roberge_experiment.SVM),
-    'jamali': Paper(replace(jamali_experiment.PROTOCOL, divide=folds(5, 1)), jamali_experiment.FIVE),
+# Scenes in which the quick learner is too good, or too bad, to see all that the paper's method sees: the experiment,
+# its slides divided less often than there, and the method by which the scene was set.
+PAPERS: Mapping[str, tuple[PaperProtocol, str]] = {
+    'ets_linear': (replace(roberge_experiment.LINEAR, divide=halves(4)), roberge_experiment.SVM),
+    'jamali': (replace(jamali_experiment.PROTOCOL, divide=folds(5, 1)), jamali_experiment.FIVE),
 }
 
 
 def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = False) -> Ablation:
     """Return the same with the change of accuracy of the paper's method, if there is one, without each effect."""
-    paper = PAPERS.get(ablation.scene)
-    if not paper:
+    if ablation.scene not in PAPERS:
         return ablation
-    [task] = paper.protocol.tasks
-    task = replace(task, methods=tuple(method for method in task.methods if method.name == paper.method))
+    protocol, name = PAPERS[ablation.scene]
+    [task] = protocol.tasks
+    task = replace(task, methods=tuple(method for method in task.methods if method.name == name))
 
     def right(world: Scene, number: int) -> float:
-        [(_, outcome)] = of_task(paper.protocol, task, world, seed + number, quick=quick)
+        [(_, outcome)] = of_task(protocol, task, world, seed + number, quick=quick)
         return outcome.test.value
 
     touch_protocol = TOUCH_PROTOCOLS[ablation.scene]
@@ -470,7 +454,7 @@ class _Size:
     repeats: int = 5
     paper_repeats: int = 3
     scan_repeats: int = 15
-    many: int = MANY
+    many: int = 100  # slides at once
     timed: int = 10
     timed_repeats: int = 5
 
@@ -512,7 +496,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         f'paper; intervals of {CONFIDENCE:.0%}',
         numbers={
             'target_ms': {'without stick-slip': TARGET_MS[False], 'with': TARGET_MS[True]},
-            'scan_ms': {f'{name}, stick-slip' if kind else name: asdict(cost) for (name, kind), cost in costs.items()},
+            'scan_ms': {f'{name}, stick-slip' if kind else name: cost for (name, kind), cost in costs.items()},
             'terms': {ablation.scene: _terms(ablation) for ablation in ablations},
             'added': {
                 effect.term: {'strength': asdict(EFFECTS[effect.term]()), **_terms(ablation)}

@@ -24,6 +24,7 @@ from texture_core.ros_testing import NodeProcess
 from texture_core.types import NANOSECONDS, Array, ExplorationState, TactileSignal, TextureEstimate
 from texture_estimation.model import load_model
 from texture_features.windows import INDEX_TOLERANCE
+from texture_recordings.bags import slide_batches
 from texture_recordings.ros import TOPICS, Topic
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
@@ -224,7 +225,12 @@ class _Finger:
             load_scene(slide.scene), slide.surface, SPEED_M_S, FORCE_N, slide.slide_s,
             start_ns=0, exploration_id='long', rng=np.random.default_rng(slide.seed),
         )  # fmt: skip
-        return cls(namespace, states, {topic: rebatch(signals[topic]) for topic in signals})
+        batches = {}
+        for topic, [first, *others] in signals.items():  # one unbroken stream
+            samples = np.concatenate([first.samples, *(signal.samples for signal in others)])
+            places = np.arange(len(samples))
+            batches[topic] = list(slide_batches(first, samples, places, first.stamp_ns, batch_s=BATCH_S))
+        return cls(namespace, states, batches)
 
     def topic(self, short: str) -> str:
         """Return the name of a topic of this finger."""
@@ -281,23 +287,6 @@ def driver_cpu() -> float:
             before, began = sensor.cpu_s(), time.monotonic()
             graph.spin(DRIVER_S)
             return (sensor.cpu_s() - before) / (time.monotonic() - began)
-
-
-def rebatch(signals: Sequence[TactileSignal]) -> list[TactileSignal]:
-    """Cut one unbroken stream into batches of BATCH_S, or of one sample if that is longer."""
-    samples = np.concatenate([signal.samples for signal in signals])
-    first = signals[0]
-    rate_hz = first.sampling_rate_hz
-    size = max(1, round(BATCH_S * rate_hz))
-    return [
-        replace(
-            first,
-            stamp_ns=first.stamp_ns + round(start / rate_hz * NANOSECONDS),
-            first_sample=first.first_sample + start,
-            samples=samples[start : start + size],
-        )
-        for start in range(0, len(samples), size)
-    ]
 
 
 def _sent_at(streamer: Streamer, topic: str) -> list[float]:

@@ -515,17 +515,11 @@ class HazardRig(Listener):
 
 def children(pid: int) -> list[int]:
     """Return the processes that a process has started."""
-    found = [folder for folder in Path('/proc').iterdir() if folder.name.isdigit()]
-    parents = {int(folder.name): parent_of(folder) for folder in found}
-    return [child for child, parent in parents.items() if parent == pid]
-
-
-def parent_of(folder: Path) -> int:
-    """Return the parent of a process by its folder in /proc, 0 if it has ended."""
-    try:
-        return int((folder / 'stat').read_text(errors='replace').rpartition(')')[2].split()[1])
-    except OSError:
-        return 0
+    found: list[int] = []
+    for thread in Path('/proc', str(pid), 'task').glob('*/children'):
+        with suppress(OSError):  # it has ended meanwhile
+            found += map(int, thread.read_text(encoding='ascii').split())
+    return found
 
 
 def command_line(pid: int) -> list[str]:
