@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from texture_benchmarks import catalogue
-from texture_benchmarks.catalogue import BENCHMARKS, LONG, SIDE_BY_SIDE, in_processes
+from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all
 from texture_benchmarks.commands import benchmark as command
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_bringup.command import main
@@ -29,15 +29,12 @@ def act(name: str, folder: Path) -> int:
 
 
 def test_one_that_fails_or_is_killed_stops_no_other(tmp_path: Path) -> None:
-    for at_once in (1, 3):
-        folder = tmp_path / str(at_once)
-        folder.mkdir()
-        codes = in_processes(NAMES, partial(act, folder=folder), at_once)
-        assert codes == {'good': 0, 'killed': -signal.SIGKILL, 'bad': 1, 'clock': 0, 'missing': 3}
+    codes = run_all(NAMES, partial(act, folder=tmp_path))
+    assert codes == {'good': 0, 'killed': -signal.SIGKILL, 'bad': 1, 'clock': 0, 'missing': 3}
 
 
 def test_every_benchmark_has_its_line_on_the_page_and_what_is_scheduled_exists() -> None:
-    assert {*SIDE_BY_SIDE, *LONG} < set(BENCHMARKS)
+    assert set(LONG) < set(BENCHMARKS)
     page = (Path(__file__).resolve().parents[3] / 'docs' / 'benchmarks.md').read_text()
     assert re.findall(r'^\| `(\w+)` \|', page, re.MULTILINE) == list(BENCHMARKS)
 

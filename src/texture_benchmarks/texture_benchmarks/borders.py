@@ -226,11 +226,13 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 Cell = tuple[str, str, str]  # border, data and recipe
 
 
-def tried(trials: Sequence[BorderTrial]) -> Mapping[Cell, list[SlideAnswer]]:
+def tried(
+    trials: Sequence[BorderTrial], recipe_named: Callable[[str], Recipe] = recipe_of
+) -> Mapping[Cell, list[SlideAnswer]]:
     """Return what each recipe says of the slides of each border."""
     found: defaultdict[Cell, list[SlideAnswer]] = defaultdict(list)
     jobs = [(index, name) for index, trial in enumerate(trials) for name in trial.recipes]
-    for (index, name), tested in zip(jobs, map_forked(partial(_try, trials), jobs), strict=True):
+    for (index, name), tested in zip(jobs, map_forked(partial(_try, trials, recipe_named), jobs), strict=True):
         for border, results in tested.items():
             found[border, trials[index].data, name] += results
     return found
@@ -295,10 +297,12 @@ def _cluster(slide: LabelledSlide) -> str:
     return f'{slide.surface} {slide.place or slide.session}'
 
 
-def _try(trials: Sequence[BorderTrial], job: tuple[int, str]) -> dict[str, list[SlideAnswer]]:
+def _try(
+    trials: Sequence[BorderTrial], recipe_named: Callable[[str], Recipe], job: tuple[int, str]
+) -> dict[str, list[SlideAnswer]]:
     if job[1] in CONTROLS:
         return control(trials[job[0]], job[1])
-    trial, recipe = trials[job[0]], recipe_of(job[1])
+    trial, recipe = trials[job[0]], recipe_named(job[1])
     model = train(recipe, training_examples(recipe, for_recipe(trial.trained, recipe)))
     found = {}
     for border, slides in trial.tested.items():
@@ -312,12 +316,7 @@ def _try(trials: Sequence[BorderTrial], job: tuple[int, str]) -> dict[str, list[
 def figures(tested: Sequence[SlideAnswer]) -> dict[str, Any]:
     """Return how slides end, with intervals over clusters, and how they stand after the usual times."""
     results = [one.result for one in tested]
-    ends = [(result.end, result.surface) for result in results]
-    shares = {
-        'right': [end.label == surface for end, surface in ends],
-        'known_right': [end.known and end.label == surface for end, surface in ends],
-        'known_wrong': [end.known and end.label != surface for end, surface in ends],
-    }
+    shares = _shares([(result.end, result.surface) for result in results])
     early = [(result.early(), result.surface) for result in results]
     wrong = [end.decided and end.known and end.label != surface for end, surface in early]
     names = sorted({one.cluster for one in tested})
@@ -344,11 +343,14 @@ def _after(results: Sequence[SlideResult], seconds: float) -> dict[str, float] |
     reached = [(end, one.surface) for one in results if (end := one.after(seconds)) is not None]
     if not reached:
         return None
+    return {'slides': len(reached), **{name: float(np.mean(which)) for name, which in _shares(reached).items()}}
+
+
+def _shares(ends: Sequence[tuple[TextureEstimate, str]]) -> dict[str, list[bool]]:
     return {
-        'slides': len(reached),
-        'right': float(np.mean([end.label == surface for end, surface in reached])),
-        'known_right': float(np.mean([end.known and end.label == surface for end, surface in reached])),
-        'known_wrong': float(np.mean([end.known and end.label != surface for end, surface in reached])),
+        'right': [end.label == surface for end, surface in ends],
+        'known_right': [end.known and end.label == surface for end, surface in ends],
+        'known_wrong': [end.known and end.label != surface for end, surface in ends],
     }
 
 

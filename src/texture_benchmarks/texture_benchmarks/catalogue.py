@@ -4,11 +4,8 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
-from multiprocessing.connection import wait
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from texture_benchmarks import (
@@ -27,7 +24,6 @@ from texture_benchmarks import (
 )
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.config import find
-from texture_estimation.search import single_blas_thread
 
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
@@ -47,8 +43,6 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
 }
-# Where accuracy counts: they run side by side, one on each core, the longest first.
-SIDE_BY_SIDE = ('trust', 'learning', 'next_motion', 'next_motion_recorded')
 # What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes or more.
 LONG = frozenset({'borders', 'finger_check', 'motion', 'overview', 'scale', 'scenes', 'trust'})
 
@@ -62,30 +56,12 @@ def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult
 
 
 def run_all(names: Sequence[str], act: Act) -> dict[str, int]:
-    """Run studies, those of SIDE_BY_SIDE first, then the others one by one; return the exit codes by name."""
-    beside = [name for name in SIDE_BY_SIDE if name in names]
-    alone = [name for name in names if name not in SIDE_BY_SIDE]
-    return {**in_processes(beside, act, os.cpu_count() or 1), **in_processes(alone, act, 1)}
-
-
-def in_processes(names: Sequence[str], act: Act, at_once: int) -> dict[str, int]:
-    """Run the act for each name in a process, so many at once; return the exit codes, below 0 of what was killed."""
-    waiting, codes = list(names), {}
-    running: dict[object, BaseProcess] = {}
+    """Run the act for each name in a process of its own; return the exit codes, below 0 of what was killed."""
     context = multiprocessing.get_context('fork')  # nothing is imported again
-    while waiting or running:
-        while waiting and len(running) < at_once:
-            name = waiting.pop(0)
-            process = context.Process(target=_run, args=(name, act, at_once), name=name)
-            process.start()
-            running[process.sentinel] = process
-        for ended in wait([process.sentinel for process in running.values()]):
-            done = running.pop(ended)
-            done.join()
-            codes[done.name] = done.exitcode or 0
+    codes = {}
+    for name in names:
+        process = context.Process(target=lambda name=name: sys.exit(act(name)))
+        process.start()
+        process.join()
+        codes[name] = process.exitcode or 0
     return codes
-
-
-def _run(name: str, act: Act, at_once: int) -> None:
-    with single_blas_thread() if at_once > 1 else nullcontext():
-        raise SystemExit(act(name))

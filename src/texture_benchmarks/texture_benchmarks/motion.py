@@ -6,13 +6,12 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
-import socket
 import statistics
 import tempfile
-import threading
+import time
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
 from pathlib import Path
@@ -23,7 +22,7 @@ import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.ros_testing import NodeProcess
-from texture_core.types import Array, ExplorationRequest, ExplorationState, FingerState, Phase
+from texture_core.types import Array, ExplorationRequest, ExplorationState, Phase
 from texture_evaluation.charts import COLOURS, chart
 from texture_exploration.arms.arm import Arm, ArmState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
@@ -39,6 +38,7 @@ from texture_exploration.stages import TouchParams
 from texture_simulation.devices.dynamixel import LEAP_FINGERS, EmulatedDynamixelBus, leap_hand
 from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
+from texture_simulation.emulator import FingerStateReceiver
 
 ARM_PERIOD_NS = round(1e9 / RATE_HZ)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
@@ -257,43 +257,12 @@ LAG_S = 0.02
 
 
 DEADLINE_S = 60.0
+READ_S = 0.05  # how often: what is not read soon is lost
 GRIP_S = 20.0
 
 
 TOUCH = TouchParams()
 RUB = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, force_n=1.0, distance_m=0.02, duration_s=3.0)
-
-
-class FingerLog:
-    """Takes what an emulated robot tells the bench about its finger; usable as a context."""
-
-    def __init__(self) -> None:
-        self.fingers: list[FingerState] = []
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(('127.0.0.1', 0))
-        self._socket.settimeout(0.1)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='finger log', daemon=True)
-
-    @property
-    def port(self) -> int:
-        """UDP port on loopback."""
-        return int(self._socket.getsockname()[1])
-
-    def __enter__(self) -> FingerLog:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        self._ended.set()
-        self._thread.join()
-        self._socket.close()
-
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            with suppress(TimeoutError):
-                finger = FingerState.from_bytes(self._socket.recv(1024))
-                self.fingers += [finger] if finger else []
 
 
 @contextmanager
@@ -381,15 +350,18 @@ def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) ->
     robot = ROBOTS[name]
     states: list[ExplorationState] = []
     with ExitStack() as stack:
-        log = stack.enter_context(FingerLog())
-        arm = stack.enter_context(robot.start(stiffness_n_m, log.port))
+        told = stack.enter_context(closing(FingerStateReceiver(0)))
+        arm = stack.enter_context(robot.start(stiffness_n_m, told.port))
         explorer = Explorer(arm, replace(robot.touch, approach_stiffness_n_m=stiffness_n_m), LIMITS, states.append)
         stack.callback(explorer.close)
         explorer.connect()
-        exploration = explorer.begin('trial', request)
-        exploration.ended.wait(DEADLINE_S)
+        told.states()  # of before
+        exploration, fingers, late_s = explorer.begin('trial', request), [], time.monotonic() + DEADLINE_S
+        while not exploration.ended.wait(READ_S) and time.monotonic() < late_s:
+            fingers += told.states()
+        fingers += told.states()
         begins, phases = [state.stamp_ns for state in states], []
-        for finger in log.fingers:
+        for finger in fingers:
             newest = bisect_right(begins, finger.time_ns) - 1
             state = states[newest] if newest >= 0 else None
             if state and (state.phase is not Phase.SLIDE or finger.time_ns <= state.stamp_ns + state.steady_s * 1e9):

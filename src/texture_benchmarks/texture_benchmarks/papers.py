@@ -17,17 +17,16 @@ from texture_benchmarks.borders import (
     LATER,
     PLACE,
     SAME,
-    SlideAnswer,
+    BorderTrial,
     across_places,
     figures,
+    tried,
 )
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.training import train
-from texture_evaluation.cross_validation import interval, predict_slides
-from texture_evaluation.train import training_examples
+from texture_evaluation.cross_validation import interval
 from texture_features.examples import LabelledFeatures
 from texture_recordings.dataset import SlideDataset
 
@@ -71,17 +70,18 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         slides = SlideDataset.from_bags(bags, '1-12' if options.quick else '21-40').in_parts(2)
     earlier, later = ('1-8', '9-12') if options.quick else (EARLIER, LATER)
     numbers: dict[str, dict[str, Any]] = {SAME: {}, PLACE: {}}
-    for name in QUICK if options.quick else RECIPES:
-        for border, answers in _tried(slides, earlier, later, recipe_of(name)).items():
-            known = figures(answers)
-            numbers[border][name] = {
-                'slides': len(answers),
-                'right': known['right'],
-                'interval': known['interval']['right'],
-            }
-        if name in OF_TWO:
-            for border, right in _of_two(slides, earlier, later, recipe_of(name)).items():
-                numbers[border][f'{name}, two fingers'] = right
+    names = QUICK if options.quick else tuple(RECIPES)
+    trials = [BorderTrial('biotac20 halves', names, *own) for own in _halves(slides, earlier, later)]
+    for (border, _, name), answers in tried(trials, recipe_of).items():
+        known = figures(answers)
+        numbers[border][name] = {
+            'slides': len(answers),
+            'right': known['right'],
+            'interval': known['interval']['right'],
+        }
+    for name in (one for one in OF_TWO if one in names):
+        for border, right in _of_two(slides, earlier, later, recipe_of(name)).items():
+            numbers[border][f'{name}, two fingers'] = right
     return BenchmarkResult(
         name='papers',
         measured=run.__doc__,
@@ -98,17 +98,6 @@ def _halves(
     for place in PLACES:
         trained = slides.select(earlier, where=lambda one, place=place: one.place == place)  # type: ignore[misc]
         yield trained, across_places(slides.select(later), trained)
-
-
-def _tried(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> Mapping[str, list[SlideAnswer]]:
-    found: defaultdict[str, list[SlideAnswer]] = defaultdict(list)
-    for trained, tested in _halves(slides, earlier, later):
-        model = train(recipe, training_examples(recipe, trained))
-        for border, others in tested.items():
-            clusters = {one.name: f'{one.surface} {one.place}' for one in others}
-            results = predict_slides(model, others.features(recipe.feature_set))
-            found[border] += [SlideAnswer(clusters[name], result) for name, result in results.items()]
-    return found
 
 
 def _of_two(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> Mapping[str, dict[str, Any]]:

@@ -21,7 +21,7 @@ from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
     imported,
-    in_own_process,
+    map_forked,
 )
 from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator
@@ -143,7 +143,8 @@ KIB_PER_MIB = 1024.0
 def costs_of(recipe: Recipe, spread: FeatureSpread, size: DrawnSize, seed: int) -> dict[str, Any]:
     """Return what one training costs, and what its model recognises of other slides."""
     trained = recipe if size.copies else replace(recipe, augmentation=replace(recipe.augmentation, copies=0))
-    return in_own_process(lambda: _measure(trained, spread, size, seed))
+    [found] = map_forked(lambda size: _measure(trained, spread, size, seed), [size])
+    return found
 
 
 def _measure(recipe: Recipe, spread: FeatureSpread, size: DrawnSize, seed: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import platform
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -98,10 +99,14 @@ _work: list[Callable[[Any], Any]] = []  # of a worker
 
 
 def map_forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> list[Out]:
-    """Return work(job) for each job, in their order."""
+    """Return work(job) for each job, in their order; one job alone has memory that nothing else has used."""
     context = multiprocessing.get_context('fork')
-    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), context, _begin, (work,)) as pool:
-        return list(pool.map(_do, jobs))
+    with ProcessPoolExecutor(min(len(jobs), len(os.sched_getaffinity(0))), context, _begin, (work,)) as pool:
+        try:
+            return list(pool.map(_do, jobs))
+        except BrokenProcessPool as error:
+            sentence = 'a measurement ended without an answer; see above, or give it more memory'
+            raise DeviceError(sentence) from error
 
 
 def _begin(work: Callable[[Any], Any]) -> None:
@@ -111,22 +116,6 @@ def _begin(work: Callable[[Any], Any]) -> None:
 def _do(job: Any) -> Any:
     with single_blas_thread():
         return _work[0](job)
-
-
-def in_own_process(measure: Callable[[], Out]) -> Out:
-    """Return what a function returns in a process of its own, whose memory nothing else has used."""
-    context = multiprocessing.get_context('fork')
-    here, there = context.Pipe(duplex=False)
-    process = context.Process(target=lambda: there.send(measure()))
-    process.start()
-    there.close()
-    try:
-        found: Out = here.recv()
-    except EOFError as error:
-        raise DeviceError('a measurement ended without an answer; see above, or give it more memory') from error
-    finally:
-        process.join()
-    return found
 
 
 def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
