@@ -19,7 +19,8 @@ from texture_core.errors import InvalidData
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes
 from texture_estimation.numerics import shrunk_covariance
-from texture_features.examples import Interval, RunningConditions, SlideConditions
+from texture_features.examples import RunningConditions, SlideConditions
+from texture_features.windows import Interval
 
 Mask = NDArray[np.bool_]
 
@@ -213,13 +214,6 @@ class ConfidenceFloor:
                 f'confidence_floor has {len(counts)} effective_window_counts and {len(self.log_odds)} log_odds; '
                 'as many of both are needed, finite, the counts ascending'
             )
-
-    def reached_by(self, confidences: Array, effective_windows: Array) -> Mask:
-        """Return what `reached` does for each window of a slide, (n_windows,)."""
-        if not self.log_odds:
-            return np.ones(len(confidences), dtype=bool)
-        least = np.interp(effective_windows, self.effective_window_counts, self.log_odds)
-        return confidences >= 1.0 / (1.0 + np.exp(-least))
 
     def reached(self, confidence: float, effective_windows: float) -> bool:
         """Return whether a known surface may have so little confidence.
@@ -691,11 +685,7 @@ NOVELTY_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0)
 # Spaces in which a slide is compared with the slides of its class, and the length of its start that is compared. The
 # first windows of slides are compared by themselves, as this shows soonest that something differs.
 FEATURES, HIDDEN, ONSET = 'features', 'hidden', 'onset'
-SPACES: Mapping[str, float] = {
-    FEATURES: NOVELTY_WINDOWS[-1],
-    HIDDEN: NOVELTY_WINDOWS[-1],
-    ONSET: 1.5,
-}
+SPACES: Mapping[str, float] = {FEATURES: NOVELTY_WINDOWS[-1], HIDDEN: NOVELTY_WINDOWS[-1], ONSET: 1.5}
 # Negative log-odds of the best to the second label, and the negative fraction of the windows that agree with the best.
 LOG_ODDS, AGREEMENT = 'log_odds', 'agreement'
 OTHER_SCORES = (LOG_ODDS, AGREEMENT)
@@ -1026,12 +1016,7 @@ def _conformal(novelty_scores: Array, false_rejection_rate: float) -> float:
 # Conformal prediction sets: the smallest sets of textures with a given coverage.
 
 ROUNDING = 1e-9
-SETS_WINDOWS = (
-    1.0,
-    2.0,
-    4.0,
-    8.0,
-)  # lengths of evidence at which it is fitted, in windows that do not overlap
+SETS_WINDOWS = (1.0, 2.0, 4.0, 8.0)  # lengths of evidence at which it is fitted, in windows that do not overlap
 
 
 @dataclass(frozen=True)

@@ -210,22 +210,6 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=100.0,
     )
-    direction_margin_rad: float = param(
-        0.35,
-        'Largest angle between the direction of an exploration and a direction of the training; '
-        'beyond, the estimate says that it is outside what was trained.',
-        unit='rad',
-        low=0.0,
-        high=3.2,
-    )
-
-    level_margin: float = param(
-        1.0,
-        'How far the signal level of an exploration may lie outside the levels of the training, relative to them; '
-        'beyond, the estimate says that it is outside what was trained.',
-        low=0.0,
-        high=1e6,
-    )
 
     def __post_init__(self) -> None:
         if FEATURES not in self.novelty_scores:
@@ -254,7 +238,7 @@ class DecisionParams(TrainingParams):
     @property
     def domain_margins(self) -> DomainMargins:
         """How far an exploration may lie outside the conditions of the training."""
-        return DomainMargins(self.speed_margin, self.force_margin, self.direction_margin_rad, self.level_margin)
+        return DomainMargins(self.speed_margin, self.force_margin)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import copy
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -635,14 +635,6 @@ class SearchParams:
 
 
 @dataclass(frozen=True)
-class ScoredIndividual:
-    """An individual with its fitness: larger is better."""
-
-    individual: Individual
-    fitness: float
-
-
-@dataclass(frozen=True)
 class Generation:
     """What is reported after each generation: its number of how many, the best alive, and how many were tried.
 
@@ -651,17 +643,19 @@ class Generation:
 
     number: int
     of: int
-    best: ScoredIndividual
+    best: Individual
+    fitness: float  # of the best; larger is better
     tried: int
     evaluated: int
 
 
 @dataclass(frozen=True, eq=False)
 class Finalist:
-    """A recipe evaluated on every half: its score in the search, and learning and test score of each half."""
+    """A recipe evaluated on every half: its fitness in the search, and learning and test score of each half."""
 
     recipe: Any
-    searched: ScoredIndividual
+    individual: Individual
+    searched: float
     scores: tuple[HalfScore, ...]
 
     @property
@@ -762,8 +756,12 @@ def optimise(
     identity = _identity(space, slides, task, params)
     known = read_scores(resume, identity) if resume else {}
     n_read = len(known)
-    members: dict[Individual, ScoredIndividual] = {}
+    alive: list[Individual] = []
     history: list[Generation] = []
+
+    def rank(one: Individual) -> tuple[float, str]:
+        return known[one], str(one)
+
     algorithm = _algorithm(space, params)
     for number in range(1, params.generations + 1):
         offspring = algorithm.ask()
@@ -773,28 +771,21 @@ def optimise(
         new = [one for one in dict.fromkeys(tried) if one not in known]
         trials = trials_of(space, slides, task, new)
         known.update(zip(new, map(fitness, _evaluated(trials, few)), strict=True))
-        scored = {one: ScoredIndividual(one, known[one]) for one in tried}
-        offspring.set('F', np.array([[-scored[one].fitness] for one in tried]))
+        offspring.set('F', np.array([[-known[one]] for one in tried]))
         algorithm.tell(infills=offspring)
         alive = [space.individual(point) for point in algorithm.pop.get('X')]
-        members = {one: scored.get(one) or members[one] for one in alive}
-        best = max(members.values(), key=_rank)
-        history.append(Generation(number, params.generations, best, len(known), len(known) - n_read))
+        best = max(alive, key=rank)
+        history.append(Generation(number, params.generations, best, known[best], len(known), len(known) - n_read))
         if checkpoint:
             write_scores(checkpoint, identity, known)
         tell(history[-1])
-    ranked = sorted(members.values(), key=_rank, reverse=True)
-    chosen = ranked[: params.finalists]
-    trials = trials_of(space, slides, task, [one.individual for one in chosen])
+    chosen = sorted(dict.fromkeys(alive), key=rank, reverse=True)[: params.finalists]
+    trials = trials_of(space, slides, task, chosen)
     finalists = [
-        Finalist(trial.recipe, one, scores)
+        Finalist(trial.recipe, one, known[one], scores)
         for one, trial, scores in zip(chosen, trials, _evaluated(trials, params.halves), strict=True)
     ]
     return SearchResult(tuple(sorted(finalists, key=lambda one: -one.fitness)), tuple(history))
-
-
-def _rank(one: ScoredIndividual) -> tuple[float, str]:
-    return one.fitness, str(one.individual)
 
 
 def trials_of(
@@ -821,11 +812,9 @@ def _evaluated(trials: Sequence[Trial], n_halves: int) -> list[tuple[HalfScore, 
     return [tuple(scores[place * n_halves : (place + 1) * n_halves]) for place in range(len(trials))]
 
 
-@contextmanager
-def single_blas_thread() -> Iterator[None]:
-    """Keep linear algebra from starting threads of its own: the cores are busy already."""
-    with threadpool_limits(limits=1, user_api='blas'):
-        yield
+def single_blas_thread() -> AbstractContextManager[Any]:
+    """Keep linear algebra from starting threads of its own within a `with` block: the cores are busy already."""
+    return threadpool_limits(limits=1, user_api='blas')
 
 
 def scored_alone(trial: Callable[[int], HalfScore], number: int) -> HalfScore:

@@ -360,7 +360,8 @@ def fit_novelty(
         _Slide(number, int(classes[first[number]]), examples.values, np.flatnonzero(groups == number))
         for number in range(len(names))
     ]
-    disturbed = _disturbed_slides(examples, names, classes[first])
+    augmented = examples.augmented
+    disturbed = [*_copied_slides(augmented.disturbed, names, classes[first])] if augmented else []
     copies = _reference_copies(examples, names, classes[first], gain_range)
     # what says when and how a window was made, and not what of: not compared
     apart = {temporal.SLIDE_ONSET, FORCE} if isinstance(learner, ForceDiscriminant) else {temporal.SLIDE_ONSET}
@@ -413,10 +414,6 @@ def _folds(
     parts = split[0] if split else np.zeros(len(groups), np.intp)
     for part in np.unique(parts):
         yield frozenset(groups[parts == part].tolist()), None
-
-
-def _disturbed_slides(examples: LabelledFeatures, names: Any, classes: Codes) -> list[_Slide]:
-    return list(_copied_slides(examples.augmented.disturbed, names, classes)) if examples.augmented else []
 
 
 def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, gain_range: float) -> list[_Slide]:
@@ -607,7 +604,10 @@ def fit_open_set(
     most = decisions.max_known_error_rate if held_out_parts(examples) is not None else 1.0
     floor = fit_confidence_floor(courses, decisions.low_confidence_rejection_rate, most)
     courses = [
-        replace(course, known=course.known & floor.reached_by(course.confidences, course.effective_windows))
+        replace(
+            course,
+            known=course.known & [*map(floor.reached, course.confidences.tolist(), course.effective_windows.tolist())],
+        )
         for course in courses
     ]
     rule = fit_stopping_rule(

@@ -20,15 +20,15 @@ SMALL = SearchParams(population=5, generations=2, halves=3)
 def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: Path) -> None:
     out = tmp_path / 'best.yaml'
     said: list[int] = []
-    written = optimise_from_bags(
+    files, _lines = optimise_from_bags(
         Wanted('ets-linear-svm', (str(simulated),)),
         SMALL,
         out,
         tell=lambda _, generation: said.append(generation.number),
     )
     assert said == [1, 2]
-    assert written.files == (out, tmp_path / 'best.search.json', tmp_path / 'best.png')
-    assert all(path.is_file() for path in written.files)
+    assert files == (out, tmp_path / 'best.search.json', tmp_path / 'best.png')
+    assert all(path.is_file() for path in files)
     first, second, *_ = out.read_text().splitlines()
     assert 'texture optimise ets-linear-svm' in first
     assert re.fullmatch(r'# fitness \d+\.\d %: training .* over 3 halves\.', second)
@@ -69,18 +69,18 @@ def test_pairs_that_cannot_be_joined_are_written_alone_and_it_is_said_why(
 
     monkeypatch.setattr(optimise, 'joined_recipe', refuse)
     wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
-    written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
+    _files, lines = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
     assert not (tmp_path / 'best.yaml').exists()
     assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
-    assert written.lines[-1] == "no recipe of all pairs was written: the pairs differ in 'windows'"
+    assert lines[-1] == "no recipe of all pairs was written: the pairs differ in 'windows'"
 
 
 def test_grades_are_tuned_by_a_roughness_recipe(simulated: Path, tmp_path: Path) -> None:
     table = tmp_path / 'grades.csv'
     table.write_text('texture,grade\nglass,1\nleather,3\nridge_2mm_deep,5\n')
     wanted = Wanted('ets-roughness-svm5', (str(simulated),), grades=str(table))
-    written = optimise_from_bags(wanted, SMALL, tmp_path / 'rough.yaml')
-    assert 'Svm5' in written.files[0].read_text()
+    files, _lines = optimise_from_bags(wanted, SMALL, tmp_path / 'rough.yaml')
+    assert 'Svm5' in files[0].read_text()
 
 
 @pytest.mark.parametrize(

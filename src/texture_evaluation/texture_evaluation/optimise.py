@@ -196,7 +196,7 @@ def convergence_chart(searches: Mapping[str, Sequence[search.Generation]], title
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
         for (name, history), style in zip(searches.items(), cycle(line_styles()), strict=False):
-            best = [100 * one.best.fitness for one in history]
+            best = [100 * one.fitness for one in history]
             label = name if len(searches) <= NAMED else None
             axes.step([one.number for one in history], best, where='mid', label=label, **style)
         axes.set(xlabel='generation', ylabel='fitness of the best individual (%)')
@@ -267,7 +267,7 @@ def optimise_from_bags(
     *,
     resume: bool = False,
     tell: Tell = lambda *_: None,
-) -> Written:
+) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Tune a recipe and write it as `out`, with checkpoint and chart beside it; within `workers`, on several cores.
 
     Parameters
@@ -285,8 +285,10 @@ def optimise_from_bags(
 
     Returns
     -------
-    Written
-        What was found, and the paths of the files.
+    tuple of Path
+        The files.
+    tuple of str
+        What was found, in lines for people.
 
     Raises
     ------
@@ -316,9 +318,8 @@ def optimise_from_bags(
     else:
         task = search.RoughnessTask(read_grades(wanted.grades)) if wanted.grades else search.ClassificationTask()
         found = search.optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
-    written = write_recipes(found, space.base, wanted.recipe, params, target)
-    chart = _draw(found, wanted.recipe, target.with_suffix('.png'))
-    return Written((*written.files, chart), written.lines)
+    files, lines = write_recipes(found, space.base, wanted.recipe, params, target)
+    return (*files, _draw(found, wanted.recipe, target.with_suffix('.png'))), lines
 
 
 def _draw(found: search.SearchResult | PairSearchResult, recipe: str, chart: Path) -> Path:
@@ -352,20 +353,6 @@ def _space(wanted: Wanted) -> search.RecipeSpace:
 # Recipes that a search has found, written as files that `texture train` reads.
 
 
-@dataclass(frozen=True)
-class Written:
-    """The files that a search has written, and what it found in lines for people.
-
-    Examples
-    --------
-    >>> Written((checkpoint_of('best.yaml'),), ('nothing yet',)).files[0].name
-    'best.search.json'
-    """
-
-    files: tuple[Path, ...]
-    lines: tuple[str, ...]
-
-
 def checkpoint_of(out: str | Path) -> Path:
     """Return where the scores of a search are kept: 'best.yaml' → 'best.search.json'."""
     path = Path(out)
@@ -380,7 +367,7 @@ def written_checkpoints(out: str | Path) -> list[Path]:
 
 def write_recipes(
     found: search.SearchResult | PairSearchResult, base: Any, tuned: str, params: search.SearchParams, target: Path
-) -> Written:
+) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Write the best recipe; of pairs, theirs and the one that joins them.
 
     Where a recipe comes from and its scores stand at the top of its file.
@@ -400,8 +387,10 @@ def write_recipes(
 
     Returns
     -------
-    Written
-        The files, with the checkpoint of a search that has one, and what was found.
+    tuple of Path
+        The files, with the checkpoint of a search that has one.
+    tuple of str
+        What was found, in lines for people.
 
     Raises
     ------
@@ -419,21 +408,16 @@ def write_recipes(
     )
     for path, finalist in files.items():
         _write(finalist.recipe, path, origin, _scores(finalist))
-    written = Written(tuple(files), tuple(f'{path}: {_scores(finalist)}' for path, finalist in files.items()))
-    if isinstance(found, PairSearchResult):
-        return _with_joined(written, found, base, origin, target)
-    return Written((*written.files, checkpoint_of(target)), written.lines)
-
-
-def _with_joined(written: Written, pairs: PairSearchResult, base: Recipe, origin: str, target: Path) -> Written:
-    """Write the recipe that joins those of the pairs, or say why there is none."""
-    together = f'all pairs together, most pairs won: {_shares(pairs.scores)}'
+    lines = tuple(f'{path}: {_scores(finalist)}' for path, finalist in files.items())
+    if not isinstance(found, PairSearchResult):
+        return (*files, checkpoint_of(target)), lines
+    together = f'all pairs together, most pairs won: {_shares(found.scores)}'
     try:
-        joined = joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
+        joined = joined_recipe({pair: one.best.recipe for pair, one in found.by_pair.items()}, base)
     except InvalidParameter as error:
-        return Written(written.files, (*written.lines, together, f'no recipe of all pairs was written: {error}'))
+        return tuple(files), (*lines, together, f'no recipe of all pairs was written: {error}')
     _write(joined, target, origin, together)
-    return Written((target, *written.files), (*written.lines, f'{target}: {together}'))
+    return (target, *files), (*lines, f'{target}: {together}')
 
 
 def _write(recipe: Any, path: Path, origin: str, scores: str) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import NANOSECONDS, AnyArray, Array, FeatureVector, SlideMotion
+from texture_features.windows import UNKNOWN, Interval, RunningMean
 
 if TYPE_CHECKING:
     from texture_features.augmentation import AugmentedFeatures
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 # --------------------
 # How one exploration was made: motion, sensor, and the speed, force, directions and signal level of its windows.
 
-Interval = tuple[float, float]
-UNKNOWN: Interval = (math.nan, math.nan)
 DIRECTION_DIGITS = 2  # so that a slide has few directions, however long it is
 # In the name of the feature that tells the level of a channel, 'signal/moments/signal_log_power/dynamic'.
 LOG_POWER = '/moments/signal_log_power/'
@@ -131,10 +130,10 @@ class RunningConditions:
 
     def __init__(self) -> None:
         self.motion = self.sensor = ''
-        self._speed = _RunningMean()
-        self._force = _RunningMean()
+        self._speed = RunningMean()
+        self._force = RunningMean()
         self.directions_rad: dict[float, None] = {}  # in the order in which they came
-        self._levels: list[tuple[str, int, _RunningMean]] | None = None  # channel, place among the features, log power
+        self._levels: list[tuple[str, int, RunningMean]] | None = None  # channel, place among the features, log power
 
     def update(self, vector: FeatureVector) -> None:
         """Take the conditions of one more window into account."""
@@ -145,7 +144,7 @@ class RunningConditions:
         if math.isfinite(vector.direction_rad):
             self.directions_rad[round(vector.direction_rad, DIRECTION_DIGITS)] = None
         if self._levels is None and vector.names:
-            self._levels = [(channel, place, _RunningMean()) for channel, place in _log_powers(vector.names)]
+            self._levels = [(channel, place, RunningMean()) for channel, place in _log_powers(vector.names)]
         for _, place, log_power in self._levels or ():
             log_power.update(float(vector.values[place]))
 
@@ -178,24 +177,6 @@ class RunningConditions:
         )
 
 
-class _RunningMean:
-    """Mean of the finite values, and the range in which it has been so far."""
-
-    def __init__(self) -> None:
-        self.value = math.nan
-        self.range = UNKNOWN
-        self._sum = 0.0
-        self._count = 0
-
-    def update(self, value: float) -> None:
-        if math.isfinite(value):
-            self._sum += value
-            self._count += 1
-            self.value = mean = self._sum / self._count
-            low, high = self.range
-            self.range = (low if low <= mean else mean, high if high >= mean else mean)  # NaN is neither
-
-
 def _level(channel: Any, rms: Any, *interval: Any) -> SignalLevel:
     return SignalLevel(str(channel), float(rms), *_pair(interval))
 
@@ -214,7 +195,7 @@ def _log_powers(names: Sequence[str]) -> list[tuple[str, int]]:
     ]
 
 
-def _signal_level(channel: str, log_power: _RunningMean) -> SignalLevel:
+def _signal_level(channel: str, log_power: RunningMean) -> SignalLevel:
     return SignalLevel(channel, *(math.exp(0.5 * value) for value in (log_power.value, *log_power.range)))
 
 

@@ -317,6 +317,9 @@ class BufferedStream:
 # --------------------
 # One slide: which time is covered, and how fast and hard the finger moved.
 
+Interval = tuple[float, float]
+UNKNOWN: Interval = (math.nan, math.nan)
+
 # Two slide states at most so far apart cover the time between them.
 LINK_NS = NANOSECONDS // 2
 # No guarantee holds for longer: a wrong one must not make millions of windows.
@@ -391,8 +394,7 @@ class SlideCoverage:
         self._states: deque[tuple[int, ExplorationState]] = deque(maxlen=MAX_STATES)
         self._promising = False
         self._withdrawn = False
-        self._force = _WeightedMean()
-        self._speed = _WeightedMean()
+        self._force, self._speed = RunningMean(), RunningMean()  # of the guaranteed states
         self.add(state)
 
     def add(self, state: ExplorationState) -> bool:
@@ -409,8 +411,9 @@ class SlideCoverage:
         self._withdrawn = self._promising and not state.steady_s > 0
         if self._withdrawn and self._is_far(state):
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
-        self._force.add(state.force_n, float(state.steady_s > 0))
-        self._speed.add(state.speed_m_s, float(state.steady_s > 0))
+        if state.steady_s > 0:
+            self._force.update(state.force_n)
+            self._speed.update(state.speed_m_s)
         self._states.append((self._intervals[-1][1], state))
         return True
 
@@ -480,21 +483,32 @@ def _mean(weighted: Sequence[tuple[float, float]]) -> float:
     return sum(weight * value for weight, value in known) / total if total else math.nan
 
 
-class _WeightedMean:
-    """Weighted mean of what is known."""
+class RunningMean:
+    """Mean of the finite values, and the range in which it has been so far.
+
+    Examples
+    --------
+    >>> mean = RunningMean()
+    >>> for value in (1.0, math.nan, 4.0):
+    ...     mean.update(value)
+    >>> mean.value, mean.range
+    (2.5, (1.0, 2.5))
+    """
 
     def __init__(self) -> None:
+        self.value = math.nan
+        self.range = UNKNOWN
         self._sum = 0.0
-        self._weight = 0.0
+        self._count = 0
 
-    def add(self, value: float, weight: float) -> None:
-        if weight > 0 and math.isfinite(value):
-            self._sum += weight * value
-            self._weight += weight
-
-    @property
-    def value(self) -> float:
-        return self._sum / self._weight if self._weight else math.nan
+    def update(self, value: float) -> None:
+        """Add a value; one that is not finite says nothing."""
+        if math.isfinite(value):
+            self._sum += value
+            self._count += 1
+            self.value = mean = self._sum / self._count
+            low, high = self.range
+            self.range = (low if low <= mean else mean, high if high >= mean else mean)  # NaN is neither
 
 
 def _steady_ns(steady_s: float) -> int:

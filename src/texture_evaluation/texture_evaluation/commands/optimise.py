@@ -49,14 +49,14 @@ def run(options: argparse.Namespace) -> int:
     progress = Progress()
     try:
         with workers(options.jobs, options.dask):
-            written = optimise_from_bags(wanted, params, options.out, resume=options.resume, tell=progress.tell)
+            files, lines = optimise_from_bags(wanted, params, options.out, resume=options.resume, tell=progress.tell)
     except KeyboardInterrupt:
         progress.end()
         print(f"scores are kept in '{checkpoint_of(options.out)}': go on with --resume", file=sys.stderr)
         raise
     progress.end()
-    print('\n'.join(written.lines))
-    for path in written.files:
+    print('\n'.join(lines))
+    for path in files:
         print(f'  {path}')
     return 0
 
@@ -100,5 +100,5 @@ def bar(generation: Generation, taken_s: float, pair: str = '') -> str:
     done = BAR * generation.number // generation.of
     return (
         f'{pair}{": " if pair else ""}[{"#" * done}{"." * (BAR - done)}] {generation.number}/{generation.of}  '
-        f'best {100 * generation.best.fitness:.2f} %  {generation.tried} tried  {taken_s:.0f} s'
+        f'best {100 * generation.fitness:.2f} %  {generation.tried} tried  {taken_s:.0f} s'
     )
