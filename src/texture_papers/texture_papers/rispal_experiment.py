@@ -431,11 +431,6 @@ def table_lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
         f'(without, {100 * skids["without"]["refused"]:.1f} %): error of all {number(skids["with"]["error_of_all"])}, '
         f'of those graded {number(skids["with"]["error_of_the_others"])}'
     )
-    for name, facts in numbers['tuning'].items():
-        yield (
-            f'  search for {name}: {facts["seconds"]:.0f} s, {facts["cpu_seconds"]:.0f} s of one core, for '
-            f'{facts["generations"]} generations on {facts["scans"]} scans, {facts["individuals_tried"]} individuals'
-        )
     latency = numbers['window_to_grade_us']
     yield f'  from window to grade: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile'
     yield from _texture_lines(numbers, grades)
