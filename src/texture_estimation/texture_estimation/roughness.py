@@ -343,43 +343,83 @@ def read_grades(path: str | Path) -> Grades:
         If there is no such file, or with the line that cannot be used.
     """
     place = find_file(str(path), 'texture_simulation', 'config/grades', 'table of grades', '.csv')
-    try:
-        file = io.StringIO(read_text(place, MAX_BYTES, 'utf-8-sig'), newline='')
-        reader = csv.DictReader(line for line in file if not line.startswith('#'))
-        rows = list(enumerate(reader, 2))
-        columns = tuple(reader.fieldnames or ())
-    except (OSError, ValueError, csv.Error) as error:
-        raise InvalidData(f"'{place}' cannot be read: {error}; give a CSV file of grades") from error
-    if not {'texture', 'grade'} <= set(columns):
-        raise InvalidData(f"'{place}' has the columns {', '.join(columns) or 'none'}; texture and grade are needed")
     grades: dict[str, float] = {}
     splits: dict[str, str] = {}
-    for line, row in rows:
+    for line, row in read_rows(place, ('texture', 'grade'), 'grade'):
         texture, where = row['texture'], f"'{place}', line {line}"
         if not texture or texture in grades:
             raise InvalidData(f"{where}: the texture is '{texture}'; name each once")
-        grades[texture] = _grade(row['grade'], where)
-        if row.get('split'):
-            splits[texture] = _split(row['split'], where)
-    if not grades:
-        raise InvalidData(f"'{place}' holds no grade; write one a line under texture,grade")
+        grades[texture] = checked_grade(row['grade'], where)
+        if split := row.get('split'):
+            if split not in (TRAIN, TEST):
+                raise InvalidData(f"{where}: the split is '{split}'; '{TRAIN}' or '{TEST}' is needed")
+            splits[texture] = split
     return Grades(grades, splits)
 
 
-def _grade(text: str | None, where: str) -> float:
+def read_rows(path: Path, columns: Sequence[str], what: str) -> list[tuple[int, dict[str, str]]]:
+    """Read a CSV file: number and entries of each line, by the names of the columns in small letters.
+
+    Lines that begin with '#' are no lines. An entry that a short line lacks is None.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    columns
+        Names of those that are needed; 'rating' is another name of 'grade'.
+    what
+        What a line holds, for the sentence of an error.
+
+    Raises
+    ------
+    InvalidData
+        If it cannot be read, lacks a column, or has no line.
+    """
+    needed = f'{", ".join(columns[:-1])} and {columns[-1]} are needed, one {what} a line'
+    try:
+        file = io.StringIO(read_text(path, MAX_BYTES, 'utf-8-sig'), newline='')
+        reader = csv.DictReader(line for line in file if not line.startswith('#'))
+        names = ['grade' if name == 'rating' else name for name in map(_plain, reader.fieldnames or ())]
+        reader.fieldnames = names
+        rows = [(reader.line_num, row) for row in reader]
+    except (OSError, ValueError, csv.Error) as error:
+        raise InvalidData(f"'{path}' cannot be read: {error}; give a CSV file of {what}s") from error
+    if missing := [name for name in columns if name not in names]:
+        raise InvalidData(
+            f"'{path}' has the columns {', '.join(names) or 'none'} but no {', '.join(missing)}; {needed}"
+        )
+    if not rows:
+        raise InvalidData(f"'{path}' holds no {what}; {needed}")
+    return rows
+
+
+def _plain(name: str) -> str:
+    return name.strip().lower()
+
+
+def checked_grade(
+    text: str | None, where: str, scale: tuple[float, float] = (SMOOTH, ROUGH), advice: str = ''
+) -> float:
+    """Return a number on a scale of grades; InvalidData with the place if it is none, or beyond an end.
+
+    Parameters
+    ----------
+    text
+        As it was read.
+    where, advice
+        Place of the text, and what else may help, for the sentence of the error.
+    scale
+        Smoothest and roughest grade.
+    """
+    low, high = scale
     try:
         grade = float(text or '')
     except ValueError:
         grade = math.nan
-    if not SMOOTH <= grade <= ROUGH:
-        raise InvalidData(f"{where}: the grade is '{text}'; a number from 1 to 5 is needed")
+    if not low <= grade <= high:
+        raise InvalidData(f"{where}: the grade is '{text}'; a number from {low:g} to {high:g} is needed{advice}")
     return grade
-
-
-def _split(text: str, where: str) -> str:
-    if text not in (TRAIN, TEST):
-        raise InvalidData(f"{where}: the split is '{text}'; '{TRAIN}' or '{TEST}' is needed")
-    return text
 
 
 # --------------------

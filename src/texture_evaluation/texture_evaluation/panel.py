@@ -4,30 +4,27 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from texture_core.config import MB, read_text, writing
+from texture_core.config import writing
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray, Array
-from texture_estimation.roughness import ROUGH, SMOOTH
+from texture_estimation.roughness import ROUGH, SMOOTH, checked_grade, read_rows
 from texture_evaluation.charts import COLOURS, chart
 
 # --------------------
 # Ratings from 1 (smooth) to 5 (rough) that people gave textures, and the table they are read from.
 
 RATINGS_GRADES = np.arange(1, 6)
-MAX_BYTES = 1 * MB
 MAX_CELLS = 1_000_000  # people × textures
 COLUMNS = ('rater', 'texture', 'grade')
-SYNONYMS = {'rating': 'grade'}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,87 +82,36 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
     ------
     InvalidData
         With the line, if the file cannot be read as such.
+    InvalidParameter
+        If the smooth end of the scale is not below the rough one.
     """
-    rows = _read_rows(Path(path))
-    raters = tuple(dict.fromkeys(row['rater'] for _, row in rows))
-    textures = tuple(dict.fromkeys(row['texture'] for _, row in rows))
+    low, high = scale
+    if not low < high:
+        raise InvalidParameter(f'the scale goes from {low:g} to {high:g}; give the smooth end first, then a larger one')
+    given: dict[tuple[str, str], float] = {}
+    for line, row in read_rows(Path(path), COLUMNS, 'rating'):
+        where, key = f"'{path}', line {line}", (row['rater'], row['texture'])
+        if not all(key) or row['grade'] is None:
+            raise InvalidData(f'{where}: rater or texture is missing; write rater,texture,grade')
+        if not math.isnan(given.get(key, math.nan)):
+            raise InvalidData(f"{where}: rater '{key[0]}' graded '{key[1]}' before; give one grade each")
+        given[key] = math.nan
+        if row['grade'].strip():
+            rating = checked_grade(row['grade'], where, scale, ', or name another scale with --scale')
+            given[key] = SMOOTH + (ROUGH - SMOOTH) * (rating - low) / (high - low)
+    raters, textures = (tuple(dict.fromkeys(names)) for names in zip(*given, strict=True))
     if len(raters) * len(textures) > MAX_CELLS:
         raise InvalidData(
             f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MAX_CELLS}"
         )
-    grades = _grades(rows, raters, textures, scale, path)
-    _check_filled(raters, textures, grades, path)
-    low, high = scale
-    note = '' if scale == (SMOOTH, ROUGH) else f'ratings from {low:g} to {high:g} were mapped linearly to 1 to 5'
-    return Ratings(raters, textures, grades, note)
-
-
-def _read_rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
-    """Return number and columns of each line."""
-    try:
-        reader = csv.DictReader(io.StringIO(read_text(path, MAX_BYTES, 'utf-8-sig'), newline=''))
-        names = [SYNONYMS.get(name.strip().lower(), name.strip().lower()) for name in reader.fieldnames or ()]
-        reader.fieldnames = names
-        rows: list[tuple[int, Mapping[str, str]]] = [(reader.line_num, row) for row in reader]
-    except (OSError, ValueError, csv.Error) as error:
-        raise InvalidData(f"'{path}' cannot be read: {error}; give a CSV file of ratings") from error
-    missing = [name for name in COLUMNS if name not in names]
-    if missing:
-        raise InvalidData(
-            f"'{path}' has the columns {', '.join(names) or 'none'} but no {', '.join(missing)}; "
-            'write one rating a line under rater,texture,grade'
-        )
-    if not rows:
-        raise InvalidData(f"'{path}' holds no rating; write one a line under rater,texture,grade")
-    for line, row in rows:
-        if any(row[name] is None for name in COLUMNS) or not row['rater'] or not row['texture']:
-            raise InvalidData(f"'{path}', line {line}: rater or texture is missing; write rater,texture,grade")
-    return rows
-
-
-def _grades(
-    rows: Sequence[tuple[int, Mapping[str, str]]],
-    raters: Sequence[str],
-    textures: Sequence[str],
-    scale: tuple[float, float],
-    path: str | Path,
-) -> Array:
-    """Return the grades, (n_raters, n_textures), NaN where there is none."""
-    rater_at = {name: index for index, name in enumerate(raters)}
-    texture_at = {name: index for index, name in enumerate(textures)}
-    grades = np.full((len(raters), len(textures)), np.nan)
-    for line, row in rows:
-        at = rater_at[row['rater']], texture_at[row['texture']]
-        if not np.isnan(grades[at]):
-            raise InvalidData(
-                f"'{path}', line {line}: rater '{row['rater']}' graded '{row['texture']}' before; give one grade each"
-            )
-        grades[at] = _rating(row['grade'], scale, f"'{path}', line {line}")
-    return grades
-
-
-def _rating(text: str, scale: tuple[float, float], where: str) -> float:
-    low, high = scale
-    if not low < high:
-        raise InvalidParameter(f'the scale goes from {low:g} to {high:g}; give the smooth end first, then a larger one')
-    if not text.strip():
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
-        needed = f'a number from {low:g} to {high:g} is needed, or name another scale with --scale'
-        raise InvalidData(f"{where}: the grade is '{text}'; {needed}")
-    return SMOOTH + (ROUGH - SMOOTH) * (value - low) / (high - low)
-
-
-def _check_filled(raters: Sequence[str], textures: Sequence[str], grades: Array, path: str | Path) -> None:
+    grades = np.array([[given.get((rater, texture), math.nan) for texture in textures] for rater in raters])
     empty = np.isnan(grades).all(axis=0)
     if empty.any():
         raise InvalidData(f"'{path}': nobody graded '{textures[int(empty.argmax())]}'; leave it out or grade it")
     if len(raters) < 2:
         raise InvalidData(f"'{path}' has a single rater, '{raters[0]}'; a panel needs two or more")
+    note = '' if scale == (SMOOTH, ROUGH) else f'ratings from {low:g} to {high:g} were mapped linearly to 1 to 5'
+    return Ratings(raters, textures, grades, note)
 
 
 # --------------------

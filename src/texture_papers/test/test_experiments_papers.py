@@ -312,7 +312,7 @@ def test_a_verdict_follows_from_the_interval_over_seeds_or_over_textures(name: s
         assert len(finding['by_seed']) >= 5, finding['claim']
         if 'by_texture' not in finding:
             assert finding['over_seeds'] == pytest.approx(mean_over_seeds(finding['by_seed']).as_json(), abs=2e-4)
-        assert finding['verdict'] == VERDICTS[Interval(*finding['over_seeds']).above()]
+        assert finding['verdict'] == VERDICTS[Interval(*finding['over_seeds']).positive()]
 
 
 @pytest.mark.parametrize('name', STORED)

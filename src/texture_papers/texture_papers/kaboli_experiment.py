@@ -96,7 +96,7 @@ def _on_average(claim: str, outcome: MethodResult) -> Finding:
     shares = [mean(right_of(outcome, surfaces)) for surfaces in SURFACES]
     centre = sum(one.value for one in shares) / len(shares)
     reach = max(one.high - one.value for one in shares)  # the sets share their slides
-    over = Interval(centre - PAPER_PA, centre - reach - PAPER_PA, centre + reach - PAPER_PA)
+    over = Interval(centre, centre - reach, centre + reach).less(PAPER_PA)
     named = ', '.join(f'{task} {100 * one.value:.1f}' for task, one in zip(TASKS, shares, strict=True))
     return Finding(claim, f'{100 * centre:.1f} % ({named})', over)
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold, ShuffleSplit, StratifiedShuffleSplit
 
-from texture_core.config import find
+from texture_core.config import find, writing
 from texture_core.errors import InvalidData, InvalidParameter, UnknownName
 from texture_core.types import AnyArray, Array, Samples
 from texture_estimation.learners.learner import Codes, of_examples
@@ -64,15 +64,19 @@ class Interval:
     low: float
     high: float
 
-    def above(self, border: float = 0.0) -> bool | None:
-        """Tell whether the figure is above a border; None if the interval does not tell."""
-        if self.low > border:
+    def positive(self) -> bool | None:
+        """Tell whether the figure is above 0; None if the interval does not tell."""
+        if self.low > 0.0:
             return True
-        return False if self.high < border else None
+        return False if self.high < 0.0 else None
 
     def times(self, factor: float) -> Interval:
         """Return the figure in another unit."""
         return Interval(self.value * factor, self.low * factor, self.high * factor)
+
+    def less(self, border: float) -> Interval:
+        """Return how much the figure is above a border."""
+        return Interval(self.value - border, self.low - border, self.high - border)
 
     def as_json(self) -> list[float]:
         """Return value, low and high, rounded."""
@@ -407,7 +411,7 @@ class Finding:
     @property
     def holds(self) -> bool | None:
         """Whether the claim holds; None if the interval does not decide."""
-        return self.interval.above()
+        return self.interval.positive()
 
 
 MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what came out
@@ -723,11 +727,9 @@ class TunedRecipe:
             If the file cannot be written.
         """
         text = yaml.safe_dump(self.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
-        try:
+        with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding='utf-8')
-        except OSError as error:
-            raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another folder") from error
         return path
 
 
@@ -1299,7 +1301,7 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
             means = [float(np.mean([one['by_texture'][name] for one in same])) for name in names]
             finding['over_seeds'] = mean_over_seeds(means).as_json()
         if 'over_seeds' in finding:
-            finding['verdict'] = VERDICTS[Interval(*finding['over_seeds']).above()]
+            finding['verdict'] = VERDICTS[Interval(*finding['over_seeds']).positive()]
     return numbers
 
 

@@ -39,6 +39,7 @@ from texture_papers.protocol import (
     Experiment,
     ExperimentResult,
     Finding,
+    Mask,
     RecognitionTask,
     SlideArrays,
     TunedRecipe,
@@ -93,9 +94,8 @@ class Answers:
 
     def by_texture(self) -> dict[str, dict[str, float]]:
         """Return human grade, mean and standard deviation of each texture."""
-        names, table = np.asarray(self.textures), {}
-        for name in dict.fromkeys(self.textures):
-            rows = names == name
+        table = {}
+        for name, rows in self._rows():
             given = self.grades[rows & np.isfinite(self.grades)]
             table[name] = {
                 'human': float(self.true[rows][0]),
@@ -112,16 +112,19 @@ class Answers:
 
     def _spread(self) -> float | None:
         """Return the standard deviation of the grades within a texture, the mean over the textures with a grade."""
-        given, names = np.isfinite(self.grades), np.asarray(self.textures)
-        rows = [given & (names == name) for name in dict.fromkeys(self.textures)]
-        spreads = [float(self.grades[own].std()) for own in rows if own.any()]
-        return float(np.mean(spreads)) if spreads else None
+        stds = [row['std'] for row in self.by_texture().values() if math.isfinite(row['std'])]
+        return float(np.mean(stds)) if stds else None
 
     def error_by_texture(self) -> dict[str, float]:
         """Return the mean absolute error of each texture that got a grade."""
-        names, errors = np.asarray(self.textures), np.abs(self.grades - self.true)
-        known = {name: errors[(names == name) & np.isfinite(errors)] for name in dict.fromkeys(self.textures)}
+        errors = np.abs(self.grades - self.true)
+        known = {name: errors[rows & np.isfinite(errors)] for name, rows in self._rows()}
         return {name: float(values.mean()) for name, values in known.items() if len(values)}
+
+    def _rows(self) -> Iterator[tuple[str, Mask]]:
+        """Yield each texture with its windows, (n,)."""
+        names = np.asarray(self.textures)
+        yield from ((name, names == name) for name in dict.fromkeys(self.textures))
 
 
 SPEED_M_S, FORCE_N, SCAN_S, USED_S = 0.15, 2.5, 0.7, 0.5
@@ -275,6 +278,11 @@ class Setup:
         true = np.array([self.grades.of(label) for label in examples.labels])
         return Answers(grades, model.calibration.window_std(stds), true, examples.labels.tolist())
 
+    def ask_both(self, model: RoughnessModel, recipe: RoughnessRecipe) -> dict[str, Answers]:
+        """Return what a model says of the textures that it was trained on ('seen'), and of the others ('unseen')."""
+        parts = {'seen': self.grades.used_for(TRAIN), 'unseen': self.grades.used_for(TEST)}
+        return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
+
 
 TARGET_S = 15 * 60.0
 
@@ -317,25 +325,12 @@ WARM_UP = 200  # windows before the time is taken
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
 
 
-@dataclass(frozen=True, eq=False)
-class Series:
-    """Textures with the human grade, the mean and standard deviation of the estimates, and the interval claimed."""
-
-    textures: tuple[str, ...]
-    human: Array
-    mean: Array
-    std: Array
-    interval_std: Array
-
-    @classmethod
-    def of(cls, table: Mapping[str, Mapping[str, float]]) -> Series:
-        """Return the series of a table by texture."""
-        columns = [np.array([row[name] for row in table.values()]) for name in ('human', 'mean', 'std', 'interval_std')]
-        return cls(tuple(table), *columns)
+# Of each texture: the human grade, mean and standard deviation of the estimates, and the interval claimed.
+ByTexture = Mapping[str, Mapping[str, float]]
 
 
 def grades_chart(
-    panels: Mapping[str, Mapping[str, Series]], textures: Sequence[str], title: str, path: str | Path
+    panels: Mapping[str, Mapping[str, ByTexture]], textures: Sequence[str], title: str, path: str | Path
 ) -> Path:
     """Draw the estimates of each texture beside its human grade, a panel for each head (the paper's Fig. 7).
 
@@ -357,8 +352,7 @@ def grades_chart(
     Path
         Of the file.
     """
-    human = {name: grade for series in panels.values() for s in series.values()
-             for name, grade in zip(s.textures, s.human, strict=True)}  # fmt: skip
+    human = {name: row['human'] for series in panels.values() for one in series.values() for name, row in one.items()}
     order = sorted(textures, key=lambda name: (human[name], list(textures).index(name)))
     place = {name: index for index, name in enumerate(order)}
     with chart(path, (0.36 * len(order) + 2.0, 2.9 * len(panels) + 1.0), title) as figure:
@@ -402,12 +396,13 @@ def coverage_chart(nominal: Array, covered: Array, title: str, path: str | Path)
     return Path(path)
 
 
-def _grade_bars(axes: Any, series: Series, place: Mapping[str, int], kind: str) -> None:
-    at = [place[name] for name in series.textures]
-    half = NORMAL_90 * series.interval_std
-    axes.errorbar(at, series.mean, yerr=half, fmt='none', color=SHADES[kind], linewidth=0.8, alpha=0.6, zorder=2)
-    axes.errorbar(at, series.mean, yerr=series.std, fmt='o', markersize=4, color=SHADES[kind], linewidth=3,
-                  alpha=0.85, label=kind, zorder=3)  # fmt: skip
+def _grade_bars(axes: Any, table: ByTexture, place: Mapping[str, int], kind: str) -> None:
+    at = [place[name] for name in table]
+    means, stds, claimed = (np.array([row[name] for row in table.values()]) for name in ('mean', 'std', 'interval_std'))
+    half = NORMAL_90 * claimed
+    axes.errorbar(at, means, yerr=half, fmt='none', color=SHADES[kind], linewidth=0.8, alpha=0.6, zorder=2)
+    axes.errorbar(at, means, yerr=stds, fmt='o', markersize=4, color=SHADES[kind], linewidth=3, alpha=0.85, label=kind,
+                  zorder=3)  # fmt: skip
 
 
 PARTS = (('seen', 'training'), ('unseen', 'unseen'))
@@ -528,11 +523,7 @@ def run(experiment: Experiment) -> ExperimentResult:
         return _table_2(setup, {name: recipe for name, recipe in recipes.items() if recipe.name != OURS})
     models = {name: train_grades(one, setup.examples(one, train), setup.grades, name) for name, one in recipes.items()}
     answers = {
-        name: {
-            'seen': setup.ask(models[name], setup.examples(recipe, train)),
-            'unseen': setup.ask(models[name], setup.examples(recipe, test)),
-            'left_out': _leave_one_out(setup, recipe),
-        }
+        name: {**setup.ask_both(models[name], recipe), 'left_out': _leave_one_out(setup, recipe)}
         for name, recipe in recipes.items()
     }
     numbers: dict[str, Any] = {
@@ -577,9 +568,7 @@ def _table_2(setup: Setup, recipes: Mapping[str, RoughnessRecipe]) -> Experiment
     answers = {}
     for name, recipe in recipes.items():
         quick = _quickly(recipe, setup)
-        model = train_grades(quick, setup.examples(quick, train), setup.grades, name)
-        parts = {'seen': train, 'unseen': test}
-        answers[name] = {part: setup.ask(model, setup.examples(recipe, of)) for part, of in parts.items()}
+        answers[name] = setup.ask_both(train_grades(quick, setup.examples(quick, train), setup.grades, name), recipe)
     return ExperimentResult(
         name='roughness',
         measured='mean absolute error in grades of single windows, by the heads of the paper',
@@ -664,8 +653,7 @@ def _after_search(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experime
     for name, one in tuned.items():
         one.write(experiment.out / f'{RECIPES[name]}-tuned.yaml')
         model = train_grades(_quickly(one.recipe, setup), setup.examples(one.recipe, train), setup.grades, name)
-        parts = {'seen': train, 'unseen': test}
-        answers[name] = {part: setup.ask(model, setup.examples(one.recipe, of)) for part, of in parts.items()}
+        answers[name] = setup.ask_both(model, one.recipe)
     size = f'{params.population} individuals, {params.generations} generations, {params.search_halves} halves'
     own = digests()
     return ExperimentResult(
@@ -788,12 +776,12 @@ def _charts(
 ) -> tuple[Any, ...]:
     panels = {
         f'{name}: training and unseen textures': {
-            'training': Series.of(answers[name]['seen'].by_texture()),
-            'unseen': Series.of(answers[name]['unseen'].by_texture()),
+            'training': answers[name]['seen'].by_texture(),
+            'unseen': answers[name]['unseen'].by_texture(),
         }
         for name in ('ANN5', 'ours')
     }
-    panels['ours: each texture left out in turn'] = {'unseen': Series.of(answers['ours']['left_out'].by_texture())}
+    panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
     where = f'simulated, {len(setup.textures)} textures'
     return (
         grades_chart(panels, setup.textures, f'Roughness as people grade it, and as it is estimated ({where})',
