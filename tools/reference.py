@@ -26,6 +26,7 @@ import yaml
 from texture_bringup.command import installed, summary
 from texture_core.cli import Command
 from texture_core.config import markdown_table
+from texture_core.types import DEVICES
 from texture_drivers.catalogue import SENSORS
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_exploration.arms.catalogue import ARMS
@@ -169,7 +170,7 @@ def parameters(root: Path) -> str:
             parts.append(f'## {package}\n')
         about = inspect.cleandoc(cls.__doc__ or '').split('\n', 1)[0]
         parts.append(f'### {cls.__module__.removeprefix(package + ".")}: {cls.__name__}\n\n{about}\n')
-        parts.append(markdown_table(cls))
+        parts.append(markdown_table(cls).replace(DEVICES, '/tmp/tactile_texture'))
     return '\n'.join(parts)
 
 

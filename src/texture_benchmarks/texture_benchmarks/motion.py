@@ -22,7 +22,7 @@ import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.ros_testing import NodeProcess
-from texture_core.types import Array, ExplorationRequest, ExplorationState, Phase
+from texture_core.types import Array, ExplorationRequest, ExplorationState, FingerReceiver, Phase
 from texture_evaluation.charts import COLOURS, chart
 from texture_exploration.arms.arm import Arm, ArmState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
@@ -38,7 +38,6 @@ from texture_exploration.stages import TouchParams
 from texture_simulation.devices.dynamixel import LEAP_FINGERS, EmulatedDynamixelBus, leap_hand
 from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
-from texture_simulation.emulator import FingerStateReceiver
 
 ARM_PERIOD_NS = round(1e9 / RATE_HZ)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
@@ -266,44 +265,44 @@ RUB = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, force_n=1.0, distanc
 
 
 @contextmanager
-def ur(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
+def ur(stiffness_n_m: float, finger_pipe: str) -> Iterator[Arm]:
     """Start an emulated UR controller."""
     params = UrControllerParams(
-        ip=UR_IP, finger_port=finger_port, stiffness_n_m=stiffness_n_m, start_height_m=HEIGHT_M, force_offset_n=0.0
+        ip=UR_IP, finger_pipe=finger_pipe, stiffness_n_m=stiffness_n_m, start_height_m=HEIGHT_M, force_offset_n=0.0
     )
     with ControllerProcess(params):
         yield UrArm(UrArmParams(ip=UR_IP))
 
 
 @contextmanager
-def rails(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
+def rails(stiffness_n_m: float, finger_pipe: str) -> Iterator[Arm]:
     """Start emulated rails."""
     machine = RailsMachine(stiffness_n_m=stiffness_n_m, start_height_m=HEIGHT_M)
     with (
         tempfile.TemporaryDirectory() as folder,
-        EmulatedRails(Path(folder) / 'rails', machine, finger_port=finger_port) as made,
+        EmulatedRails(Path(folder) / 'rails', machine, finger_pipe=finger_pipe) as made,
     ):
         yield RailsArm(RailsParams(device=str(made.port.link), height_m=HEIGHT_M))
 
 
 @contextmanager
-def hand(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
+def hand(stiffness_n_m: float, finger_pipe: str) -> Iterator[Arm]:
     """Start an emulated LEAP hand; its index finger is looked at."""
     motors = leap_hand(stiffness_n_m)
     with (
         tempfile.TemporaryDirectory() as folder,
-        EmulatedDynamixelBus(Path(folder) / 'hand', motors, LEAP_FINGERS['index'], finger_port) as made,
+        EmulatedDynamixelBus(Path(folder) / 'hand', motors, LEAP_FINGERS['index'], finger_pipe) as made,
     ):
         yield InHandArm(InHandParams(hand='dynamixel', device=str(made.port.link), grip_timeout_s=GRIP_S))
 
 
 @contextmanager
-def ros_controllers(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
+def ros_controllers(stiffness_n_m: float, finger_pipe: str) -> Iterator[Arm]:
     """Start an emulated velocity controller with a lag of 20 ms, known only through its topics, in a domain of its own.
 
     The stiffest contact is expected throughout, and may be met with half of the wanted force.
     """
-    emulated = {'finger_port': finger_port, 'stiffness_n_m': stiffness_n_m, 'start_height_m': HEIGHT_M, 'lag_s': LAG_S}
+    emulated = {'finger_pipe': finger_pipe, 'stiffness_n_m': stiffness_n_m, 'start_height_m': HEIGHT_M, 'lag_s': LAG_S}
     isolation = {'ROS_DOMAIN_ID': str(CONTROLLER_DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
     with mock.patch.dict(os.environ, isolation), NodeProcess('texture_simulation', 'twist_controller', emulated):
         # A busy machine is not what is tried here.
@@ -322,7 +321,7 @@ def ros_controllers(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
 class RobotUnderTest:
     """An emulated robot: how it is started, what it does, how it touches, and the module that it needs."""
 
-    start: Callable[[float, int], AbstractContextManager[Arm]]
+    start: Callable[[float, str], AbstractContextManager[Arm]]
     needs: str
     requests: tuple[ExplorationRequest, ...] = (SLIDE, CIRCLE)
     touch: TouchParams = TOUCH
@@ -350,8 +349,9 @@ def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) ->
     robot = ROBOTS[name]
     states: list[ExplorationState] = []
     with ExitStack() as stack:
-        told = stack.enter_context(closing(FingerStateReceiver(0)))
-        arm = stack.enter_context(robot.start(stiffness_n_m, told.port))
+        pipe = str(Path(stack.enter_context(tempfile.TemporaryDirectory()), 'finger'))
+        told = stack.enter_context(closing(FingerReceiver(pipe)))
+        arm = stack.enter_context(robot.start(stiffness_n_m, pipe))
         explorer = Explorer(arm, replace(robot.touch, approach_stiffness_n_m=stiffness_n_m), LIMITS, states.append)
         stack.callback(explorer.close)
         explorer.connect()

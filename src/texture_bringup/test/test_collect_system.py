@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`texture collect` and `texture check` on the emulated rig, over a sample that varies."""
+"""The collector and `texture check` on the emulated rig, over a sample that varies."""
 
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
+from rclpy.action import ActionClient
+from texture_msgs import action, msg, srv
+
 from texture_bringup.command import main
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.nodes.collector import collect_surface
 from texture_bringup.operator import Operator
-from texture_core.errors import CollectionError, InvalidData
+from texture_core.errors import CollectionError
+from texture_core.ros_testing import LocalGraph, filled
 from texture_evaluation.collection import CollectionParams
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
@@ -39,10 +42,7 @@ def operator(folder):
     params = folder / 'patient.yaml'
     params.write_text(f'/**: {{ros__parameters: {{{PATIENT}, {PATCH}}}}}')
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
-    given = {
-        'device': folder / 'tsf85', 'finger_port': free_port(), 'scene': 'varying', 'surface': 'cork',
-        'recipe': 'fast', 'explorer_params': params,
-    }  # fmt: skip
+    given = {'devices': folder, 'scene': 'varying', 'surface': 'cork', 'recipe': 'fast', 'explorer_params': params}
     before = os.environ.get('ROS_DOMAIN_ID')
     os.environ['ROS_DOMAIN_ID'] = str(DOMAIN)  # of the recorder and the commands
     with (
@@ -75,20 +75,44 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
     train_from_bags('fast', [bag, other], out=folder / 'two')
 
 
-def test_a_collection_that_is_stopped_keeps_its_slides_and_lifts_the_finger(operator, folder):
-    many = replace(QUICK, places=3, most_places=9)
+@pytest.fixture
+def collector(operator, folder):
+    """Return the graph of a client of the collector, as its launch file starts it."""
+    environment = {**os.environ, 'ROS_LOG_DIR': str(folder)}
+    with (
+        ChildLauncher('collector', {}, environment, folder / 'collector.log') as launcher,
+        LocalGraph(DOMAIN, DEADLINE_S) as graph,
+    ):
+        graph.until(lambda: launcher.check() or graph.peer.count_services('collect'))
+        yield graph
 
-    def stop(_sentence, _slides):
-        raise KeyboardInterrupt
 
-    end, bag = collect_surface(operator, 'suede', folder / 'bags', many, stop)
-    assert (end.error, end.slides, len(SlideDataset.from_bags([bag]))) == (CollectionError.CANCELLED, 3, 3)
+def request_of(params, surface, folder):
+    return filled(msg.CollectionRequest(), {**asdict(params), 'surface': surface, 'folder': str(folder / 'bags')})
 
 
-def test_a_patch_that_was_never_taught_is_named(operator, folder):
+def test_a_collection_that_is_cancelled_keeps_its_slides_and_an_untaught_patch_is_named(collector, operator, folder):
+    request = request_of(replace(QUICK, places=3, most_places=9), 'suede', folder)
+    client, slides = ActionClient(collector.peer, action.Collect, 'collect'), []
+    collector.until(client.server_is_ready)
+    sent = client.send_goal_async(
+        action.Collect.Goal(request=request), lambda message: slides.append(message.feedback.slides)
+    )
+    collector.until(lambda: slides)
+    sent.result().cancel_goal_async()
+    ended = sent.result().get_result_async()
+    collector.until(ended.done)
+    result = ended.result().result.result
+    assert (result.error_code, slides[0]) == (CollectionError.CANCELLED, 3), result.message
+    assert result.slides == len(SlideDataset.from_bags([result.bag])) >= 3
+
     operator.set_parameters('explorer', {'patch_x_high_m': -0.05})
-    with pytest.raises(InvalidData, match='no surface is taught: touch the corners'):
-        collect_surface(operator, 'cork', folder / 'bags', QUICK, lambda _text, _slides: None)
+    service = collector.peer.create_client(srv.Collect, 'collect')
+    collector.until(service.service_is_ready)
+    answer = service.call_async(srv.Collect.Request(request=request))
+    collector.until(answer.done)
+    assert answer.result().result.error_code == CollectionError.INVALID_REQUEST
+    assert answer.result().result.message.startswith('no surface is taught: touch the corners')
     operator.set_parameters('explorer', {'patch_x_high_m': 0.05})
 
 

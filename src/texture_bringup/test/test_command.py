@@ -114,9 +114,9 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
 def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:
     assert main(['launch', 'ur', '--show-args']) == 0
     shown = capsys.readouterr().out
-    assert 'ip:=127.0.0.2' in shown
+    assert 'ip:=$(var devices)/ur' in shown
     assert 'surface:=glass' in shown
-    assert shown.count('finger_port:=') == 1
+    assert shown.count('devices:=') == 1
 
 
 def test_a_scene_is_drawn_and_explained(capsys, tmp_path) -> None:

@@ -14,7 +14,6 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 
 DOMAIN = 90
@@ -93,8 +92,7 @@ def address(folder, two_surfaces):
     """Return the address of the page of a bench that knows two surfaces."""
     port = free_tcp_port()
     given = {
-        'device': folder / 'tsf85',
-        'finger_port': free_port(),
+        'devices': folder,
         'surface': SURFACES[1],
         'model': two_surfaces / 'model.npz',
     }

@@ -14,7 +14,6 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core import config as resources
@@ -36,7 +35,7 @@ def folder(tmp_path_factory):
 
 def launched(folder: Path, **arguments: object) -> ChildLauncher:
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
-    given = {'device': folder / 'tsf85', 'finger_port': free_port(), 'namespace': 'left', **arguments}
+    given = {'devices': folder, 'namespace': 'left', **arguments}
     return ChildLauncher('emulator', given, environment, folder / 'nodes.log')
 
 

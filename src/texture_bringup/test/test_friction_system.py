@@ -13,7 +13,6 @@ import yaml
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core.config import find_file
@@ -72,8 +71,7 @@ def launch(out: Path) -> ChildLauncher:
     given = {
         'ip': ADDRESS,
         'sensor': 'tsf85',
-        'device': out / 'sensor',
-        'finger_port': free_port(),
+        'devices': out,
         'recipe': find_file(RECIPE, 'texture_estimation', 'config/recipes', 'recipe'),
         'scene': SCENE,
         'surface': SHEETS[0],

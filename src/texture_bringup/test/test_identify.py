@@ -12,7 +12,6 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.command import main
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_evaluation.train import train_from_bags
@@ -50,7 +49,7 @@ def bench(tmp_path, monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', str(DOMAIN))
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
     (tmp_path / 'patient.yaml').write_text(PATIENT)
-    given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'scene': 'oriented', 'surface': 'ridges_x'}
+    given = {'devices': tmp_path, 'scene': 'oriented', 'surface': 'ridges_x'}
     given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher('emulator', {**given, 'recipe': 'fast'}, dict(os.environ), tmp_path / 'nodes.log') as launcher:
         with Operator('', DOMAIN, launcher.check) as operator:

@@ -12,7 +12,6 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup import command
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 
@@ -33,7 +32,7 @@ PATIENT = """/**:
 
 def launched(words, folder, log):
     """Return the launcher of a `texture launch` line, with places of its own."""
-    own = {'device': folder / 'tsf85', 'finger_port': free_port(), 'explorer_params': folder / 'patient.yaml'}
+    own = {'devices': folder, 'explorer_params': folder / 'patient.yaml'}
     given = dict(word.split(':=') for word in words[3:])
     return ChildLauncher(words[2], {**own, **given}, dict(os.environ), log)
 

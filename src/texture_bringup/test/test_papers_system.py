@@ -20,7 +20,6 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 from rclpy.parameter import Parameter
 from texture_msgs import msg
 
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core import config as resources
@@ -220,18 +219,15 @@ class Rig:
         parameters = out / 'patient.yaml'
         patient = {**PATIENT, **ARMS.get(paper.robot, {})}
         parameters.write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
-        place = {'emulator': {}, 'ur': {'ip': '127.0.0.111'}, 'ros_controllers': {}}
         given = {
             'sensor': paper.sensor,
-            'device': out / 'sensor',
-            'finger_port': free_port(),
+            'devices': out,
             'recipe': recipe_file(paper.recipe),
             'scene': paper.scene,
             'surface': paper.surfaces[0],
             **paper.launch,
             'watch_signal': False,
             'explorer_params': parameters,
-            **place.get(paper.robot, {'robot': out / paper.robot}),
         }
         self.launcher = self.started(paper.robot, given)
         self.operator = Operator(domain_id=DOMAIN, guard=self.launcher.check)

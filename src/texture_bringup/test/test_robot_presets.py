@@ -1,22 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The presets of robots: every name and value is one that their nodes take, and the pages agree with them."""
+"""The launch files of robots, and their presets: every name and value is one that their nodes take."""
 
+import os
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 import yaml
 
+from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
+from texture_core.errors import InvalidLaunch, UnknownName
+from texture_exploration.arms.in_hand import InHandParams
+from texture_exploration.arms.rails import RailsParams
 from texture_exploration.arms.ros_controllers import RosControllersParams
 from texture_exploration.arms.ur import UrArmParams
 from texture_exploration.safety import SafetyLimits, SignalWatchParams
 from texture_exploration.stages import TouchParams
+from texture_simulation.emulator import EmulatorParams
+from texture_simulation.nodes.leap_hand import LeapHandParams
+from texture_simulation.nodes.rails import RailsLinkParams
+
+pytestmark = pytest.mark.ros
 
 PRESETS = sorted((resources.folder('texture_bringup', 'config') / 'robots').glob('*.yaml'))
 ROOT = Path(__file__).parents[3]
 ARMS = {'ur5e': UrArmParams}
+ROBOTS = ('ur', 'rails', 'hand', 'ros_controllers')
 
 
 def values_of(text):
@@ -47,3 +59,68 @@ def test_the_first_contact_is_the_same_with_and_without_the_driver_and_in_the_pa
         shared = direct.keys() & other.keys()
         assert {'contact_force_n', 'force_limit_n', 'max_force_n', 'approach_speed_m_s'} <= shared
         assert {name: other[name] for name in shared} == {name: direct[name] for name in shared}
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_a_real_robot_comes_without_anything_emulated(robot):
+    path = find_launch_file(robot)
+    device = {'device': '/dev/finger'}
+    emulated, real = (read(path, {'emulated': value, **device}, {}) for value in ('true', 'false'))
+    with pytest.raises(InvalidLaunch, match="argument 'device' is required"):  # not the place of an emulated one
+        read(path, {'emulated': 'false'}, {})
+    assert {node.package for node in emulated} - {node.package for node in real} == {'texture_simulation'}
+    assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
+
+
+def test_an_unknown_preset_gets_the_nearest():
+    with pytest.raises(UnknownName, match="'moveit_servo'"):
+        read(find_launch_file('ros_controllers'), {'preset': 'moveit_serv'}, {})
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
+    file = tmp_path / 'my_robot.yaml'
+    file.touch()
+    nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
+    explorer = next(node for node in nodes if node.executable == 'explorer')
+    assert explorer.parameters[-1] == file
+
+
+def given_to(node):
+    """Return the parameters that a launch file itself gives to a node."""
+    return {name: value for one in node.parameters if not isinstance(one, Path) for name, value in one.items()}
+
+
+@pytest.mark.parametrize('robot', ['emulator', *ROBOTS])
+def test_two_emulated_instances_share_no_device_if_their_namespaces_differ(robot, monkeypatch):
+    monkeypatch.setenv('XDG_RUNTIME_DIR', '/run/user/1000')
+
+    def devices(given):
+        found = {}
+        for node in read(find_launch_file(robot), given, os.environ):
+            found |= given_to(node)
+        return {value for value in found.values() if str(value).startswith('/run/user/1000/tactile_texture/')}
+
+    alone, left, right = (devices(given) for given in ({}, {'namespace': 'left'}, {'namespace': 'right'}))
+    assert len(alone) == len(left) == len(right) >= 2  # the sensor and the pipe of the finger, and what moves it
+    assert not left & right
+    assert not any('//' in path for path in alone | left)
+
+
+@pytest.mark.parametrize(
+    ('robot', 'node', 'params'),
+    [
+        ('emulator', 'emulator', EmulatorParams),
+        ('rails', 'rails', RailsLinkParams),
+        ('rails', 'explorer', RailsParams),
+        ('hand', 'leap_hand', LeapHandParams),
+        ('hand', 'explorer', InHandParams),
+    ],
+)
+def test_a_node_started_alone_looks_for_emulated_devices_where_launch_files_put_them(robot, node, params):
+    given = {}
+    for launched in read(find_launch_file(robot), {}, os.environ):
+        if launched.executable == node:
+            given |= given_to(launched)
+    defaults = asdict(params())
+    assert any(name in given and given[name] == defaults[name] for name in ('device', 'link', 'sensor_link'))

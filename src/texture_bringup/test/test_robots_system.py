@@ -11,15 +11,9 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup import command
-from texture_bringup.demo import free_port
-from texture_bringup.launcher import (
-    ChildLauncher,
-    find_launch_file,
-    read,
-)
+from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core import config as resources
-from texture_core.errors import InvalidLaunch, UnknownName
 
 DEADLINE_S = 60.0
 SURFACE = 'ridge_2mm_deep'
@@ -63,13 +57,9 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, two_surfaces, 
         **PATIENCE.get(robot, {}),
     }
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
-    place = {
-        'ur': {'ip': '127.0.0.110'},
-        'ros_controllers': {},
-        'rails': {'robot': tmp_path / robot},
-        'hand': {'robot': tmp_path / robot, 'profile': patient_hand(tmp_path)},
-    }[robot]
-    given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, **place}
+    given = {'devices': tmp_path, 'surface': SURFACE}
+    if robot == 'hand':
+        given['profile'] = patient_hand(tmp_path)
     given['model'] = two_surfaces / 'model.npz'
     given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
@@ -92,28 +82,3 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, two_surfaces, 
             )
             assert len(found) == (len(directions) if label else 1), reported
             assert all(label in ('', measured) and float(evidence_s) > 0.5 for measured, evidence_s in found), reported
-
-
-@pytest.mark.parametrize('robot', ROBOTS)
-def test_a_real_robot_comes_without_anything_emulated(robot):
-    path = find_launch_file(robot)
-    device = {'device': '/dev/finger'}
-    emulated, real = (read(path, {'emulated': value, **device}, {}) for value in ('true', 'false'))
-    with pytest.raises(InvalidLaunch, match="argument 'device' is required"):  # not the place of an emulated one
-        read(path, {'emulated': 'false'}, {})
-    assert {node.package for node in emulated} - {node.package for node in real} == {'texture_simulation'}
-    assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
-
-
-def test_an_unknown_preset_gets_the_nearest():
-    with pytest.raises(UnknownName, match="'moveit_servo'"):
-        read(find_launch_file('ros_controllers'), {'preset': 'moveit_serv'}, {})
-
-
-@pytest.mark.parametrize('robot', ROBOTS)
-def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
-    file = tmp_path / 'my_robot.yaml'
-    file.touch()
-    nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
-    explorer = next(node for node in nodes if node.executable == 'explorer')
-    assert explorer.parameters[-1] == file

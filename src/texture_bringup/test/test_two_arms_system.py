@@ -17,7 +17,6 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from texture_msgs.msg import TactileSignal
 
-from texture_bringup.demo import free_port
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import ExplorationResult, Operator
 from texture_core.ros import SENSOR_QOS
@@ -54,9 +53,9 @@ def arms(tmp_path: Path, two_surfaces: Path):
     given |= {'autostart': False, 'right_recipe': 'two-fingers', 'record_both': True, 'both_bag': tmp_path / 'bag'}
     for arm, surface in SURFACES.items():
         given[f'{arm}_surface'], given[f'{arm}_model'] = surface, models[arm]
-        given[f'{arm}_params'], given[f'{arm}_device'] = tmp_path / 'patient.yaml', tmp_path / f'{arm}_sensor'
-        given[f'{arm}_finger_port'] = free_port()
+        given[f'{arm}_params'] = tmp_path / 'patient.yaml'
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(tmp_path)}
+    environment['XDG_RUNTIME_DIR'] = str(tmp_path)  # the arms share all but the namespace
     with ChildLauncher('two_arms', given, environment, tmp_path / 'nodes.log') as launcher:
         yield launcher
 

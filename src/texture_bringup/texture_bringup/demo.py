@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 import os
-import random
 import shutil
 import socket
 import statistics
@@ -45,7 +44,7 @@ from texture_evaluation.train import train_from_bags
 from texture_recordings.bags import read_bag
 
 # --------------------
-# Places of its own for a demonstration, so that it disturbs nothing that runs already.
+# A ROS domain of its own for a demonstration, so that it disturbs nothing that runs already.
 
 # Domains whose ports lie below the ephemeral ports of Linux:
 # https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html The tests of the suite have those above 60.
@@ -54,21 +53,8 @@ DOMAINS = range(1, 61)
 FIRST_PORT, PORTS_PER_DOMAIN, FIRST_UNICAST = 7400, 250, 10
 
 
-@dataclass(frozen=True)
-class Isolation:
-    """A ROS domain, a UDP port for the finger and a path for the device that nobody else uses."""
-
-    domain_id: int
-    finger_port: int
-    device: Path
-
-    def environment(self, base: Mapping[str, str]) -> dict[str, str]:
-        """Return the environment for processes in this isolation."""
-        return {**base, 'ROS_DOMAIN_ID': str(self.domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-
-
-def isolate(folder: Path) -> Isolation:
-    """Return places that are free now; the device will appear in `folder`.
+def free_domain() -> int:
+    """Return a ROS domain that nobody uses now.
 
     Raises
     ------
@@ -79,16 +65,13 @@ def isolate(folder: Path) -> Isolation:
     first = os.getpid() % len(DOMAINS)
     for domain_id in (*DOMAINS[first:], *DOMAINS[:first]):
         if all(_is_free(FIRST_PORT + PORTS_PER_DOMAIN * domain_id + FIRST_UNICAST + offset) for offset in (0, 1)):
-            return Isolation(domain_id, free_port(), folder / 'tsf85')
+            return domain_id
     raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop something first')
 
 
-def free_port() -> int:
-    """Return a UDP port on loopback that is free now, and that no other program gets unasked before it is bound."""
-    # Below the ports that Linux deals out (32768 on), and below those of the ROS domains of tests and demonstrations.
-    while not _is_free(port := random.SystemRandom().randrange(10000, 20000)):
-        pass
-    return port
+def isolated(domain_id: int, environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment for processes that meet in a domain of this machine only."""
+    return {**environment, 'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
 
 def _is_free(port: int) -> bool:
@@ -286,16 +269,11 @@ class DemoRig:
     """
 
     def __init__(self, folder: Path, log: Path, recipe: str, seed: int) -> None:
-        self._isolation = isolate(folder)
-        self._environment = self._isolation.environment({**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
-        arguments = {
-            'device': self._isolation.device,
-            'finger_port': self._isolation.finger_port,
-            'recipe': recipe,
-            'seed': seed,
-        }
+        domain_id = free_domain()
+        self._environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
+        arguments = {'devices': folder, 'recipe': recipe, 'seed': seed}
         self._launcher = ChildLauncher('emulator', arguments, self._environment, log)
-        self._operator = Operator(domain_id=self._isolation.domain_id, guard=self._launcher.check)
+        self._operator = Operator(domain_id=domain_id, guard=self._launcher.check)
         self._open = ExitStack()
 
     def __enter__(self) -> DemoRig:

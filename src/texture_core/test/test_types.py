@@ -2,23 +2,25 @@
 from __future__ import annotations
 
 import math
-import socket
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from texture_core import errors
-from texture_core.errors import InvalidData
+from texture_core.errors import DeviceError, InvalidData
 from texture_core.types import (
-    LOOPBACK,
     MAX_CHARACTERS,
+    FingerReceiver,
     FingerSender,
     FingerState,
     SlideMotion,
     TactileSignal,
     checked_label,
     group_similar,
+    loopback_address,
     lost_samples,
     quaternion,
     quaternion_matrix,
@@ -156,22 +158,65 @@ def test_a_state_survives_the_wire() -> None:
 
 
 @pytest.mark.parametrize('data', [b'', b'TTF1', b'X' * 68, FingerState(1).to_bytes() + b'\0'])
-def test_a_foreign_datagram_is_no_state(data: bytes) -> None:
+def test_foreign_bytes_are_no_state(data: bytes) -> None:
     assert FingerState.from_bytes(data) is None
 
 
-def test_the_bench_is_reported_if_it_has_a_port_and_need_not_listen() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind((LOOPBACK, 0))
-        emulator.settimeout(10.0)
-        sender, silent = FingerSender(emulator.getsockname()[1]), FingerSender(0)
-        for _ in range(2):
-            silent.send(FingerState(0))
-            sender.send(FingerState(7))
-            assert FingerState.from_bytes(emulator.recv(256)) == FingerState(7)
-            sender.close()
-    sender.send(FingerState(8))
+def test_the_emulator_is_told_the_state_of_the_finger_if_there_is_one(tmp_path: Path) -> None:
+    path = tmp_path / 'left' / 'finger'
+    sender, silent = FingerSender(str(path)), FingerSender('')
+    sender.send(FingerState(6))  # nobody is there yet
+    for _ in range(2):  # the second emulator takes the place of one that has ended
+        emulator = FingerReceiver(str(path))
+        assert emulator.states() == []
+        silent.send(FingerState(0))
+        for time_ns in (7, 8):
+            sender.send(FingerState(time_ns))
+        assert emulator.states(10.0) == [FingerState(7), FingerState(8)]
+        emulator.close()
+        assert not path.exists()
+        sender.send(FingerState(9))
     sender.close()
+
+
+def test_a_state_after_foreign_bytes_is_understood(tmp_path: Path) -> None:
+    emulator = FingerReceiver(str(tmp_path / 'finger'))
+    (tmp_path / 'finger').write_bytes(b'X' * 100 + FingerState(7).to_bytes() + b'X')
+    assert emulator.states() == [FingerState(7)]
+    (tmp_path / 'finger').write_bytes(FingerState(8).to_bytes())
+    assert emulator.states() == [FingerState(8)]
+    assert (emulator.received, emulator.refused) == (2, 2)
+    emulator.close()
+
+
+def test_a_sender_never_waits_for_an_emulator_that_does_not_read(tmp_path: Path) -> None:
+    emulator, sender = FingerReceiver(str(tmp_path / 'finger')), FingerSender(str(tmp_path / 'finger'))
+    for time_ns in range(2000):
+        sender.send(FingerState(time_ns))
+    held = [state.time_ns for state in emulator.states()]
+    assert held == list(range(len(held)))
+    assert len(held) > 900
+    sender.send(FingerState(-1))
+    assert emulator.states() == [FingerState(-1)]
+    sender.close()
+    emulator.close()
+
+
+def test_one_emulator_has_a_pipe_and_no_other_file_stands_at_its_place(tmp_path: Path) -> None:
+    (tmp_path / 'file').touch()
+    with pytest.raises(DeviceError, match=r'cannot be made: .* no other file'):
+        FingerReceiver(str(tmp_path / 'file'))
+    emulator = FingerReceiver(str(tmp_path / 'finger'))
+    with pytest.raises(DeviceError, match=r'another emulator has the pipe .* namespace'):
+        FingerReceiver(str(tmp_path / 'finger'))
+    emulator.close()
+
+
+def test_each_emulated_controller_has_a_loopback_address_of_its_own() -> None:
+    addresses = [loopback_address(f'/tmp/{name}/ur') for name in ('left', 'right')]
+    assert len(set(addresses)) == 2
+    assert all(re.fullmatch(r'127(\.\d{1,3}){3}', address) for address in addresses)
+    assert loopback_address('192.168.0.10') == '192.168.0.10'
 
 
 def test_an_error_is_one_line_whatever_others_said() -> None:

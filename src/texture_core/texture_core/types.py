@@ -6,19 +6,23 @@ from __future__ import annotations
 import cmath
 import contextlib
 import enum
+import fcntl
+import hashlib
 import math
-import socket
+import os
+import select
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import pairwise
+from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.errors import InvalidData
+from texture_core.errors import DeviceError, InvalidData
 
 # --------------------
 # Quality of service of every topic of the suite, in one place: for ROS, and for bags that are written without it.
@@ -526,11 +530,25 @@ def _within(one: float, other: float, factor: float) -> bool:
 
 
 # --------------------
-# State of a simulated finger: what emulated arms send to the emulator, over UDP on loopback.
+# Where emulated devices appear, and what emulated arms tell the emulator there: the state of the finger.
+
+# As $(env XDG_RUNTIME_DIR /tmp)/tactile_texture of the launch files.
+DEVICES = f'{os.environ.get("XDG_RUNTIME_DIR", "/tmp")}/tactile_texture'
 
 FORMAT = struct.Struct('<4sq7d')
 MAGIC = b'TTF1'
-LOOPBACK = '127.0.0.1'
+PIPE_BYTES = 65536  # that a pipe of Linux holds: states of 2 s at 500 Hz
+
+
+def loopback_address(ip: str) -> str:
+    """Return an IP address as it is, and for a path the loopback address that an emulated controller has by that path.
+
+    The ports of a controller are fixed, so that each emulated one needs an address of its own. Two paths have the same
+    one with a probability of 1 in 16 million.
+    """
+    if '/' not in ip:
+        return ip
+    return '.'.join(['127', *(str(1 + byte % 254) for byte in hashlib.sha256(ip.encode()).digest()[:3])])
 
 
 @dataclass(frozen=True)
@@ -551,12 +569,12 @@ class FingerState:
     force_n: float = 0.0
 
     def to_bytes(self) -> bytes:
-        """Return the datagram: magic, time, seven doubles, little endian."""
+        """Return what is sent of it: magic, time, seven doubles, little endian."""
         return FORMAT.pack(MAGIC, *astuple(self))
 
     @classmethod
     def from_bytes(cls, data: bytes) -> FingerState | None:
-        """Return the state in a datagram, or None if it is not one."""
+        """Return the state in bytes, or None if they are not one."""
         if len(data) != FORMAT.size or not data.startswith(MAGIC):
             return None
         _, time_ns, *numbers = FORMAT.unpack(data)
@@ -564,26 +582,90 @@ class FingerState:
 
 
 class FingerSender:
-    """Sends finger states to the emulator on a UDP port of this machine, which need not listen; port 0: sends none."""
+    """Sends finger states into the named pipe of an emulator, which need not be there; the path '' sends none."""
 
-    def __init__(self, port: int) -> None:
-        self._address = (LOOPBACK, port)
-        self._socket: socket.socket | None = None
+    def __init__(self, path: str) -> None:
+        self._path = str(Path(path).expanduser()) if path else ''
+        self._pipe: int | None = None
 
     def send(self, state: FingerState) -> None:
-        """Send one datagram."""
-        if not self._address[1]:
+        """Send one state; it is lost if nobody reads, or nobody has read for long."""
+        if not self._path:
             return
-        if self._socket is None:
-            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        with contextlib.suppress(OSError):
-            self._socket.sendto(state.to_bytes(), self._address)
+        try:
+            if self._pipe is None:
+                self._pipe = os.open(self._path, os.O_WRONLY | os.O_NONBLOCK)
+            os.write(self._pipe, state.to_bytes())  # as a whole: it is shorter than PIPE_BUF
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.close()
 
     def close(self) -> None:
-        """Close the socket; the next datagram opens it again."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
+        """Close the pipe; the next state opens it again."""
+        if self._pipe is not None:
+            os.close(self._pipe)
+            self._pipe = None
+
+
+class FingerReceiver:
+    """The emulator's end of the named pipe at a path, which it makes and removes.
+
+    Raises
+    ------
+    DeviceError
+        If the pipe cannot be made, or another emulator has it.
+    """
+
+    def __init__(self, path: str) -> None:
+        self.received = 0
+        self.refused = 0  # pieces between states that are none
+        self._path = Path(path).expanduser()
+        self._rest = b''
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            if not self._path.is_fifo():
+                os.mkfifo(self._path)
+            self._pipe = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)  # also to write: it never ends with a sender
+        except OSError as error:
+            raise DeviceError(
+                f"the pipe '{path}' for the finger cannot be made: {error}; choose a path in a folder that you may "
+                'write to, where no other file stands'
+            ) from error
+        try:
+            fcntl.flock(self._pipe, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            os.close(self._pipe)
+            raise DeviceError(
+                f"another emulator has the pipe '{path}' for the finger; end it, or give this one a namespace"
+            ) from error
+
+    def states(self, wait_s: float = 0.0) -> list[FingerState]:
+        """Return what has come since the last call; if nothing has, what comes first within so long."""
+        if wait_s:
+            select.select([self._pipe], [], [], wait_s)
+        data = self._rest
+        with contextlib.suppress(BlockingIOError):
+            data += os.read(self._pipe, PIPE_BYTES)
+        states: list[FingerState] = []
+        at = 0
+        while len(data) - at >= FORMAT.size:
+            state = FingerState.from_bytes(data[at : at + FORMAT.size])
+            if state is not None:
+                states.append(state)
+                at += FORMAT.size
+            else:
+                self.refused += 1
+                following = data.find(MAGIC, at + 1)
+                at = following if following > 0 else len(data)
+        self._rest = data[at:]
+        self.received += len(states)
+        return states
+
+    def close(self) -> None:
+        """Remove the pipe."""
+        self._path.unlink(missing_ok=True)
+        os.close(self._pipe)
 
 
 # --------------------

@@ -2,12 +2,11 @@
 """The explorer as others meet it: over ROS, on a simulated arm in real time."""
 
 import math
-import select
 import signal
-import socket
 import subprocess
 import sys
 import time
+from contextlib import closing
 
 import pytest
 import rclpy
@@ -23,7 +22,7 @@ from texture_msgs import action, msg, srv
 from texture_core.errors import InvalidParameter
 from texture_core.ros import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS, WaitingExecutor, check_names, to_msg, to_ns
 from texture_core.ros_testing import LocalGraph, killed_on_error
-from texture_core.types import FingerState, Phase, Rejection, TextureEstimate
+from texture_core.types import FingerReceiver, Phase, Rejection, TextureEstimate
 from texture_exploration.nodes.explorer import ExplorerNode
 from texture_simulation.devices.dynamixel import ERROR, OVERLOAD, EmulatedDynamixelBus, leap_hand
 
@@ -375,19 +374,17 @@ def test_a_shutdown_while_moving_lifts_the_finger_and_frees_the_caller(world):
     assert world.explored(call).message == 'the explorer was shut down'
 
 
-def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind(('127.0.0.1', 0))
-        emulator.settimeout(DEADLINE_S)
+def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros, tmp_path):
+    with closing(FingerReceiver(str(tmp_path / 'finger'))) as emulator:
         program = 'from texture_exploration.nodes.explorer import main; main()'
-        port = f'finger_port:={emulator.getsockname()[1]}'
-        options = ['--ros-args', '-p', port, '-p', 'watch_signal:=false']
+        options = ['--ros-args', '-p', f'finger_pipe:={tmp_path / "finger"}', '-p', 'watch_signal:=false']
         with subprocess.Popen([sys.executable, '-c', program, *options]) as explorer, killed_on_error(explorer):
             client = Client()
             assert client.explore.wait_for_service(DEADLINE_S)
             answer = client.explore.call_async(srv.Explore.Request(request=request_of(**SLOW)))
-            fingers = iter(lambda: FingerState.from_bytes(emulator.recv(100)), None)
-            assert next(finger for finger in fingers if finger.vx_m_s > 0.009)
+            deadline = time.monotonic() + DEADLINE_S
+            while not any(finger.vx_m_s > 0.009 for finger in emulator.states(0.1)):
+                assert time.monotonic() < deadline, 'the finger does not slide'
             explorer.send_signal(signal.SIGINT)
             last = last_until_exit(emulator, explorer)
             rclpy.spin_until_future_complete(client, answer, timeout_sec=DEADLINE_S)
@@ -399,11 +396,10 @@ def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros)
 
 
 def last_until_exit(emulator, process):
-    """Return the last finger state that a process sent; read all the while, the socket holds but few."""
+    """Return the last finger state that a process sent; read all the while, the pipe holds those of 2 s."""
     deadline, last, ended = time.monotonic() + DEADLINE_S, None, False
     while not ended:
         assert time.monotonic() < deadline, 'the process did not end'
         ended = process.poll() is not None
-        while select.select([emulator], [], [], 0.05)[0]:
-            last = FingerState.from_bytes(emulator.recv(100))
+        last = (emulator.states(0.05) or [last])[-1]
     return last

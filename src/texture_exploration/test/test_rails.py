@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rails through their serial line, on the emulated microcontroller."""
 
-import socket
 import struct
 import time
+from contextlib import closing
 
 import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, pack, unpack
-from texture_core.types import ExplorationRequest, FingerState
+from texture_core.types import ExplorationRequest, FingerReceiver
 from texture_exploration.arms import rails as tables
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.rails import RailsArm, RailsParams
@@ -101,8 +101,6 @@ def test_a_silent_device_is_reported(rails):
 
 
 def test_the_bench_is_reported_where_the_finger_is(tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind(('127.0.0.1', 0))
-        emulator.settimeout(DEADLINE_S)
-        with EmulatedRails(tmp_path / 'rails', finger_port=emulator.getsockname()[1]):
-            assert FingerState.from_bytes(emulator.recv(1024)).z_m == pytest.approx(0.01)
+    path = str(tmp_path / 'finger')
+    with closing(FingerReceiver(path)) as emulator, EmulatedRails(tmp_path / 'rails', finger_pipe=path):
+        assert emulator.states(DEADLINE_S)[0].z_m == pytest.approx(0.01)

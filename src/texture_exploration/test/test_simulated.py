@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
-import socket
+from contextlib import closing
 
 import pytest
 
-from texture_core.types import FingerState
+from texture_core.types import FingerReceiver
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.simulated import HOLDS_S, DelayedVelocity, SimulatedArm, SimulatedArmParams
 
@@ -92,13 +92,11 @@ def test_a_frozen_arm_grows_old_until_it_is_connected_again(clock):
     assert arm.state().time_ns == clock.now_ns
 
 
-def test_the_bench_is_reported_where_the_finger_is(clock):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind(('127.0.0.1', 0))
-        emulator.settimeout(5.0)
-        arm = make(clock, finger_port=emulator.getsockname()[1], start_height_m=0.0)
+def test_the_emulator_is_told_where_the_finger_is(clock, tmp_path):
+    with closing(FingerReceiver(str(tmp_path / 'finger'))) as emulator:
+        arm = make(clock, finger_pipe=str(tmp_path / 'finger'), start_height_m=0.0)
         run(arm, clock, ArmCommand(tangential_m_s=(0.1, 0.0), normal_m_s=-0.1), 0.004)
-        told = [FingerState.from_bytes(emulator.recv(1024)) for _ in range(2)][-1]
+        told = emulator.states()[-1]
         arm.close()
     assert (told.time_ns, told.vx_m_s, told.x_m) == (4_000_000, 0.1, pytest.approx(0.0004))
     assert told.force_n == pytest.approx(0.8)

@@ -14,6 +14,7 @@ import socket
 import struct
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections import deque
@@ -23,7 +24,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.types import ExplorationRequest, FingerState, Phase
+from texture_core.types import ExplorationRequest, FingerReceiver, Phase
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import (
     PROTOCOL_VERSION,
@@ -58,19 +59,20 @@ class EmulatedRig:
     """The emulated controller, and the true state of its finger, as it tells the emulator."""
 
     def __init__(self, ip, **values):
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(('127.0.0.1', 0))
-        port = self._socket.getsockname()[1]
+        self._folder = tempfile.TemporaryDirectory()
+        path = f'{self._folder.name}/finger'
+        self._pipe = FingerReceiver(path)
         self.ip = ip
-        params = UrControllerParams(ip=ip, finger_port=port, unlock_delay_s=UNLOCK_S, **values)
+        params = UrControllerParams(ip=ip, finger_pipe=path, unlock_delay_s=UNLOCK_S, **values)
         self.controller = ControllerProcess(params)
         self.fingers = deque(maxlen=50000)
-        threading.Thread(target=self._receive_commands, daemon=True).start()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._receive_states, daemon=True)
+        self._thread.start()
 
-    def _receive_commands(self):
-        with contextlib.suppress(OSError):
-            while data := self._socket.recv(256):
-                self.fingers.append(FingerState.from_bytes(data))
+    def _receive_states(self):
+        while not self._closing.is_set():
+            self.fingers += self._pipe.states(0.1)
 
     @property
     def force_n(self):
@@ -86,8 +88,10 @@ class EmulatedRig:
 
     def close(self):
         self.controller.stop()
-        # A datagram of nothing ends the thread.
-        self._socket.sendto(b'', self._socket.getsockname())
+        self._closing.set()
+        self._thread.join()
+        self._pipe.close()
+        self._folder.cleanup()
 
 
 @pytest.fixture(scope='module')

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The emulated Dynamixel bus, by the bytes of protocol 2.0."""
 
-import socket
 import struct
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from texture_core.types import FingerState
+from texture_core.types import FingerReceiver, FingerState
 from texture_simulation.devices.dynamixel import (
     LEAP_FINGERS,
     OVERLOAD,
@@ -189,14 +189,13 @@ def test_the_bench_is_reported_where_the_finger_is_and_how_hard_it_presses(tmp_p
         motors.write(motor, 116, struct.pack('<i', 2048 + round(angle_rad / 0.001533981)))
         motors.write(motor, 64, b'\1')
     deadline = time.monotonic() + DEADLINE_S
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind(('127.0.0.1', 0))
-        emulator.settimeout(DEADLINE_S)
+    path = str(tmp_path / 'finger')
+    with closing(FingerReceiver(path)) as emulator:
         state = FingerState(0)
-        with EmulatedDynamixelBus(tmp_path / 'bus', motors, finger, emulator.getsockname()[1]):
+        with EmulatedDynamixelBus(tmp_path / 'bus', motors, finger, path):
             while state.x_m < 0.0085 or state.force_n < 0.95:
                 assert time.monotonic() < deadline
-                state = FingerState.from_bytes(emulator.recv(1024))
+                [*_, state] = emulator.states(DEADLINE_S)
     assert state.x_m == pytest.approx(0.009, abs=5e-4)
     assert state.y_m == 0.0
     assert state.force_n == pytest.approx(1.0, rel=0.05)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import UnknownName
-from texture_core.types import NANOSECONDS, FingerState, TactileSignal, lost_samples
+from texture_core.types import NANOSECONDS, FingerSender, FingerState, TactileSignal, lost_samples
 from texture_drivers.pvdf import Pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import Tsf85
@@ -29,30 +28,30 @@ DEADLINE_S = 15.0
 class Arm:
     """Reports a finger that slides for ever along x, as emulated arms do."""
 
-    def __init__(self, port: int, speed_m_s: float = 0.1, force_n: float = 2.0) -> None:
-        self._port, self._speed_m_s, self._force_n = port, speed_m_s, force_n
+    def __init__(self, emulator: FingerSender, speed_m_s: float = 0.1, force_n: float = 2.0) -> None:
+        self._emulator, self._speed_m_s, self._force_n = emulator, speed_m_s, force_n
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
         start_ns = time.monotonic_ns()
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
-            while not self._stop.wait(0.01):
-                now_ns = time.monotonic_ns()
-                x_m = self._speed_m_s * (now_ns - start_ns) / 1e9
-                state = FingerState(now_ns, x_m=x_m, vx_m_s=self._speed_m_s, force_n=self._force_n)
-                line.sendto(state.to_bytes(), ('127.0.0.1', self._port))
+        while not self._stop.wait(0.01):
+            now_ns = time.monotonic_ns()
+            x_m = self._speed_m_s * (now_ns - start_ns) / 1e9
+            self._emulator.send(FingerState(now_ns, x_m=x_m, vx_m_s=self._speed_m_s, force_n=self._force_n))
 
     def stop(self) -> None:
         self._stop.set()
         self._thread.join()
+        self._emulator.close()
 
 
 @pytest.fixture
 def emulator(tmp_path: Path) -> Iterator[Emulator]:
-    links = {'sensor_link': str(tmp_path / 'tsf85'), 'pvdf_link': str(tmp_path / 'pvdf')}
-    params = EmulatorParams(surface='ridge_2mm_deep', finger_port=0, **links)
+    names = {'finger_pipe': 'finger', 'sensor_link': 'tsf85', 'pvdf_link': 'pvdf'}
+    links = {name: str(tmp_path / file) for name, file in names.items()}
+    params = EmulatorParams(surface='ridge_2mm_deep', **links)
     with Emulator(params) as made:
         yield made
 
@@ -66,8 +65,8 @@ def sensor(emulator: Emulator, tmp_path: Path) -> Iterator[Tsf85]:
 
 
 @pytest.fixture
-def arm(emulator: Emulator) -> Iterator[Arm]:
-    made = Arm(emulator.finger_port)
+def arm(emulator: Emulator, tmp_path: Path) -> Iterator[Arm]:
+    made = Arm(FingerSender(str(tmp_path / 'finger')))
     yield made
     made.stop()
 
@@ -118,7 +117,8 @@ def test_a_device_that_is_silent_after_opening_is_woken(emulator: Emulator, tmp_
 
 
 def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> None:
-    params = EmulatorParams(sensor_link=str(tmp_path / 'old'), finger_port=0, finger=1, long_stamps=False)
+    links = {'finger_pipe': str(tmp_path / 'finger'), 'sensor_link': str(tmp_path / 'old')}
+    params = EmulatorParams(finger=1, long_stamps=False, **links)
     sensor = Tsf85(SensorParams(device=params.sensor_link, finger=1))
     with Emulator(params):
         sensor.open()

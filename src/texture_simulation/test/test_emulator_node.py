@@ -23,7 +23,7 @@ class Bed:
     """Bench and sensor node, and what they publish."""
 
     def __init__(self, graph: LocalGraph, link: Path) -> None:
-        self.emulator = graph.add(EmulatorNode, sensor_link=str(link), finger_port=0)
+        self.emulator = graph.add(EmulatorNode, sensor_link=str(link), finger_pipe=f'{link}_finger')
         self.sensor = graph.add(SensorNode, device=str(link))
         self.batches: list[Any] = []
         graph.peer.create_subscription(

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import socket
 import time
+from contextlib import closing
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
 from texture_core.ros_testing import LocalGraph
-from texture_core.types import FingerState
+from texture_core.types import FingerReceiver, FingerState
 from texture_simulation.nodes.leap_hand import LeapHandNode
 from texture_simulation.nodes.rails import RailsNode
 from texture_simulation.nodes.ur_controller import UrControllerNode
@@ -29,13 +29,13 @@ def graph():
 
 @pytest.mark.parametrize('name', NODES)
 def test_the_device_lives_with_its_node_and_reports_where_the_finger_is(name, graph, tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind(('127.0.0.1', 0))
-        emulator.settimeout(DEADLINE_S)
-        node = graph.add(NODES[name], link=str(tmp_path / name), finger_port=emulator.getsockname()[1])
+    path = str(tmp_path / 'finger')
+    with closing(FingerReceiver(path)) as emulator:
+        node = graph.add(NODES[name], link=str(tmp_path / name), finger_pipe=path)
         before_ns = time.monotonic_ns()
-        while (state := FingerState.from_bytes(emulator.recv(1024))).time_ns < before_ns:
-            pass
+        state = FingerState(0)
+        while state.time_ns < before_ns:
+            [*_, state] = emulator.states(DEADLINE_S)
         assert (state.z_m, state.force_n) == (pytest.approx(0.01), 0.0)
         assert (tmp_path / name).exists()
         assert node._report()[0] == 'OK'

@@ -4,15 +4,15 @@
 from __future__ import annotations
 
 import json
-import socket
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from texture_core.types import FingerState
+from texture_core.types import FingerReceiver
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = pytest.mark.realtime
@@ -97,12 +97,13 @@ os._exit(0)  # the interfaces would sleep
     assert session.stdout.splitlines()[-1:] == ['True 0.41'], session.stderr
 
 
-def test_it_reports_the_bench_where_the_finger_is():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
-        emulator.bind(('127.0.0.1', 0))
-        emulator.settimeout(10.0)
-        with ControllerProcess(UrControllerParams(ip='127.0.0.61', finger_port=emulator.getsockname()[1])):
-            states = [FingerState.from_bytes(emulator.recv(256)) for _ in range(200)]
+def test_it_tells_the_emulator_where_the_finger_is(tmp_path):
+    path, states, end_s = str(tmp_path / 'finger'), [], time.monotonic() + DEADLINE_S
+    params = UrControllerParams(ip=str(tmp_path / 'ur'), finger_pipe=path)
+    with closing(FingerReceiver(path)) as emulator, ControllerProcess(params):
+        while len(states) < 200 and time.monotonic() < end_s:
+            states += emulator.states(1.0)
+    states = states[:200]
     assert (states[-1].x_m, states[-1].z_m, states[-1].force_n) == (0.0, pytest.approx(0.01), 0.0)
     rate_hz = 199 / ((states[-1].time_ns - states[0].time_ns) * 1e-9)
     assert 100 < rate_hz < 600  # 500 Hz on a machine that is not busy

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -15,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.config import find, param
-from texture_core.errors import DeviceError
-from texture_core.types import LOOPBACK, NANOSECONDS, FingerState
+from texture_core.types import DEVICES, NANOSECONDS, FingerReceiver, FingerState
 from texture_drivers import daq, pvdf
 from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
@@ -26,56 +24,6 @@ from texture_simulation.devices import fingers
 from texture_simulation.path import FingerTrack
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.surfaces import Surface
-
-# --------------------
-# Receive finger states from emulated arms: datagrams on loopback.
-
-
-class FingerStateReceiver:
-    """A bound UDP socket, read without waiting; port 0 takes any free one.
-
-    Raises
-    ------
-    DeviceError
-        If the port is taken.
-    """
-
-    def __init__(self, port: int) -> None:
-        self.received = 0
-        self.refused = 0  # datagrams that are no finger state
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        try:
-            self._socket.bind((LOOPBACK, port))
-        except OSError as error:
-            self._socket.close()
-            raise DeviceError(
-                f'UDP port {port} for the finger cannot be opened: {error}; choose another, or end what has it'
-            ) from error
-
-    @property
-    def port(self) -> int:
-        """The port in use."""
-        return int(self._socket.getsockname()[1])
-
-    def states(self) -> list[FingerState]:
-        """Return what has come since the last call."""
-        states: list[FingerState] = []
-        while True:
-            try:
-                data = self._socket.recv(256)
-            except BlockingIOError:
-                return states
-            state = FingerState.from_bytes(data)
-            self.received += 1
-            self.refused += state is None
-            if state is not None:
-                states.append(state)
-
-    def close(self) -> None:
-        """Give the port back."""
-        self._socket.close()
-
 
 # --------------------
 # Sensors on the emulator: a model on its device, brought forward in real time.
@@ -275,7 +223,7 @@ class EmulatorParams:
         choices=('', *LIVE_SENSORS),
     )
     sensor_link: str = param(
-        '/tmp/tactile_texture/tsf85',
+        f'{DEVICES}/tsf85',
         'Path of the symbolic link to the emulated sensor, which is the device path of the sensor node.',
     )
     finger: int = param(0, 'Index of the finger of a TSF-85 that touches the surface.', low=0, high=1)
@@ -299,11 +247,8 @@ class EmulatorParams:
         low=0.0,
         high=1.0,
     )
-    finger_port: int = param(
-        28500,
-        'UDP port on loopback at which finger states are received; 0 takes any free port.',
-        low=0,
-        high=65535,
+    finger_pipe: str = param(
+        f'{DEVICES}/finger', 'Path of the named pipe that appears, on which the emulated arm tells where the finger is.'
     )
 
 
@@ -326,7 +271,7 @@ class Emulator:
     Raises
     ------
     TextureError
-        If the scene or the surface is unknown, or the port or the link cannot be had.
+        If the scene or the surface is unknown, or the pipe or the link cannot be had.
     """
 
     def __init__(self, params: EmulatorParams, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
@@ -347,7 +292,7 @@ class Emulator:
         ]
         self.flip_bits(params.bit_flips)
         self._starts_plugged = params.plugged
-        self._link = FingerStateReceiver(params.finger_port)
+        self._link = FingerReceiver(params.finger_pipe)
         self._commands: list[Callable[[], None]] = []
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='emulator', daemon=True)
@@ -364,11 +309,6 @@ class Emulator:
     def device(self) -> fingers.EmulatedDevice:
         """The device of the sensor on the emulator; those beside it are left out."""
         return self._sensors[0].device
-
-    @property
-    def finger_port(self) -> int:
-        """UDP port for `texture_core.types.FingerState` datagrams."""
-        return self._link.port
 
     @property
     def running(self) -> bool:
@@ -429,7 +369,7 @@ class Emulator:
             'skipped samples': self._sensors[0].skipped,
             'bytes nobody took': sum(sensor.device.dropped_bytes for sensor in self._sensors),
             'finger states': self._link.received,
-            'refused datagrams': self._link.refused,
+            'refused finger states': self._link.refused,
         }
 
     def _in_thread(self, command: Callable[[], None]) -> None:

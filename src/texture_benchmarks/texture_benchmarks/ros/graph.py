@@ -276,10 +276,11 @@ def driver_cpu() -> float:
     """Return the share of one core that the sensor node uses, reading an emulated TSF-85."""
     with tempfile.TemporaryDirectory() as folder:
         device = str(Path(folder) / 'tsf85')
+        emulated = {'sensor_link': device, 'finger_pipe': str(Path(folder) / 'finger')}
         received: list[TactileSignal] = []
         with (
             Graph(DOMAIN) as graph,
-            NodeProcess('texture_simulation', 'emulator', {'sensor_link': device, 'finger_port': 0}, domain_id=DOMAIN),
+            NodeProcess('texture_simulation', 'emulator', emulated, domain_id=DOMAIN),
             NodeProcess('texture_drivers', 'sensor', {'device': device}, domain_id=DOMAIN) as sensor,
         ):
             graph.listen('signal', received.append)

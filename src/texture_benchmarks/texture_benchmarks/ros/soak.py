@@ -31,7 +31,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
 from texture_benchmarks import soak
-from texture_bringup.demo import Isolation, isolate
+from texture_bringup.demo import free_domain, isolated
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted, TextureError
@@ -260,7 +260,7 @@ class SoakPlan:
     settle_s: float = 10.0  # Time for the nodes to find each other, before anything is asked of them
 
 
-def launched_nodes(isolation: Isolation, folder: Path, plan: SoakPlan, log: Path) -> ChildLauncher:
+def launched_nodes(domain_id: int, folder: Path, plan: SoakPlan, log: Path) -> ChildLauncher:
     """Return the launch of the emulator with a model, trained if there is none; use it in a `with` block."""
     model = plan.model
     if model is None:
@@ -272,8 +272,7 @@ def launched_nodes(isolation: Isolation, folder: Path, plan: SoakPlan, log: Path
         probe.bind(('127.0.0.1', 0))
         port = int(probe.getsockname()[1])
     arguments = {
-        'device': isolation.device,
-        'finger_port': isolation.finger_port,
+        'devices': folder,
         'scene': SCENE,
         'seed': plan.seed,
         'model': card,
@@ -282,7 +281,7 @@ def launched_nodes(isolation: Isolation, folder: Path, plan: SoakPlan, log: Path
         'dashboard': 'true',
         'dashboard_port': port,
     }
-    environment = isolation.environment({**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
+    environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
     return ChildLauncher('emulator', arguments, environment, log, together=False)
 
 
@@ -300,9 +299,8 @@ def endure(
     With faults of one's own, the run ends when they are over. `say` is told now and then how it goes.
     """
     with tempfile.TemporaryDirectory(prefix='texture_endurance_') as name, ExitStack() as stack:
-        isolation = isolate(Path(name))
-        launcher = stack.enter_context(launched_nodes(isolation, Path(name), plan, log))
-        domain = isolation.domain_id
+        domain = free_domain()
+        launcher = stack.enter_context(launched_nodes(domain, Path(name), plan, log))
         clients = [stack.enter_context(Operator(domain_id=domain, guard=launcher.check)) for _ in range(3)]
         watcher = stack.enter_context(Watcher(domain))
         clients[0].wait_for_explorer(START_DEADLINE_S)
@@ -535,11 +533,11 @@ def endure_hazards(
 ) -> list[soak.HazardRecord]:
     """Explore with each hazard in turn, in calm after each, again and again until the time is over; each comes once."""
     records: list[soak.HazardRecord] = []
-    with tempfile.TemporaryDirectory(prefix='texture_hazards_') as folder, ExitStack() as stack:
-        isolation = isolate(Path(folder))
-        stack.enter_context(mock.patch.dict(os.environ, isolation.environment(os.environ)))
-        clients = [stack.enter_context(Operator(domain_id=isolation.domain_id)) for _ in range(2)]
-        rig = stack.enter_context(HazardRig(isolation.domain_id, clients))
+    with ExitStack() as stack:
+        domain = free_domain()
+        stack.enter_context(mock.patch.dict(os.environ, isolated(domain, os.environ)))
+        clients = [stack.enter_context(Operator(domain_id=domain)) for _ in range(2)]
+        rig = stack.enter_context(HazardRig(domain, clients))
         end_s = time.monotonic() + plan.duration_s
         rng = np.random.default_rng(plan.seed)
         while not records or time.monotonic() < end_s:

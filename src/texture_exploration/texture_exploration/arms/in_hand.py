@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from texture_core.config import find, param
 from texture_core.errors import DeviceError
-from texture_core.types import FingerSender, FingerState
+from texture_core.types import DEVICES, FingerSender, FingerState
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.arms.dynamixel import DynamixelHand
 from texture_exploration.arms.hand import FingerSet, Fingertip, Hand, SimulatedHand
@@ -43,16 +43,13 @@ class InHandParams(CommandLimits):
         high=30.0,
     )
     profile: str = param('leap', 'Profile of a Dynamixel hand: the name of a shipped one or the path of a file.')
-    device: str = param('/tmp/tactile_texture/dynamixel', 'Path of the serial device of a Dynamixel hand.')
+    device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of a Dynamixel hand.')
     torque_off_on_fault: bool = param(
         False,
         'Switches the torque of a Dynamixel hand off, so that it releases the object, when a motor reports a fault.',
     )
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
+    finger_pipe: str = param(
+        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
     )
 
 
@@ -76,7 +73,7 @@ class InHandArm(Arm):
         self._params = params
         self.hand = hand or HANDS[params.hand](params)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
-        self._emulator = FingerSender(params.finger_port)
+        self._emulator = FingerSender(params.finger_pipe)
         self._connected = False
 
     def connect(self) -> None:

@@ -17,6 +17,7 @@ import serial
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame, FrameDecoder, pack
+from texture_core.types import DEVICES
 from texture_exploration.arms.arm import Arm, ArmCommand, ArmState, Vector
 from texture_exploration.safety import CommandLimits
 
@@ -66,7 +67,7 @@ class RailsParams(CommandLimits):
     """Where the rails are, and what their encoders count."""
 
     device: str = param(
-        '/tmp/tactile_texture/rails',
+        f'{DEVICES}/rails',
         'Path of the serial device of the rails; the default is that of the emulated rails.',
     )
     baud: int = param(

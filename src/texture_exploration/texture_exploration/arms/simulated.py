@@ -179,11 +179,8 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
         low=0.02,
         high=2.0,
     )
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
+    finger_pipe: str = param(
+        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
     )
 
 
@@ -235,7 +232,7 @@ class SimulatedArm(Arm):
         self._wake = threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
-        self._emulator = FingerSender(params.finger_port)
+        self._emulator = FingerSender(params.finger_pipe)
         self._surface = SimulatedSurface(shape, params.stiffness_n_m)
         # The force control is told `loop_delay_s` alone; the rest it has to find out.
         self._velocity = None if params.force_mode else CommandedVelocity(params, 1 / RATE_HZ)

@@ -15,11 +15,12 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from texture_core.config import param
 from texture_core.errors import DeviceError
+from texture_core.types import loopback_address
 from texture_exploration.arms.arm import (
     STANDSTILL,
     UNSTEADY,
@@ -176,7 +177,11 @@ def command_of(data: bytes) -> UrCommand:
 class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
-    ip: str = param('127.0.0.2', 'IP address of the controller; the default is that of the emulated one.')
+    ip: str = param(
+        '127.0.0.2',
+        'IP address of the controller; the default is that of the emulated one, and a path stands for that of the '
+        'emulated one with the same path.',
+    )
     rate_hz: float = param(
         250.0,
         'Rate of commands and states; a higher rate reacts faster and costs more computing time.',
@@ -676,7 +681,7 @@ class UrArm(SurfaceArm):
     _params: UrArmParams
 
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:
-        super().__init__(params)
+        super().__init__(replace(params, ip=loopback_address(params.ip)))
         self._link: WorkerLink | None = None
         self._series = 0  # of the controller that was connected last
         self._paused = False  # a stop by the safety system may have left our program paused

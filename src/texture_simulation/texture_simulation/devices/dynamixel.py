@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.types import Array, FingerState
+from texture_core.types import DEVICES, Array, FingerState
 from texture_simulation.devices.rails import EmulatedSerialRobot
 
 # --------------------
@@ -308,7 +308,7 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
 
     Parameters
     ----------
-    link, finger_port
+    link, finger_pipe
         See `EmulatedSerialRobot`.
     motors
         On the bus.
@@ -323,10 +323,10 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
         link: Path,
         motors: DynamixelMotors,
         finger: FingerMotors | None = None,
-        finger_port: int = 0,
+        finger_pipe: str = '',
         latency_s: float = 0.0,
     ) -> None:
-        super().__init__(link, finger_port)
+        super().__init__(link, finger_pipe)
         self.motors = motors
         self.latency_s = latency_s
         self._finger = finger
@@ -419,9 +419,7 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
 def main() -> None:
     """Run an emulated LEAP hand until Ctrl-C, as in `python -m texture_simulation.devices.dynamixel`."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument(
-        'link', type=Path, nargs='?', default=Path('/tmp/tactile_texture/dynamixel'), help='device path to make'
-    )
+    parser.add_argument('link', type=Path, nargs='?', default=Path(DEVICES, 'dynamixel'), help='device path to make')
     options = parser.parse_args()
     EmulatedDynamixelBus(options.link, leap_hand()).serve_forever()
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.framing import cobs_decode
-from texture_core.types import FingerSender, FingerState
+from texture_core.types import DEVICES, FingerSender, FingerState
 from texture_simulation.devices.fingers import ByteFaults, PtyPort, framed
 
 # --------------------
@@ -188,14 +188,11 @@ def _checked(segment: bytes) -> bytes | None:
 
 
 @dataclass(frozen=True)
-class FingerPortParams:
+class FingerPipeParams:
     """Whom an emulated robot tells where its finger is."""
 
-    finger_port: int = param(
-        0,
-        'UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
-        low=0,
-        high=65535,
+    finger_pipe: str = param(
+        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
     )
 
 
@@ -209,13 +206,13 @@ class EmulatedSerialRobot:
     ----------
     link
         Symbolic link that leads to the device; this is the path for the arm.
-    finger_port
-        UDP port on loopback at which the emulator receives finger states; 0: none.
+    finger_pipe
+        Path of the named pipe on which the emulator is told where the finger is; '': nobody.
     """
 
-    def __init__(self, link: Path, finger_port: int) -> None:
+    def __init__(self, link: Path, finger_pipe: str) -> None:
         self.port = PtyPort(link)
-        self.emulator = FingerSender(finger_port)
+        self.emulator = FingerSender(finger_pipe)
         self.port_lock = threading.Lock()  # the port: it is unplugged by others
         self.closing = threading.Event()
         self._thread = threading.Thread(target=self.run, name=type(self).__name__, daemon=True)
@@ -279,7 +276,7 @@ class EmulatedRails(EmulatedSerialRobot):
 
     Parameters
     ----------
-    link, finger_port
+    link, finger_pipe
         See `EmulatedSerialRobot`.
     machine
         The mechanics.
@@ -292,9 +289,9 @@ class EmulatedRails(EmulatedSerialRobot):
         link: Path,
         machine: RailsMachine | None = None,
         rng: np.random.Generator | None = None,
-        finger_port: int = 0,
+        finger_pipe: str = '',
     ) -> None:
-        super().__init__(link, finger_port)
+        super().__init__(link, finger_pipe)
         self.faults = ByteFaults()
         self.firmware = RailsFirmware(machine or RailsMachine())
         self.silent = False
@@ -327,14 +324,12 @@ class EmulatedRails(EmulatedSerialRobot):
 
 
 def main() -> None:
-    """Run the emulated rails until Ctrl-C, as in `python -m texture_simulation.devices.rails /tmp/rails`."""
+    """Run the emulated rails until Ctrl-C, as in `python -m texture_simulation.devices.rails`."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument(
-        'link', type=Path, nargs='?', default=Path('/tmp/tactile_texture/rails'), help='device path to make'
-    )
-    parser.add_argument('--finger-port', type=int, default=0, help='UDP port of the emulator; 0: none')
+    parser.add_argument('link', type=Path, nargs='?', default=Path(DEVICES, 'rails'), help='device path to make')
+    parser.add_argument('--finger-pipe', default='', help='named pipe of the emulator; default: none')
     options = parser.parse_args()
-    EmulatedRails(options.link, finger_port=options.finger_port).serve_forever()
+    EmulatedRails(options.link, finger_pipe=options.finger_pipe).serve_forever()
 
 
 if __name__ == '__main__':

@@ -27,8 +27,8 @@ import numpy as np
 
 from texture_core.config import from_mapping, param, parameters_of
 from texture_core.errors import DeviceError, TextureError
-from texture_core.types import Array, FingerSender, FingerState, rotation_matrix
-from texture_simulation.devices.rails import FingerPortParams
+from texture_core.types import Array, FingerSender, FingerState, loopback_address, rotation_matrix
+from texture_simulation.devices.rails import FingerPipeParams
 from texture_simulation.devices.twist_controller import TouchedSurfaceParams, coulomb_n
 
 # --------------------
@@ -288,10 +288,13 @@ READY, DONE = 1, 2  # output_int_register_0
 
 
 @dataclass(frozen=True)
-class UrControllerParams(FingerPortParams, TouchedSurfaceParams):
+class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
     """The emulated controller, its robot and the surface under the finger."""
 
-    ip: str = param('127.0.0.2', 'Loopback address to listen on; the ports of a UR controller are fixed.')
+    ip: str = param(
+        '127.0.0.2',
+        'Loopback address to listen on, as the ports are fixed; or a path, which stands for one of its own.',
+    )
     version: str = param('5.12', 'Version of the emulated control software.', choices=tuple(VERSIONS))
     slope_x: float = param(0.0, 'Rise of the surface along x, in metres per metre.', low=-1.0, high=1.0)
     slope_y: float = param(0.0, 'Rise of the surface along y, in metres per metre.', low=-1.0, high=1.0)
@@ -396,7 +399,7 @@ class ControllerProcess:
     """Runs from `start` to `stop`, or as a context."""
 
     def __init__(self, params: UrControllerParams) -> None:
-        self.params = params
+        self.params = dataclasses.replace(params, ip=loopback_address(params.ip))
         self._process: subprocess.Popen[str] | None = None
 
     def __enter__(self) -> ControllerProcess:
@@ -1404,7 +1407,7 @@ class Server:
         If a port cannot be opened.
     """
 
-    def __init__(self, controller: EmulatedController, ip: str, finger_port: int) -> None:
+    def __init__(self, controller: EmulatedController, ip: str, finger_pipe: str) -> None:
         self._controller = controller
         self._ip = ip
         claims: dict[str, RtdeSession] = {}
@@ -1420,7 +1423,7 @@ class Server:
         self._online_ns = 0
         self._offline_s = 0.0  # asked for
         self._silent_until_ns = 0
-        self._emulator = FingerSender(finger_port)
+        self._emulator = FingerSender(finger_pipe)
         self._open()
 
     def run(self, stopped: Callable[[], bool]) -> None:
@@ -1543,7 +1546,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         params = read_params(arguments)
         controller = EmulatedController(params, np.random.default_rng(params.seed))
-        server = Server(controller, params.ip, params.finger_port)
+        server = Server(controller, params.ip, params.finger_pipe)
     except TextureError as error:
         print(f'emulated UR controller: {error}', file=sys.stderr)
         return 2

@@ -28,7 +28,7 @@ class EmulatorNode(Node):
         self._diagnostics = Diagnostics(self, self._report, hardware_id=self._params.sensor_link)
         self.get_logger().info(
             f"'{self._params.surface}' lies under the finger; {self._params.sensor} at {self._params.sensor_link}, "
-            f'finger states at UDP port {self._emulator.finger_port}'
+            f'finger states at {self._params.finger_pipe}'
         )
 
     def shutdown(self) -> None:

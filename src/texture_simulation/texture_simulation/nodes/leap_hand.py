@@ -12,16 +12,17 @@ from rclpy.node import Node
 
 from texture_core.config import param
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
+from texture_core.types import DEVICES
 from texture_simulation.devices.dynamixel import LEAP_FINGERS, EmulatedDynamixelBus, leap_hand
-from texture_simulation.devices.rails import FingerPortParams
+from texture_simulation.devices.rails import FingerPipeParams
 
 
 @dataclass(frozen=True)
-class LeapHandParams(FingerPortParams):
+class LeapHandParams(FingerPipeParams):
     """Where the motors are reached, what they hold, and which finger senses it."""
 
     link: str = param(
-        '/tmp/tactile_texture/dynamixel',
+        f'{DEVICES}/dynamixel',
         'Path of the symbolic link to the emulated hand, which is the device path of the arm.',
     )
     finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
@@ -40,7 +41,7 @@ class LeapHandNode(Node):
         finger = LEAP_FINGERS[params.finger]
         self._open = ExitStack()
         self._bus = self._open.enter_context(
-            EmulatedDynamixelBus(Path(params.link).expanduser(), motors, finger, params.finger_port)
+            EmulatedDynamixelBus(Path(params.link).expanduser(), motors, finger, params.finger_pipe)
         )
         Diagnostics(self, self._report, hardware_id=params.link)
         self.get_logger().info(f'an emulated LEAP hand is at {params.link}; its {params.finger} finger senses')

@@ -12,15 +12,16 @@ from rclpy.node import Node
 
 from texture_core.config import param
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
-from texture_simulation.devices.rails import EmulatedRails, FingerPortParams, RailsMachine
+from texture_core.types import DEVICES
+from texture_simulation.devices.rails import EmulatedRails, FingerPipeParams, RailsMachine
 
 
 @dataclass(frozen=True)
-class RailsLinkParams(FingerPortParams):
+class RailsLinkParams(FingerPipeParams):
     """Where the rails are reached, and whom they tell where the finger is."""
 
     link: str = param(
-        '/tmp/tactile_texture/rails',
+        f'{DEVICES}/rails',
         'Path of the symbolic link to the emulated rails, which is the device path of the arm.',
     )
 
@@ -34,7 +35,7 @@ class RailsNode(Node):
         machine = declare(self, RailsMachine)
         self._open = ExitStack()
         self._rails = self._open.enter_context(
-            EmulatedRails(Path(params.link).expanduser(), machine, finger_port=params.finger_port)
+            EmulatedRails(Path(params.link).expanduser(), machine, finger_pipe=params.finger_pipe)
         )
         Diagnostics(self, self._report, hardware_id=params.link)
         self.get_logger().info(f'emulated rails are at {params.link}')

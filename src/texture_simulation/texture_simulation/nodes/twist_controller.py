@@ -18,7 +18,7 @@ from rclpy.node import Node
 from texture_core.config import param
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, on_change, run
 from texture_core.types import FingerSender
-from texture_simulation.devices.rails import FingerPortParams
+from texture_simulation.devices.rails import FingerPipeParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 COMMANDED_S = 0.3  # who commands an arm that moves does so more often
@@ -26,7 +26,7 @@ LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
 
 
 @dataclass(frozen=True)
-class ControllerTopicParams(FingerPortParams):
+class ControllerTopicParams(FingerPipeParams):
     """Names of the topics and frames, which are those of `ur_robot_driver` by default."""
 
     twist_topic: str = param('twist_controller/twist', 'Topic of the commanded velocities.')
@@ -81,7 +81,7 @@ class TwistControllerNode(Node):
         self._delayed: deque[tuple[float, Any, list[float]]] = deque()  # when due, stamp and reading
         self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
         self.create_subscription(WrenchStamped, topics.target_wrench_topic, self._on_wrench, 1)
-        self._emulator = FingerSender(topics.finger_port)
+        self._emulator = FingerSender(topics.finger_pipe)
         self._closing = threading.Event()
         Diagnostics(self, self._report)
         self._thread = threading.Thread(target=self._run, name='arm', daemon=True)
