@@ -91,13 +91,12 @@ def test_a_condition_that_is_neither_true_nor_false_is_refused(launch) -> None:
         launch('<node pkg="p" exec="e" if="yes"/>')
 
 
-def test_a_group_keeps_its_changes_to_itself_and_an_unscoped_one_does_not(launch) -> None:
+def test_a_group_keeps_its_changes_to_itself(launch) -> None:
     change = '<push_ros_namespace namespace="left"/><let name="n" value="inner"/><set_env name="E" value="1"/>'
     node = '<node pkg="p" exec="e" name="$(var n)"/>'
     inner, outer = launch(f'<let name="n" value="outer"/><group>{change}{node}</group>{node}')
     assert (inner.name, inner.namespace, inner.environment['E']) == ('inner', '/left', '1')
     assert (outer.name, outer.namespace, 'E' in outer.environment) == ('outer', '', False)
-    assert launch(f'<let name="n" value="outer"/><group scoped="false">{change}</group>{node}')[0].namespace == '/left'
 
 
 def test_an_empty_namespace_is_the_root(launch) -> None:
@@ -120,27 +119,25 @@ def test_a_file_that_includes_itself_is_refused(launch) -> None:
         launch(f'<include file="{launch.folder / "a.launch.xml"}"/>')
 
 
-def test_params_are_typed_nested_and_kept_in_their_order_with_files(launch) -> None:
+def test_params_are_typed_and_kept_in_their_order_with_files(launch) -> None:
     (launch.folder / 'p.yaml').write_text('{}')
     params = (
-        '<param name="rate" value="2.5"/>'
-        '<param name="pid"><param name="p" value="1"/><param name="i" value="0.5"/></param>'
-        f'<param from="{launch.folder}/p.yaml"/><param name="id" value="7" type="str"/>'
+        '<param name="rate" value="2.5"/><param name="count" value="$(var n)"/>'
+        f'<param from="{launch.folder}/p.yaml"/><param name="id" value="$(var n)" type="str"/>'
     )
-    (node,) = launch(f'<node pkg="p" exec="e">{params}</node>')
-    assert node.parameters == ({'rate': 2.5}, {'pid.p': 1, 'pid.i': 0.5}, launch.folder / 'p.yaml', {'id': '7'})
+    (node,) = launch(f'<let name="n" value="5"/><node pkg="p" exec="e">{params}</node>')
+    assert node.parameters == ({'rate': 2.5}, {'count': 5}, launch.folder / 'p.yaml', {'id': '5'})
 
 
 def test_the_command_line_is_that_of_ros(launch, tmp_path) -> None:
     (node,) = launch(
-        '<let name="x" value="a b"/><node pkg="p" exec="e" name="n" namespace="ns" args="--flag $(var x) \'c d\'">'
+        '<node pkg="p" exec="e" name="n" namespace="ns">'
         '<remap from="signal" to="/s"/><param name="rate" value="2"/></node>'
     )
     words = command(node, tmp_path / 'params')
-    assert words[1:4] == ['--flag', 'a b', 'c d']
-    assert words[4:10] == ['--ros-args', '-r', '__node:=n', '-r', '__ns:=/ns', '--params-file']
-    assert words[11:] == ['-r', 'signal:=/s']
-    assert Path(words[10]).read_text() == '/ns/n:\n  ros__parameters:\n    rate: 2\n'
+    assert words[1:7] == ['--ros-args', '-r', '__node:=n', '-r', '__ns:=/ns', '--params-file']
+    assert words[8:] == ['-r', 'signal:=/s']
+    assert Path(words[7]).read_text() == '/ns/n:\n  ros__parameters:\n    rate: 2\n'
 
 
 def test_an_unknown_package_or_executable_gets_the_nearest(launch, tmp_path) -> None:
@@ -183,15 +180,6 @@ def test_a_namespace_is_joined_unless_it_is_absolute(base, name, joined) -> None
     assert joined_namespace(base, name) == joined
 
 
-VARIABLES = {'$(var n)': '5', '$(var x)': '0.5', '$(var t)': 'cork', '$(var e)': '', '$(var b)': '[1'}
-
-
-def with_values(text):
-    for call, value in VARIABLES.items():
-        text = text.replace(call, value)
-    return text
-
-
 @pytest.mark.parametrize(
     ('text', 'type_name', 'value'),
     [
@@ -205,20 +193,11 @@ def with_values(text):
         ('5', 'str', '5'),
         ('5', 'float', 5.0),
         ('1', 'bool', True),
-        ('[1, 2]', 'yaml', [1, 2]),
-        ('[a, b]', 'list_of_str', ['a', 'b']),
-        ('$(var n)', 'yaml', 5),
-        ("'$(var n)'", 'yaml', 5),
-        ('$(var n)', 'str', '5'),
-        ('$(var n)', 'float', 5.0),
-        ('$(var t)/$(var n)', 'yaml', 'cork/5'),
-        ('$(var e)', 'yaml', ''),
-        ('[$(var n), 6]', 'yaml', [5, 6]),
-        ('[$(var t), birch]', 'yaml', ['cork', 'birch']),
+        ('cork/5', 'yaml', 'cork/5'),
     ],
 )
 def test_values_are_typed_as_yaml_does_unless_a_type_is_given(text, type_name, value) -> None:
-    got = parameter_value(text, type_name, with_values)
+    got = parameter_value(text, type_name)
     assert got == value
     assert type(got) is type(value)
 
@@ -227,21 +206,20 @@ def test_values_are_typed_as_yaml_does_unless_a_type_is_given(text, type_name, v
     ('text', 'type_name'),
     [
         ('rough', 'float'),
-        ('$(var t)', 'int'),
+        ('cork', 'int'),
         ('{a: 1}', 'yaml'),
         ('null', 'yaml'),
-        ('[1, a]', 'yaml'),
-        ('3', 'list_of_int'),
+        ('[1, 2]', 'yaml'),
     ],
 )
 def test_a_value_of_another_type_is_refused(text, type_name) -> None:
     with pytest.raises(InvalidLaunch, match='parameter value'):
-        parameter_value(text, type_name, with_values)
+        parameter_value(text, type_name)
 
 
 def test_an_unknown_type_gets_the_nearest() -> None:
     with pytest.raises(UnknownName, match='float'):
-        parameter_value('1', 'flaot', with_values)
+        parameter_value('1', 'flaot')
 
 
 def shown(name, arguments):
@@ -257,7 +235,6 @@ def shown(name, arguments):
         ('$(env XDG /tmp)/finger', '<env:XDG|/tmp>/finger'),
         ('$(env $(var name) "a b")', '<env:<var:name>|a b>'),
         ("$(env X '')", '<env:X|>'),
-        (r'\$(var x)', '$(var x)'),
     ],
 )
 def test_calls_are_expanded_innermost_first_and_all_else_stays(text, expanded) -> None:

@@ -10,13 +10,12 @@ import math
 import os
 import re
 import selectors
-import shlex
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -135,10 +134,8 @@ class NodeDescription:
     executable: str
     name: str = ''
     namespace: str = ''
-    arguments: tuple[str, ...] = ()
     parameters: tuple[Path | Mapping[str, Any], ...] = ()
     remappings: tuple[tuple[str, str], ...] = ()
-    screen: bool = False
     respawn: bool = False
     respawn_delay_s: float = 0.0
     respawn_max_retries: int = -1  # below 0: as often as it dies
@@ -167,7 +164,7 @@ def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
             file.write_text(yaml.safe_dump({node.parameter_key: {'ros__parameters': dict(parameters)}}))
         options += ['--params-file', str(file)]
     options += [word for source, target in node.remappings for word in ('-r', f'{source}:={target}')]
-    return [str(executable(node.package, node.executable)), *node.arguments, '--ros-args', *options]
+    return [str(executable(node.package, node.executable)), '--ros-args', *options]
 
 
 # ROS packages and their executables over AMENT_PREFIX_PATH.
@@ -239,7 +236,7 @@ class RunningNode:
                 command_line,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
                 # A pipe would hold the output of Python programs back until 8 KiB have come together.
                 env={**environment, 'PYTHONUNBUFFERED': '1'},
                 preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),  # noqa: PLW1509 - the launcher is a program without threads
@@ -248,10 +245,9 @@ class RunningNode:
         except OSError as error:
             raise LaunchFailed(f"'{command_line[0]}' cannot be started: {error.strerror}") from error
         assert self._process.stdout is not None
-        assert self._process.stderr is not None
-        self.streams: dict[IO[bytes], bytes] = {self._process.stdout: b'', self._process.stderr: b''}  # begun lines
-        for stream in self.streams:
-            os.set_blocking(stream.fileno(), False)
+        self.stream: IO[bytes] = self._process.stdout
+        self._begun = b''  # line
+        os.set_blocking(self.stream.fileno(), False)
 
     @property
     def pid(self) -> int:
@@ -262,33 +258,30 @@ class RunningNode:
         """Return the code with which the process ended; None while it runs."""
         return self._process.poll()
 
-    def read(self, stream: IO[bytes]) -> bool:
-        """Show the lines that have arrived on a stream; return whether anything had."""
+    def read(self) -> bool:
+        """Show the lines that have arrived; return whether anything had."""
         try:
-            data = os.read(stream.fileno(), CHUNK)
+            data = os.read(self.stream.fileno(), CHUNK)
         except BlockingIOError:
             return False
-        *lines, self.streams[stream] = (self.streams[stream] + data).split(b'\n')
+        *lines, self._begun = (self._begun + data).split(b'\n')
         for line in lines:
-            self._show(stream, line)
+            self._show(line)
         return bool(data)
 
     def close(self) -> None:
-        """End what the process has started itself, show what is left, also of unfinished lines, and close."""
+        """End what the process has started itself, show what is left, also of an unfinished line, and close."""
         self.send(signal.SIGKILL)
         self._process.wait()
-        for stream in self.streams:
-            while self.read(stream):
-                pass
-            if self.streams[stream]:
-                self._show(stream, self.streams[stream])
-            stream.close()
+        while self.read():
+            pass
+        if self._begun:
+            self._show(self._begun)
+        self.stream.close()
 
-    def _show(self, stream: IO[bytes], line: bytes) -> None:
-        # As upstream: without output="screen", what a node prints is not shown, only its log and error messages.
-        if self.node.screen or stream is self._process.stderr:
-            self.last = line.decode(errors='replace').rstrip()
-            self._say(f'[{self.node.label}] {self.last}')
+    def _show(self, line: bytes) -> None:
+        self.last = line.decode(errors='replace').rstrip()
+        self._say(f'[{self.node.label}] {self.last}')
 
     def send(self, number: signal.Signals) -> None:
         """Send a signal to the whole group of the process; one that is gone is left alone.
@@ -396,7 +389,7 @@ class Supervisor:
                 self._due.remove((when, node, deaths))
                 self._start(node, deaths)
         for key, _ in self._selector.select(POLL_S):
-            if not key.data.read(key.fileobj):  # the end of the stream: it would stay readable for ever
+            if not key.data.read():  # the end of the stream: it would stay readable for ever
                 self._selector.unregister(key.fileobj)
         for process in list(self._running):
             code = process.poll()
@@ -409,8 +402,7 @@ class Supervisor:
             # In the place of a dead node, with which the others still count, Fast DDS is to be discovered soon.
             environment[PROFILES[0]] = str(config.folder('texture_bringup', 'config/fastdds') / 'restart.xml')
         process = RunningNode(node, self._commands[id(node)], environment, self._say)
-        for stream in process.streams:
-            self._selector.register(stream, selectors.EVENT_READ, process)
+        self._selector.register(process.stream, selectors.EVENT_READ, process)
         process.deaths = deaths
         self._running.append(process)
         self._say(f'[launch] {node.label} started (process {process.pid})')
@@ -442,9 +434,8 @@ class Supervisor:
 
     def _forget(self, process: RunningNode) -> None:
         self._running.remove(process)
-        for stream in process.streams:
-            if stream.fileno() in self._selector.get_map():
-                self._selector.unregister(stream)
+        if process.stream.fileno() in self._selector.get_map():
+            self._selector.unregister(process.stream)
         process.close()
 
 
@@ -458,8 +449,7 @@ Perform = Callable[[str, Sequence[str]], str]
 def expand(text: str, perform: Perform) -> str:
     """Return a text with its calls performed: `perform(name, arguments)` gives the text of each, innermost first.
 
-    A backslash takes the next character literally. Inside a call, arguments stand one space apart; an argument with
-    spaces is quoted.
+    Inside a call, arguments stand one space apart; an argument with spaces is quoted.
 
     Raises
     ------
@@ -469,18 +459,6 @@ def expand(text: str, perform: Perform) -> str:
     return _expand(text, 0, '', perform)[0]
 
 
-def has_calls(text: str) -> bool:
-    """Return whether a text holds a substitution."""
-    found: list[str] = []
-
-    def note(name: str, _arguments: Sequence[str]) -> str:
-        found.append(name)
-        return ''
-
-    expand(text, note)
-    return bool(found)
-
-
 def _expand(text: str, at: int, stop: str, perform: Perform) -> tuple[str, int]:
     """Return the expanded text up to the end or the first plain character of `stop`, and the place of that."""
     parts = []
@@ -488,7 +466,6 @@ def _expand(text: str, at: int, stop: str, perform: Perform) -> tuple[str, int]:
         if text.startswith('$(', at):
             part, at = _call(text, at, perform)
         else:
-            at += text[at] == '\\' and at + 1 < len(text)
             part, at = text[at], at + 1
         parts.append(part)
     return ''.join(parts), at
@@ -572,73 +549,41 @@ SUBSTITUTIONS: Mapping[str, tuple[Callable[..., str], int, int]] = {
 # The type of a parameter given as text: YAML's rules, as in ROS 2 launch files.
 
 SCALARS = (bool, int, float, str)
-# The `type` attribute of a param; (type, whether a list of it); None lets YAML decide.
-TYPES: Mapping[str, tuple[type | None, bool]] = {
-    **{kind.__name__: (kind, False) for kind in SCALARS},
-    **{f'list_of_{kind.__name__}': (kind, True) for kind in SCALARS},
-    'yaml': (None, False),
-}
+TYPES: Mapping[str, type | None] = {**{kind.__name__: kind for kind in SCALARS}, 'yaml': None}
 TRUTH = {'true': True, '1': True, 'false': False, '0': False}
 
 
-def parameter_value(text: str, type_name: str, expand: Callable[[str], str]) -> Any:
-    """Return the value of a parameter: bool, int, float, str or a list of one of them.
+def parameter_value(text: str, type_name: str) -> Any:
+    """Return the value of a parameter: bool, int, float or str.
 
-    Upstream reads the text as YAML first and performs substitutions afterwards, in what is a string then; the result
-    is read as YAML again. So quotes do not keep `'$(var x)'` a string: `type="str"` does.
+    Quotes do not keep `'$(var x)'` a string, as upstream reads the text as YAML before and after the substitution:
+    `type="str"` does.
 
     Parameters
     ----------
     text
-        Value in the launch file.
+        Value in the launch file, with its substitutions performed.
     type_name
         Content of the attribute `type`; 'yaml' lets the text decide.
-    expand
-        Performs the substitutions in a text.
-
-    Returns
-    -------
-    bool, int, float, str or a list of one of them
 
     Raises
     ------
     InvalidLaunch
         If the text is no value of the type.
     """
-
-    def performed(value: Any) -> Any:
-        if not isinstance(value, str):
-            return value
-        return _scalar(expand(value), kind, pending=False) if has_calls(value) else expand(value)
-
-    kind, is_list = find(TYPES, type_name, 'parameter type')
-    value = _scalar(text, None if is_list else kind, pending=has_calls(text))
-    if is_list and not (isinstance(value, list) and all(isinstance(item, (str, kind or str)) for item in value)):
-        raise InvalidLaunch(f"parameter value '{text}' is no list of {type_name.removeprefix('list_of_')}")
-    if not isinstance(value, list):
-        return performed(value)
-    items = [performed(item) for item in value]
-    if len({type(item) for item in items}) > 1 or not all(isinstance(item, SCALARS) for item in items):
-        raise InvalidLaunch(
-            f"parameter value '{text}' is a list of several types; give one bool, int, float or str throughout"
-        )
-    return items
-
-
-def _scalar(text: str, kind: type | None, pending: bool) -> Any:
-    """Return the value of a text; one with substitutions still to perform (`pending`) may stay a string."""
+    kind = find(TYPES, type_name, 'parameter type')
     if kind is str or not text:
         return text
     try:
         if kind is bool and text in TRUTH:  # YAML takes 1 and 0 for numbers
             return TRUTH[text]
         value = kind(text) if kind in (int, float) else parse_yaml(text)
-        if not isinstance(value, kind or (*SCALARS, list)):
+        if not isinstance(value, kind or SCALARS):
             raise ValueError(text)
     except PARSE_ERRORS as error:
-        if pending or (kind is None and isinstance(error, yaml.YAMLError)):
+        if kind is None and isinstance(error, yaml.YAMLError):
             return text
-        wanted = kind.__name__ if kind else 'bool, int, float, str or a list of one of them'
+        wanted = kind.__name__ if kind else 'bool, int, float or str'
         raise InvalidLaunch(f"parameter value '{text}' is no {wanted}; change it, or the param's type") from error
     return value
 
@@ -658,7 +603,6 @@ NODE_TEXTS = (
     'exec',
     'name',
     'namespace',
-    'output',
     'respawn',
     'respawn_delay',
     'respawn_max_retries',
@@ -666,21 +610,18 @@ NODE_TEXTS = (
 )
 # Attributes and child elements of each element; None: any element.
 ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
-    'launch': (('version',), None),
+    'launch': ((), None),
     'arg': (('name', 'default', 'description', *CONDITIONS), ('choice',)),
     'arg of an include': (('name', 'value'), ()),
     'let': (('name', 'value', *CONDITIONS), ()),
     'set_env': (('name', 'value', *CONDITIONS), ()),
     'push_ros_namespace': (('namespace', *CONDITIONS), ()),
-    'push-ros-namespace': (('namespace', *CONDITIONS), ()),
-    'group': (('scoped', *CONDITIONS), None),
+    'group': (CONDITIONS, None),
     'include': (('file', *CONDITIONS), ('arg',)),
-    'node': ((*NODE_TEXTS, 'args', *CONDITIONS), ('param', 'remap')),
-    'param': (('name', 'value', 'type', 'from'), ('param',)),
+    'node': ((*NODE_TEXTS, 'output', *CONDITIONS), ('param', 'remap')),  # whatever a node says is shown
+    'param': (('name', 'value', 'type', 'from'), ()),
     'remap': (('from', 'to'), ()),
 }
-ON_SCREEN = {'': False, 'log': False, 'screen': True, 'both': True}
-SHUTDOWN_ON_EXIT = {'': False, 'shutdown': True}
 
 
 def find_launch_file(name_or_path: str) -> Path:
@@ -820,12 +761,6 @@ def _attribute(element: Element, name: str) -> str:
     return element.attrib[name]
 
 
-def _choice(text: str, choices: Mapping[str, bool], where: str) -> bool:
-    if text not in choices:
-        raise InvalidLaunch(f"{where} is '{text}'; allowed is one of {', '.join(filter(None, choices))}")
-    return choices[text]
-
-
 def _truth(text: str, where: str) -> bool:
     value = TRUTH.get(text.strip().lower())
     if value is None:
@@ -865,7 +800,6 @@ class _Reader:
             'let': self._read_let,
             'set_env': self._read_set_env,
             'push_ros_namespace': self._read_namespace,
-            'push-ros-namespace': self._read_namespace,
             'group': self._read_group,
             'include': self._read_include,
             'node': self._read_node,
@@ -916,8 +850,7 @@ class _Reader:
         scope.namespace = joined_namespace(scope.namespace, scope.expand(_attribute(element, 'namespace'))) or '/'
 
     def _read_group(self, element: Element, scope: Scope) -> None:
-        scoped = _truth(element.get('scoped', 'true'), "'scoped' of <group>")
-        self._children(element, scope.copy() if scoped else scope)
+        self._children(element, scope.copy())
 
     def _read_include(self, element: Element, scope: Scope) -> None:
         path = Path(scope.expand(_attribute(element, 'file')))
@@ -936,6 +869,8 @@ class _Reader:
         texts = {name: scope.expand(element.get(name, '')) for name in NODE_TEXTS}
         _attribute(element, 'pkg')
         _attribute(element, 'exec')
+        if texts['on_exit'] not in ('', 'shutdown'):
+            raise InvalidLaunch(f"'on_exit' of <node> is '{texts['on_exit']}'; allowed is shutdown")
         self.nodes.append(
             NodeDescription(
                 package=texts['pkg'],
@@ -943,14 +878,12 @@ class _Reader:
                 name=texts['name'],
                 namespace=joined_namespace(scope.namespace, texts['namespace'])
                 or '/' * ('namespace' in element.attrib),
-                arguments=_words(element.get('args', ''), scope),
-                parameters=tuple(_parameters(item, scope) for item in element.findall('param')),
+                parameters=tuple(_parameter(item, scope) for item in element.findall('param')),
                 remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
-                screen=_choice(texts['output'], ON_SCREEN, "'output' of <node>"),
                 respawn=_truth(texts['respawn'] or 'false', "'respawn' of <node>"),
                 respawn_delay_s=_number(texts['respawn_delay'] or '0', 'respawn_delay', 0.0),
                 respawn_max_retries=int(_number(texts['respawn_max_retries'] or '-1', 'respawn_max_retries', -1.0)),
-                needed=_choice(texts['on_exit'], SHUTDOWN_ON_EXIT, "'on_exit' of <node>"),
+                needed=texts['on_exit'] == 'shutdown',
                 environment=dict(scope.environment),
             )
         )
@@ -961,28 +894,15 @@ def _remapping(element: Element, scope: Scope) -> tuple[str, str]:
     return scope.expand(_attribute(element, 'from')), scope.expand(_attribute(element, 'to'))
 
 
-def _words(text: str, scope: Scope) -> tuple[str, ...]:
-    """Return the arguments in a text, split at spaces outside quotes; what a substitution gives is never split."""
-    values: list[str] = []
-
-    def kept(name: str, arguments: Sequence[str]) -> str:
-        values.append(scope.perform(name, [_unmarked(argument, values) for argument in arguments]))
-        return f'\0{len(values) - 1}\0'
-
-    try:
-        return tuple(_unmarked(word, values) for word in shlex.split(expand(text, kept)))
-    except ValueError as error:
-        raise InvalidLaunch(f"'args' of <node> is '{text}', whose quotes are not closed") from error
-
-
-def _unmarked(text: str, values: Sequence[str]) -> str:
-    return re.sub('\0(\\d+)\0', lambda mark: values[int(mark[1])], text)
-
-
-def _parameters(element: Element, scope: Scope) -> Path | dict[str, Any]:
+def _parameter(element: Element, scope: Scope) -> Path | dict[str, Any]:
+    """Return a parameter file, or a name with its value."""
     _check_form(element, 'param')
     if 'from' not in element.attrib:
-        return dict(_named(element, scope, prefix=''))
+        name, text = scope.expand(_attribute(element, 'name')), scope.expand(_attribute(element, 'value'))
+        try:
+            return {name: parameter_value(text, element.get('type', 'yaml'))}
+        except InvalidLaunch as error:
+            raise InvalidLaunch(f"<param name='{name}'>: {error}") from error
     path = Path(scope.expand(element.attrib['from']))
     if 'name' in element.attrib:
         raise InvalidLaunch(f"<param from='{path}'> has a name, too; the file holds the names")
@@ -991,18 +911,3 @@ def _parameters(element: Element, scope: Scope) -> Path | dict[str, Any]:
             raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')
         raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
     return path
-
-
-def _named(element: Element, scope: Scope, prefix: str) -> Iterator[tuple[str, Any]]:
-    """Yield the names, joined with dots, and values of a param and of those inside it."""
-    _check_form(element, 'param')
-    name = prefix + scope.expand(_attribute(element, 'name'))
-    if len(element) and 'value' in element.attrib:
-        raise InvalidLaunch(f"<param name='{name}'> has both a value and params inside; give one of them")
-    for child in element:
-        yield from _named(child, scope, f'{name}.')
-    if not len(element):
-        try:
-            yield name, parameter_value(_attribute(element, 'value'), element.get('type', 'yaml'), scope.expand)
-        except InvalidLaunch as error:
-            raise InvalidLaunch(f"<param name='{name}'>: {error}") from error
