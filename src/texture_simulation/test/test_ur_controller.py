@@ -17,7 +17,6 @@ from texture_simulation.devices.ur import (
     EmulatedController,
     EmulatedRobot,
     ForceMode,
-    LinearMove,
     RtdeMessage,
     RtdeSession,
     SafetyMode,
@@ -201,20 +200,6 @@ def test_a_slope_pushes_along_its_normal():
     surface = ContactPlane(UrControllerParams(slope_x=1.0))
     force = surface.force_n(place(0.01, 0.05, 0.009), REST)  # 1 mm below a plane of 45°
     assert force == pytest.approx(2000.0 * 0.001 / np.sqrt(2) * np.array([-1, 0, 1]) / np.sqrt(2))
-
-
-def test_a_line_takes_the_time_of_its_trapezoid_and_ends_on_the_goal():
-    robot = robot_over()
-    goal = robot.pose + vector(0.03, 0.04)
-    robot.motion = LinearMove(goal, 0.1, 1.0)
-    steps = 0
-    while not robot.motion.done:
-        robot.step(STEP_S)
-        steps += 1
-    assert steps * STEP_S == pytest.approx(0.05 / 0.1 + 0.1 / 1.0, abs=0.01)
-    assert robot.pose == pytest.approx(goal)
-    robot.step(STEP_S)
-    assert not robot.velocity.any()
 
 
 @pytest.mark.parametrize('stiffness', [500.0, 2000.0, 10000.0])

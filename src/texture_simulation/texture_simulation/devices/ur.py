@@ -90,42 +90,6 @@ class SpeedMove(RobotMove):
         return approach(velocity, self._wanted, self._acceleration * step_s)
 
 
-class LinearMove(RobotMove):
-    """Go to a pose on a straight line, speeding up and slowing down (movel)."""
-
-    def __init__(self, goal: Array, speed: float, acceleration: float) -> None:
-        self.done = False
-        self.goal = goal
-        self._speed = speed
-        self._acceleration = acceleration
-
-    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Go on; the last step lands on the goal."""
-        if self.done:
-            return np.zeros(6)
-        offset = self.goal - pose
-        distance = math.sqrt(offset @ offset)
-        faster = math.sqrt(velocity @ velocity) + self._acceleration * step_s
-        speed = min(self._speed, faster, math.sqrt(2 * self._acceleration * distance))
-        if speed * step_s >= distance:
-            self.done = True
-            speed = distance / step_s
-        return speed / distance * offset if distance > 0 else np.zeros(6)
-
-
-class ServoMove(RobotMove):
-    """Follow a pose that is moved all the time (servoj of the pose): approach it within the look-ahead time."""
-
-    def __init__(self, goal: Array, lookahead_s: float) -> None:
-        self.done = False
-        self._goal = goal
-        self._lookahead_s = lookahead_s
-
-    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Take the share of the way that the step has in the look-ahead time."""
-        return (self._goal - pose) * -math.expm1(-step_s / self._lookahead_s) / step_s
-
-
 def approach(now: Array, wanted: Array, step: float) -> Array:
     """Return `now` led towards `wanted` by at most `step`.
 
@@ -248,38 +212,23 @@ POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
 
 
 class ScriptCommand(enum.IntEnum):
-    """Numbers in input_int_register_0 that the control script obeys."""
+    """Numbers in input_int_register_0 that the control script obeys, as far as the arm sends them."""
 
     NONE = 0
-    MOVE_L = 3
     FORCE_MODE = 6
     FORCE_MODE_STOP = 7
     ZERO_FT_SENSOR = 8
     SPEED_L = 10
     SPEED_STOP = 15
-    SERVO_STOP = 16
-    SERVO_L = 24
-    TOOL_CONTACT = 25
     GET_STEPTIME = 26
-    GET_TARGET_WAYPOINT = 28
-    PROTECTIVE_STOP = 31
-    STOP_L = 33
     SET_WATCHDOG = 35
-    IS_POSE_WITHIN_SAFETY_LIMITS = 36
-    IS_STEADY = 47
-    MOVE_UNTIL_CONTACT = 51
-    START_CONTACT_DETECTION = 62
-    STOP_CONTACT_DETECTION = 63
-    READ_CONTACT_DETECTION = 64
     STOP_SCRIPT = 255
 
 
 # The script processes these in every cycle and stays ready; the client does not wait for them.
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
 # What the robot does for some time; a real controller may acknowledge it late.
-SLOW = frozenset(
-    {ScriptCommand.SPEED_STOP, ScriptCommand.FORCE_MODE_STOP, ScriptCommand.ZERO_FT_SENSOR, ScriptCommand.STOP_L}
-)
+SLOW = frozenset({ScriptCommand.SPEED_STOP, ScriptCommand.FORCE_MODE_STOP, ScriptCommand.ZERO_FT_SENSOR})
 READY, DONE = 1, 2  # output_int_register_0
 
 
@@ -505,8 +454,6 @@ class EmulatedRobot:
         the sensor shows it, with offset and noise.
     motion, force_mode
         What moves it; set from outside.
-    touched_at : (6,)
-        Where the last contact began.
     speed_share
         Position of the speed slider on the pendant, 0 to 1; the force mode does not obey it.
     """
@@ -521,7 +468,6 @@ class EmulatedRobot:
         self.force: Array = np.zeros(6)
         self.motion: RobotMove = StopMove(HALT)
         self.force_mode: ForceMode | None = None
-        self.touched_at = self.pose
         self._offset: Array = params.force_offset_n * OFFSET_DIRECTION
         self._noise_n = params.force_noise_n
         self._rng = rng
@@ -543,10 +489,7 @@ class EmulatedRobot:
         velocity = velocity - (1.0 - self.speed_share) * led
         self.velocity = velocity
         self.pose = self.pose + velocity * step_s
-        touched = self._contact.any()
         self._contact = self.surface.force_n(self.pose[:3], velocity[:3])
-        if not touched and self._contact.any():
-            self.touched_at = self.pose
         self.force = self._offset + self._noise_n * self._rng.standard_normal(6)
         self.force[:3] += self._contact
 
@@ -554,21 +497,6 @@ class EmulatedRobot:
         """Take what the sensor shows for nothing from now on."""
         self._offset = np.zeros(6)
         self._offset[:3] = -self._contact
-
-    def touches(self, direction: Array, threshold_n: float) -> bool:
-        """Return whether a force against a direction, (3,), is measured; a direction of 0 means any.
-
-        Parameters
-        ----------
-        direction : (3,)
-            Direction of the movement; 0 for any.
-        threshold_n
-            Force from which on it counts.
-        """
-        force = self.force[:3]
-        length = math.sqrt(direction @ direction)
-        against = math.sqrt(force @ force) if length == 0 else -(force @ direction) / length
-        return float(against) > threshold_n
 
     def end_force_mode(self) -> None:
         """Yield no longer."""
@@ -604,14 +532,7 @@ def _stiff(velocity: Array, mode: ForceMode) -> Array:
 # every cycle in which they stand there; others once, until the client has written 0 in between. A command that is
 # overwritten within a cycle is lost, as on the real controller.
 
-CONTACT_N = 3.0  # what tool_contact takes for a contact
-RETRACT_STOP = 3.0  # m/s², as in the script
-RETRACT_SPEED, RETRACT_ACCELERATION = 0.25, 1.2  # defaults of movel
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
-RUNNING_BIT = 1 << 15
-COUNTER_SIZE = 128
-
-
 Steps = Iterator[None]
 
 
@@ -623,19 +544,12 @@ class ControlProgram:
         self._registers = registers
         self._host = host
         self._step_s = step_s
-        self._goal = robot.pose
-        self._operation: LinearMove | StopMove | None = None  # what runs without the script waiting for it
-        self._operations = 0
-        self._writes = 0
-        self._contact_direction: Array | None = None
-        self._contact_seen = False
         self._unknown: set[int] = set()
 
     def cycles(self) -> Steps:
         """Obey until told to end; one item per cycle."""
         registers = self._registers
         executed = False
-        self._report_progress(False)
         registers.int_out[0] = READY
         while (number := int(registers.int_in[0])) != ScriptCommand.STOP_SCRIPT:
             if number in REALTIME:
@@ -650,7 +564,6 @@ class ControlProgram:
                     yield from self._wait(self._host.acknowledge_s)
                 registers.int_out[0] = DONE
                 executed = True
-            yield from self._check_background()
             yield
 
     def _wait(self, seconds: float) -> Steps:
@@ -668,52 +581,13 @@ class ControlProgram:
         if steps is not None:
             yield from steps
 
-    def _check_background(self) -> Steps:
-        """Notice the end of an operation in the background, and contacts."""
-        if self._operation is not None and self._operation.done:
-            self._operation = None
-            self._report_progress(False)
-        direction = self._contact_direction
-        if direction is not None and self._robot.touches(direction, CONTACT_N):
-            self._contact_direction = None
-            self._contact_seen = True
-            yield from self._retract()
-
     def _vector(self, start: int) -> Array:
         return np.array(self._registers.double_in[start : start + 6])
 
-    def _run(self, motion: LinearMove | StopMove, in_background: bool) -> Steps:
-        self._robot.motion = motion
-        if self._operation is not None:
-            self._operation = None
-            self._report_progress(False)
-        if in_background:
-            self._operations = (self._operations + 1) % COUNTER_SIZE
-            self._operation = motion
-            self._report_progress(True)
-            return
+    def _stop(self, deceleration: float) -> Steps:
+        self._robot.motion = motion = StopMove(deceleration)
         while not motion.done:
             yield
-
-    def _report_progress(self, running: bool) -> None:
-        self._writes = (self._writes + 1) % COUNTER_SIZE
-        word = self._operations << 24 | self._writes << 16 | (RUNNING_BIT if running else 0)
-        self._registers.int_out[2] = word
-
-    def _retract(self) -> Steps:
-        """Stop, and go back to where the contact began."""
-        yield from self._run(StopMove(RETRACT_STOP), False)
-        yield from self._run(LinearMove(self._robot.touched_at, RETRACT_SPEED, RETRACT_ACCELERATION), False)
-
-    def move_l(self) -> Steps:
-        """d0-5 pose, d6 speed, d7 acceleration, i1 in the background."""
-        self._goal = self._vector(0)
-        line = LinearMove(self._goal, *self._registers.double_in[6:8])
-        return self._run(line, self._registers.int_in[1] == 1)
-
-    def stop_l(self) -> Steps:
-        """d0 deceleration, i1 in the background."""
-        return self._run(StopMove(self._registers.double_in[0]), self._registers.int_in[1] == 1)
 
     def speed_l(self) -> None:
         """d0-5 velocity, d6 acceleration."""
@@ -721,11 +595,7 @@ class ControlProgram:
 
     def speed_stop(self) -> Steps:
         """d0 deceleration."""
-        return self._run(StopMove(self._registers.double_in[0]), False)
-
-    def servo_l(self) -> None:
-        """d0-5 pose, d9 look-ahead time."""
-        self._robot.motion = ServoMove(self._vector(0), self._registers.double_in[9])
+        return self._stop(self._registers.double_in[0])
 
     def force_mode(self) -> None:
         """i1 type, i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; only type 2, the frame as it is."""
@@ -740,7 +610,7 @@ class ControlProgram:
         """End yielding, then stop. What speedl was told goes on afterwards: its thread lives."""
         speeding = self._robot.motion
         self._robot.end_force_mode()
-        yield from self._run(StopMove(FORCE_MODE_STOP), False)
+        yield from self._stop(FORCE_MODE_STOP)
         if isinstance(speeding, SpeedMove):
             self._robot.motion = speeding
 
@@ -748,78 +618,23 @@ class ControlProgram:
         """Take the present force for nothing."""
         self._robot.zero_force()
 
-    def tool_contact(self) -> None:
-        """d0-5 direction; result i1: cycles since the contact, here 1 or 0."""
-        self._registers.int_out[1] = int(self._robot.touches(self._vector(0)[:3], CONTACT_N))
-
     def get_steptime(self) -> None:
         """Result d0."""
         self._registers.double_out[0] = self._step_s
-
-    def get_target_waypoint(self) -> None:
-        """Result d0-5."""
-        self._registers.double_out[:6] = self._goal.tolist()
-
-    def protective_stop(self) -> None:
-        """Stop hard."""
-        self._host.protective_stop()
 
     def set_watchdog(self) -> None:
         """d0 lowest frequency."""
         self._host.set_watchdog(self._registers.double_in[0])
 
-    def is_pose_within_safety_limits(self) -> None:
-        """Result i1: always, there are none here."""
-        self._registers.int_out[1] = 1
-
-    def is_steady(self) -> None:
-        """Result i1."""
-        self._registers.int_out[1] = int(not self._robot.velocity.any())
-
-    def move_until_contact(self) -> Steps:
-        """d0-5 velocity, d6-11 direction of the contact, d12 acceleration."""
-        direction = self._vector(6)[:3]
-        self._robot.motion = SpeedMove(self._vector(0), self._registers.double_in[12])
-        while not self._robot.touches(direction, CONTACT_N):
-            yield
-        yield from self._retract()
-
-    def start_contact_detection(self) -> None:
-        """d0-5 direction."""
-        self._contact_direction = self._vector(0)[:3]
-        self._contact_seen = False
-
-    def stop_contact_detection(self) -> None:
-        """Result i1: whether there was one."""
-        self._contact_direction = None
-        self.read_contact_detection()
-
-    def read_contact_detection(self) -> None:
-        """Result i1: whether there was one."""
-        self._registers.int_out[1] = int(self._contact_seen)
-
 
 COMMANDS: Mapping[int, Callable[[ControlProgram], Steps | None]] = {
-    ScriptCommand.MOVE_L: ControlProgram.move_l,
     ScriptCommand.FORCE_MODE: ControlProgram.force_mode,
     ScriptCommand.FORCE_MODE_STOP: ControlProgram.force_mode_stop,
     ScriptCommand.ZERO_FT_SENSOR: ControlProgram.zero_ft_sensor,
     ScriptCommand.SPEED_L: ControlProgram.speed_l,
     ScriptCommand.SPEED_STOP: ControlProgram.speed_stop,
-    ScriptCommand.SERVO_STOP: ControlProgram.speed_stop,
-    ScriptCommand.SERVO_L: ControlProgram.servo_l,
-    ScriptCommand.TOOL_CONTACT: ControlProgram.tool_contact,
     ScriptCommand.GET_STEPTIME: ControlProgram.get_steptime,
-    ScriptCommand.GET_TARGET_WAYPOINT: ControlProgram.get_target_waypoint,
-    ScriptCommand.PROTECTIVE_STOP: ControlProgram.protective_stop,
-    ScriptCommand.STOP_L: ControlProgram.stop_l,
     ScriptCommand.SET_WATCHDOG: ControlProgram.set_watchdog,
-    ScriptCommand.IS_POSE_WITHIN_SAFETY_LIMITS: ControlProgram.is_pose_within_safety_limits,
-    ScriptCommand.IS_STEADY: ControlProgram.is_steady,
-    ScriptCommand.MOVE_UNTIL_CONTACT: ControlProgram.move_until_contact,
-    ScriptCommand.START_CONTACT_DETECTION: ControlProgram.start_contact_detection,
-    ScriptCommand.STOP_CONTACT_DETECTION: ControlProgram.stop_contact_detection,
-    ScriptCommand.READ_CONTACT_DETECTION: ControlProgram.read_contact_detection,
 }
 
 
