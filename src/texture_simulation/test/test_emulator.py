@@ -16,6 +16,7 @@ from texture_core.types import NANOSECONDS, FingerSender, FingerState, TactileSi
 from texture_drivers.pvdf import Pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import Tsf85
+from texture_simulation.devices.fingers import Tsf85Encoder
 from texture_simulation.emulator import LIVE_SENSORS, Emulator, EmulatorParams
 from texture_simulation.path import straight
 from texture_simulation.scene import load_scene
@@ -47,12 +48,14 @@ class Arm:
         self._emulator.close()
 
 
+def emulated(folder: Path, sensor: str) -> Emulator:
+    links = {'finger_pipe': str(folder / 'finger'), 'sensor_link': str(folder / sensor)}
+    return Emulator(EmulatorParams(surface='ridge_2mm_deep', sensor=sensor, **links))
+
+
 @pytest.fixture
-def emulator(tmp_path: Path) -> Iterator[Emulator]:
-    names = {'finger_pipe': 'finger', 'sensor_link': 'tsf85', 'pvdf_link': 'pvdf'}
-    links = {name: str(tmp_path / file) for name, file in names.items()}
-    params = EmulatorParams(surface='ridge_2mm_deep', **links)
-    with Emulator(params) as made:
+def emulator(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Emulator]:
+    with emulated(tmp_path, getattr(request, 'param', 'tsf85')) as made:
         yield made
 
 
@@ -117,10 +120,10 @@ def test_a_device_that_is_silent_after_opening_is_woken(emulator: Emulator, tmp_
 
 
 def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> None:
-    links = {'finger_pipe': str(tmp_path / 'finger'), 'sensor_link': str(tmp_path / 'old')}
-    params = EmulatorParams(finger=1, long_stamps=False, **links)
-    sensor = Tsf85(SensorParams(device=params.sensor_link, finger=1))
-    with Emulator(params):
+    emulator = emulated(tmp_path, 'tsf85')
+    emulator.device._encoder = Tsf85Encoder(finger=1, long_stamps=False)
+    sensor = Tsf85(SensorParams(device=str(tmp_path / 'tsf85'), finger=1))
+    with emulator:
         sensor.open()
         batches = read(sensor, 500)
         sensor.close()
@@ -131,7 +134,8 @@ def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> No
 FORCE_N = 2.0
 
 
-def test_a_pvdf_finger_beside_it_senses_ridges_and_force(emulator: Emulator, arm: Arm, tmp_path: Path) -> None:
+@pytest.mark.parametrize('emulator', ['pvdf'], indirect=True)
+def test_a_pvdf_finger_senses_ridges_and_force(emulator: Emulator, arm: Arm, tmp_path: Path) -> None:
     sensor = Pvdf(SensorParams(device=str(tmp_path / 'pvdf')))
     sensor.open()
     found: dict[str, list[TactileSignal]] = {}

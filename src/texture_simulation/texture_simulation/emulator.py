@@ -98,49 +98,19 @@ class LiveSensor:
 MakeLiveSensor = Callable[..., LiveSensor]
 
 
-def live_tsf85(
-    scene: Scene,
-    surface: Surface,
-    link: Path,
-    rng: np.random.Generator,
-    *,
-    layout: str = 'tsf85',
-    finger: int = 0,
-    long_stamps: bool = True,
-    pair: bool = False,
-) -> LiveSensor:
-    """Return a TSF-85.
+def live_tsf85(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator, layout: str) -> LiveSensor:
+    """Return a TSF-85 of which one finger touches."""
+    model = models.Tsf85Model(scene, surface, rng, layout=TSF85S[layout])
+    return _on_tsf85(model, link, rng)
 
-    Parameters
-    ----------
-    scene
-        Scene: sensor, contact and effects.
-    surface
-        Surface that is touched.
-    link
-        Symbolic link that leads to the device.
-    rng
-        All random numbers: positions on the sample, effects, noise.
-    layout
-        Name of the layout of the fingertip.
-    finger
-        Which of the two touches.
-    long_stamps
-        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
-    pair
-        Whether both fingers touch, whatever `finger` says.
 
-    Returns
-    -------
-    LiveSensor
-        Not started: its first `advance` is the beginning of its time.
-    """
-    model: models.Tsf85Model | models.Tsf85Pair
-    if pair:
-        model = models.Tsf85Pair(scene, surface, rng)
-    else:
-        model = models.Tsf85Model(scene, surface, rng, layout=TSF85S[layout])
-    device = fingers.EmulatedTsf85(link, rng, 0 if pair else finger, long_stamps)
+def live_tsf85_pair(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
+    """Return a TSF-85 of which both fingers touch."""
+    return _on_tsf85(models.Tsf85Pair(scene, surface, rng), link, rng)
+
+
+def _on_tsf85(model: models.Tsf85Model | models.Tsf85Pair, link: Path, rng: np.random.Generator) -> LiveSensor:
+    device = fingers.EmulatedTsf85(link, rng)
     pace = RATE_HZ, models.TSF85_OVERSAMPLING
     return LiveSensor(model, device, lambda measured: device.advance(*measured), device.skip, pace)
 
@@ -192,8 +162,8 @@ def live_papillarray(scene: Scene, surface: Surface, link: Path, rng: np.random.
 
 
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
-    'tsf85': live_tsf85,
-    'tsf85_pair': partial(live_tsf85, pair=True),
+    'tsf85': partial(live_tsf85, layout='tsf85'),
+    'tsf85_pair': live_tsf85_pair,
     'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
     'biotac': live_biotac,
     'biotac_hand': partial(live_biotac, hand=True),
@@ -226,14 +196,6 @@ class EmulatorParams:
         f'{DEVICES}/tsf85',
         'Path of the symbolic link to the emulated sensor, which is the device path of the sensor node.',
     )
-    finger: int = param(0, 'Index of the finger of a TSF-85 that touches the surface.', low=0, high=1)
-    long_stamps: bool = param(
-        True,
-        'Lets the TSF-85 send 64-bit stamps as firmware from 1.1.7 on does; false sends the 16-bit stamps '
-        'of older firmware.',
-    )
-    daq_link: str = param('', "Path of the link to a data acquisition finger next to the sensor; '' leaves it out.")
-    pvdf_link: str = param('', "Path of the link to a PVDF finger next to the sensor; '' leaves it out.")
     plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
     unplugged_finger: int = param(
         -1,
@@ -281,15 +243,8 @@ class Emulator:
         surface = self.scene.surface(params.surface)
         for other in self.scene.surfaces.values():  # all tables are made now: swapping takes no time and no memory
             other.height_m(np.zeros(1), np.zeros(1), np.zeros(1))
-        makers = dict(LIVE_SENSORS)
-        for name in ('tsf85', 'tsf85_3x4', 'tsf85_pair'):
-            makers[name] = partial(LIVE_SENSORS[name], finger=params.finger, long_stamps=params.long_stamps)
-        sensor = params.sensor or self.scene.sensor
-        find(makers, sensor, 'sensor')
-        links = [(sensor, params.sensor_link), ('daq', params.daq_link), ('pvdf', params.pvdf_link)]
-        self._sensors = [
-            makers[name](self.scene, surface, Path(link).expanduser(), rng) for name, link in links if link
-        ]
+        make = find(LIVE_SENSORS, params.sensor or self.scene.sensor, 'sensor')
+        self._sensor = make(self.scene, surface, Path(params.sensor_link).expanduser(), rng)
         self.flip_bits(params.bit_flips)
         self._starts_plugged = params.plugged
         self._link = FingerReceiver(params.finger_pipe)
@@ -307,8 +262,8 @@ class Emulator:
 
     @property
     def device(self) -> fingers.EmulatedDevice:
-        """The device of the sensor on the emulator; those beside it are left out."""
-        return self._sensors[0].device
+        """The device of the sensor."""
+        return self._sensor.device
 
     @property
     def running(self) -> bool:
@@ -318,29 +273,25 @@ class Emulator:
     @property
     def surface(self) -> str:
         """Name of the surface under the finger."""
-        return self._sensors[0].model.touch.surface.name
+        return self._sensor.model.touch.surface.name
 
     def set_surface(self, name: str) -> None:
         """Swap the sample; UnknownName, with the nearest name, if there is none such."""
-        surface = self.scene.surface(name)
-        for sensor in self._sensors:
-            sensor.model.touch.surface = surface
+        self._sensor.model.touch.surface = self.scene.surface(name)
 
     def start(self) -> None:
-        """Plug the devices in and let time run."""
-        for sensor in self._sensors:
-            sensor.device.plug()
+        """Plug the sensor in and let time run."""
+        self.device.plug()
         if not self._starts_plugged:
             self.unplug()
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread, unplug the devices, remove their links; may be called twice."""
+        """End the thread, unplug the sensor, remove its link; may be called twice."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
-        for sensor in self._sensors:
-            sensor.device.unplug()
+        self.device.unplug()
         self._link.close()
 
     def unplug(self) -> None:
@@ -365,9 +316,9 @@ class Emulator:
     def counts(self) -> Mapping[str, int]:
         """Totals for the diagnostics."""
         return {
-            'samples': self._sensors[0].done,
-            'skipped samples': self._sensors[0].skipped,
-            'bytes nobody took': sum(sensor.device.dropped_bytes for sensor in self._sensors),
+            'samples': self._sensor.done,
+            'skipped samples': self._sensor.skipped,
+            'bytes nobody took': self.device.dropped_bytes,
             'finger states': self._link.received,
             'refused finger states': self._link.refused,
         }
@@ -385,8 +336,6 @@ class Emulator:
         while not self._stop.wait(BURST_S):
             while self._commands:
                 self._commands.pop(0)()
-            states = self._link.states()
-            for sensor in self._sensors:
-                for state in states:
-                    sensor.update(state)
-                sensor.advance(self._now_ns())
+            for state in self._link.states():
+                self._sensor.update(state)
+            self._sensor.advance(self._now_ns())

@@ -846,15 +846,13 @@ class EmulatedTsf85(EmulatedDevice):
     ----------
     link, rng
         See `EmulatedDevice`.
-    finger, long_stamps
-        See `Tsf85Encoder`.
     """
 
-    def __init__(self, link: Path, rng: np.random.Generator, finger: int = 0, long_stamps: bool = True) -> None:
+    def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
         self.started = False
         self.ignored_starts = 0  # so many start commands to come do not help, as after an unclean end
-        self._encoder = Tsf85Encoder(finger, long_stamps)
+        self._encoder = Tsf85Encoder()
         self._received = b''
         self._clock_ms = 0
         self._image: Image = np.zeros(TAXELS, dtype=np.uint16)
