@@ -196,12 +196,6 @@ def test_friction_acts_against_the_movement_with_its_share_of_the_force():
     assert force == pytest.approx([-0.4 * 2.0 * 0.6, -0.4 * 2.0 * 0.8, 2.0])
 
 
-def test_a_slope_pushes_along_its_normal():
-    surface = ContactPlane(UrControllerParams(slope_x=1.0))
-    force = surface.force_n(place(0.01, 0.05, 0.009), REST)  # 1 mm below a plane of 45°
-    assert force == pytest.approx(2000.0 * 0.001 / np.sqrt(2) * np.array([-1, 0, 1]) / np.sqrt(2))
-
-
 @pytest.mark.parametrize('stiffness', [500.0, 2000.0, 10000.0])
 def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
     robot = robot_over(stiffness_n_m=stiffness, start_height_m=0.002)
@@ -210,15 +204,13 @@ def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
     assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
 
 
-def test_force_control_follows_a_slope_while_the_finger_slides():
-    robot = robot_over(slope_x=0.1, start_height_m=0.0)
+def test_force_control_holds_while_the_finger_slides():
+    robot = robot_over(start_height_m=0.0)
     robot.force_mode = pressing(2.0)
     robot.motion = SpeedMove(vector(0.02), 1.0)
     go(robot, 3.0)
     assert robot.velocity[0] == pytest.approx(0.02)
-    assert robot.velocity[2] == pytest.approx(0.1 * 0.02, rel=0.05)
-    # A force loop with admittance a lags by v/a behind a surface that rises with v.
-    assert robot.force[2] == pytest.approx(2.0 + 0.1 * 0.02 / 0.01, rel=0.05)
+    assert robot.force[2] == pytest.approx(2.0, rel=0.01)
 
 
 @pytest.fixture

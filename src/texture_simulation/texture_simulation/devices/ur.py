@@ -245,22 +245,6 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
         'Loopback address to listen on, as the ports are fixed; or a path, which stands for one of its own.',
     )
     version: str = param('5.12', 'Version of the emulated control software.', choices=tuple(VERSIONS))
-    slope_x: float = param(0.0, 'Rise of the surface along x, in metres per metre.', low=-1.0, high=1.0)
-    slope_y: float = param(0.0, 'Rise of the surface along y, in metres per metre.', low=-1.0, high=1.0)
-    bump_height_m: float = param(
-        0.0,
-        'Height of a bump at the centre of the surface; 0 removes the bump.',
-        unit='m',
-        low=-0.05,
-        high=0.05,
-    )
-    bump_width_m: float = param(
-        0.02,
-        'Standard deviation of the Gaussian shape of the bump; larger values are flatter.',
-        unit='m',
-        low=0.001,
-        high=1.0,
-    )
     stiffness_n_m: float = param(
         2000.0,
         'Stiffness of finger and surface in contact; 0 removes the surface.',
@@ -281,7 +265,10 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
 
 
 # --------------------
-# The surface under the robot's finger: a plane that may slope and have a bump, elastic and with friction; a wall.
+# The surface under the robot's finger: a level plane, elastic and with friction; a wall.
+
+
+UP = np.array([0.0, 0.0, 1.0])
 
 
 class ContactPlane:
@@ -311,27 +298,15 @@ class ContactPlane:
         Returns
         -------
         (3,)
-            Stiffness × depth along the normal, Coulomb friction against the movement, and the push of the wall.
+            Stiffness × depth upwards, Coulomb friction against the movement, and the push of the wall.
         """
         behind_m = max(0.0, float(position_m[0] - self.origin[0]) - self._params.wall_m)
         wall: Array = np.array([-self._params.wall_stiffness_n_m * behind_m, 0.0, 0.0])
-        depth, normal = self._depth_and_normal(position_m)
-        pressing = self._params.stiffness_n_m * max(0.0, depth)
+        depth_m = float(self.origin[2] - self.drop_m - position_m[2])
+        pressing = self._params.stiffness_n_m * max(0.0, depth_m)
         if pressing == 0.0:
             return wall
-        return wall + pressing * normal + coulomb_n(self.friction, pressing, normal, velocity_m_s)
-
-    def _depth_and_normal(self, position_m: Array) -> tuple[float, Array]:
-        params = self._params
-        x, y, z = position_m - self.origin
-        width = params.bump_width_m
-        bump = params.bump_height_m * math.exp(-(x * x + y * y) / (2 * width * width))
-        slope_x = params.slope_x - bump * x / (width * width)
-        slope_y = params.slope_y - bump * y / (width * width)
-        steepness = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-        height = params.slope_x * x + params.slope_y * y + bump - self.drop_m
-        normal = np.array([-slope_x, -slope_y, 1.0]) / steepness
-        return float(height - z) / steepness, normal
+        return wall + pressing * UP + coulomb_n(self.friction, pressing, UP, velocity_m_s)
 
 
 # --------------------

@@ -42,8 +42,6 @@ class ControllerTopicParams(FingerPipeParams):
         low=10.0,
         high=1e3,
     )
-    publish_pose: bool = param(True, 'Publishes the pose; false emulates a pose broadcaster that has ended.')
-    publish_wrench: bool = param(True, 'Publishes the force; false emulates a force broadcaster that has ended.')
     blink_s: float = param(
         0.0,
         'Leaves the topic of the velocities for so long when it is set, as a controller that is switched; 0 does not.',
@@ -141,13 +139,12 @@ class TwistControllerNode(Node):
             position, reading, finger = self._arm.position, self._arm.reading_n(), self._arm.finger()
             true_n = self._arm.force_n
         topics, now_s = self._topics, time.monotonic()
-        if topics.publish_pose:
-            self._poses.publish(_pose(stamp, topics.base_frame_id, position.tolist()))
+        self._poses.publish(_pose(stamp, topics.base_frame_id, position.tolist()))
         self._delayed.append((now_s + topics.force_delay_s, stamp, reading.tolist()))
         newest = None
         while self._delayed and self._delayed[0][0] <= now_s:
             newest = self._delayed.popleft()
-        if topics.publish_wrench and newest is not None:
+        if newest is not None:
             measured = stamp if topics.stamp_when_sent else newest[1]
             self._wrenches.publish(_wrench(measured, topics.tool_frame_id, newest[2]))
         self._true_wrenches.publish(_wrench(stamp, topics.base_frame_id, true_n.tolist()))
