@@ -220,6 +220,8 @@ class EvidenceAccumulator:
         known = rejection is Rejection.NONE
         bound = model.error_bound_of(best)
         reported = bound.limited(probabilities)
+        sets = model.decisions.prediction_sets
+        members = sets.members(probabilities, effective_windows) if final and within else ()
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -229,7 +231,7 @@ class EvidenceAccumulator:
             confidence=float(reported.max()),
             probabilities=tuple(reported.tolist()),
             decided=known and bound.shown and model.decisions.decided(confidence, effective_windows, novelty_score),
-            prediction_set=self._candidates(model, probabilities, effective_windows) if final and within else (),
+            prediction_set=tuple(model.labels[number] for number in members),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
@@ -263,8 +265,3 @@ class EvidenceAccumulator:
         scores = self._novelty.scores(best, first - second)
         novelty_score, threshold = detector.score_and_threshold(scores, effective_windows)
         return novelty_score, novelty_score <= threshold
-
-    @staticmethod
-    def _candidates(model: TextureModel, probabilities: Array, effective_windows: float) -> tuple[str, ...]:
-        members = model.decisions.prediction_sets.members(probabilities, effective_windows)
-        return tuple(model.labels[number] for number in members)

@@ -163,12 +163,7 @@ class IncrementalClassifier:
         """
         if not self.model.added_slides:
             raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
-        *before, last = self.model.added_slides
-        if self._path is not None:
-            remove_added_slide(self._path, self._numbers[-1])
-            del self._numbers[-1]
-        self.model = self.model.with_added_slides(tuple(before))
-        return last
+        return self._remove([len(self.model.added_slides) - 1])[0]
 
     def remove(self, label: str) -> tuple[AddedSlide, ...]:
         """Remove all slides that were added as a label, from the model and from its folder, and return them.
@@ -186,10 +181,13 @@ class IncrementalClassifier:
         """
         label = checked_label(label)
         self._refuse_removal(label)
-        kept = list(self.model.added_slides)
-        removed = []
+        return self._remove([place for place, slide in enumerate(self.model.added_slides) if slide.label == label])
+
+    def _remove(self, places: list[int]) -> tuple[AddedSlide, ...]:
+        """Remove slides by their rising places, the last first, and return them; what could not be removed stays."""
+        kept, removed = list(self.model.added_slides), []
         try:
-            for place in reversed([place for place, slide in enumerate(kept) if slide.label == label]):
+            for place in reversed(places):
                 if self._path is not None:
                     remove_added_slide(self._path, self._numbers[place])
                     del self._numbers[place]

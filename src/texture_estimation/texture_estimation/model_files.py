@@ -11,7 +11,7 @@ import struct
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
@@ -367,14 +367,8 @@ def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, f
     Path
         Of the file.
     """
-    content = {
-        'format': FORMAT,
-        'feature_set': feature_set,
-        'label': added_slide.label,
-        'exploration_id': added_slide.exploration_id,
-        'values': added_slide.values.tolist(),
-        'conditions': asdict(added_slide.conditions),
-    }
+    told = {**tree_of(added_slide), 'values': added_slide.values.tolist()}
+    content = {'format': FORMAT, 'feature_set': feature_set, **told}
     path = _folder(model) / f'{number:05d}.json'
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, (json.dumps(content) + '\n').encode())

@@ -86,11 +86,21 @@ def interval(counts: Array) -> list[float]:
     if right in (0.0, answers):
         edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
         return [edge, 1.0] if right else [0.0, 1.0 - edge]
+    return _edges(_resampled(counts))
+
+
+def _resampled(counts: Array) -> Array:
+    """Return the share that is right in each resample of the slides, (..., RESAMPLES), of (..., n_slides, 2)."""
     # Always the same resamples: the figures of a page do not change from run to run.
-    drawn = np.random.default_rng(0).integers(len(counts), size=(RESAMPLES, len(counts)))
-    sums = counts[drawn].sum(axis=1)
-    edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
-    return [float(edge) for edge in edges]
+    n_slides = counts.shape[-2]
+    drawn = np.random.default_rng(0).integers(n_slides, size=(RESAMPLES, n_slides))
+    sums = counts[..., drawn, :].sum(axis=-2)
+    return sums[..., 0] / sums[..., 1]
+
+
+def _edges(drawn: Array) -> list[float]:
+    """Return the ends of the 95 % interval of resampled values, (RESAMPLES,)."""
+    return list(map(float, np.quantile(drawn, [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])))
 
 
 def window_counts(results: Sequence[SlideResult]) -> Array:
@@ -301,10 +311,6 @@ class PairedComparison:
     window_difference: float
     window_interval: tuple[float, float]
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the figures."""
-        return dict(vars(self))
-
 
 def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison:
     """Compare two recipes that were cross-validated on the same splits.
@@ -404,13 +410,11 @@ def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool)
 
 def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
     """Return second minus first share, and its interval; `counts` is (2, n_slides, 2)."""
-    shares = counts.sum(axis=1)
+    first, second = (right / answers for right, answers in counts.sum(axis=1))
     # Both recipes on the same resampled slides: what is hard for both widens no interval.
-    rows = np.random.default_rng(0).integers(counts.shape[1], size=(RESAMPLES, counts.shape[1]))
-    sums = counts[:, rows].sum(axis=2)
-    drawn = sums[..., 0] / sums[..., 1]
-    low, high = np.quantile(drawn[1] - drawn[0], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
-    return float(shares[1, 0] / shares[1, 1] - shares[0, 0] / shares[0, 1]), (float(low), float(high))
+    drawn = _resampled(counts)
+    low, high = _edges(drawn[1] - drawn[0])
+    return float(second - first), (low, high)
 
 
 # --------------------

@@ -55,12 +55,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import param, safe_repr, unknown_name
+from texture_core.config import param, safe_repr
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted, Learner, standardisation
 from texture_estimation.learners.svm import RbfMachines
 from texture_estimation.numerics import log_softmax
+from texture_estimation.recipe import check_keys
 from texture_features.feature import WindowBatch, first_difference, power
 from texture_features.feature_set import choose, entry_of
 from texture_features.spectra import amplitudes_of
@@ -476,40 +477,35 @@ def fit_network(network: Network, values: Array, targets: Array, held: NDArray[n
 def _step(network: Network, values: Array, targets: Array, damping: float) -> tuple[Network | None, float]:
     """Return the network after one step that lessens the error, and the next damping; None if there is no such step."""
     n_weights = network.hidden.size + 2 * len(network.out) + 1
-    linear = _by_examples(network, values) if n_weights > len(values) else _by_weights(network, values)
-    residual = targets - linear.output
+    linear = _by_examples if n_weights > len(values) else _by_weights
+    output, curvature, slope_of, step_of = linear(network, values)
+    residual = targets - output
     error = float(residual @ residual) / len(residual)
-    curvature = linear.curvature
-    slope = linear.slope(residual)
+    slope = slope_of(residual)
     diagonal = np.diag_indices_from(curvature)
     own = curvature[diagonal]
     while damping <= MAX_DAMPING:
         curvature[diagonal] = own + damping
         solved: Array = np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64)
-        stepped = network.moved(linear.step(solved))
+        stepped = network.moved(step_of(solved))
         if _error(stepped, values, targets) < error:
             return stepped, max(damping * LESS, 1e-12)
         damping *= MORE
     return None, damping
 
 
-@dataclass(frozen=True, eq=False)
-class _Linear:
-    """A network near its weights: with Jacobian J and residual r, a step is (JᵀJ + μ)⁻¹ Jᵀr = Jᵀ(JJᵀ + μ)⁻¹ r."""
-
-    output: Array
-    curvature: Array
-    slope: Callable[[Array], Array]
-    step: Callable[[Array], Array]
+# A network near its weights: with Jacobian J and residual r, a step is (JᵀJ + μ)⁻¹ Jᵀr = Jᵀ(JJᵀ + μ)⁻¹ r. Its output,
+# JᵀJ or JJᵀ, what is solved for (of the residual), and the step (of what was solved).
+Linear = tuple[Array, Array, Callable[[Array], Array], Callable[[Array], Array]]
 
 
-def _by_weights(network: Network, values: Array) -> _Linear:
+def _by_weights(network: Network, values: Array) -> Linear:
     """Return the first form, for fewer weights than examples."""
     output, jacobian = network.jacobian(values)
-    return _Linear(output, jacobian.T @ jacobian, lambda residual: jacobian.T @ residual, lambda solved: solved)
+    return output, jacobian.T @ jacobian, lambda residual: jacobian.T @ residual, lambda solved: solved
 
 
-def _by_examples(network: Network, values: Array) -> _Linear:
+def _by_examples(network: Network, values: Array) -> Linear:
     """Return the second form, for fewer examples than weights; JJᵀ is made of its factors, without J."""
     active = network.active(values)
     by_bias = network.slope(active) * network.out
@@ -520,7 +516,7 @@ def _by_examples(network: Network, values: Array) -> _Linear:
         parameters = ((weighted.T @ values).ravel(), weighted.sum(axis=0), solved @ active, solved.sum(keepdims=True))
         return np.concatenate(parameters)
 
-    return _Linear(active @ network.out + network.out_bias, curvature, lambda residual: residual, step)
+    return active @ network.out + network.out_bias, curvature, lambda residual: residual, step
 
 
 def _error(network: Network, values: Array, targets: Array) -> float:
@@ -830,9 +826,7 @@ class TunedPair:
         """
         if not isinstance(entry, Mapping):
             raise InvalidParameter(f'{where}: came {safe_repr(entry)}; a mapping with pair and learner is needed')
-        for key in entry:
-            if key not in PAIR_KEYS:
-                raise InvalidParameter(f'{where}: {unknown_name(str(key), PAIR_KEYS, "key")}')
+        check_keys(entry, PAIR_KEYS, where)
         labels, inputs = _texts(entry.get('pair'), 'pair', where), _texts(entry.get('inputs') or [], 'inputs', where)
         if len(labels) != 2 or labels[0] == labels[1]:
             raise InvalidParameter(f'{where}: pair is {list(labels)}; the labels of two textures are needed')
@@ -922,9 +916,7 @@ class TunedPairs:
         """
         if not isinstance(values, Mapping) or not isinstance(values.get('pairs') or [], list):
             raise InvalidParameter(f'{where}: came {safe_repr(values)}; a mapping with a list of pairs is needed')
-        for key in values:
-            if key not in KEYS:
-                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
+        check_keys(values, KEYS, where)
         learner = choose(OF_PAIRS, values.get('learner', 'texture_papers.roberge:SvmPairs'), 'learner of pairs', where)
         entries = enumerate(values.get('pairs') or [], 1)
         pairs = tuple(TunedPair.from_recipe(entry, f'{where}, pair {number}') for number, entry in entries)
@@ -986,14 +978,8 @@ class TunedPairs:
             rows = np.flatnonzero((y == first) | (y == second))
             codes = (y[rows] == second).astype(np.intp)
             fitted = settings.learner.fit(X[np.ix_(rows, columns)], codes, groups[rows])
-            members.append(
-                {
-                    'number': number,
-                    'columns': columns,
-                    'learner': settings.learner_name,
-                    'parameters': fitted.parameters,
-                }
-            )
+            member = {'number': number, 'columns': columns, 'learner': settings.learner_name}
+            members.append({**member, 'parameters': fitted.parameters})
         parameters = {'n_pairs': len(pairs), 'ties': self.ties, 'members': members}
         return Fitted(parameters, None, TUNED_NOTE.format(n_tuned, len(pairs)))
 

@@ -115,7 +115,7 @@ def _write_figures(
 ) -> None:
     """Write the figures of one recipe, or of several with their comparisons with the first, as JSON."""
     recipes = [result.as_json() for result in results]
-    several = {'recipes': recipes, 'comparisons': [one.as_json() for one in compared]}
+    several = {'recipes': recipes, 'comparisons': [vars(one) for one in compared]}
     write_json({**setting, **(recipes[0] if len(recipes) == 1 else several)}, path)
 
 
