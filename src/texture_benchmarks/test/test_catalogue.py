@@ -90,3 +90,17 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count('\n') == 1
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        ('benchmark latency --out /proc/x', "'/proc/x' cannot be used"),
+        ('endurance --duration 0', '--duration is 0 and --quiet 20; both must be above 0'),
+    ],
+)
+def test_a_wrong_option_is_refused_before_anything_runs(
+    arguments: str, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments.split()) == 2
+    assert sentence in capsys.readouterr().err

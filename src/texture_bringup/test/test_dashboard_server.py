@@ -185,7 +185,7 @@ def test_beyond_loopback_there_is_no_page_without_a_good_token(token) -> None:
 def test_a_port_in_use_is_reported_and_nothing_is_left_running() -> None:
     first = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
     try:
-        with pytest.raises(LaunchFailed, match='choose another port'):
+        with pytest.raises(LaunchFailed, match='choose another host or port'):
             Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', first.port)
         first.show('{}')
     finally:

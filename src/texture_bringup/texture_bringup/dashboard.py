@@ -608,9 +608,9 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
         try:
             asked = parse_json(await request.text())
         except ValueError:
-            return _said(400, 'the request is no JSON')
+            return _said(400, 'the request is not JSON')
         if not isinstance(asked, dict):
-            return _said(400, 'the request is no JSON object')
+            return _said(400, 'the request is not a JSON object')
         try:
             return web.json_response(await command(asked))
         except TextureError as error:
@@ -650,7 +650,8 @@ class Serving:
         except OSError as error:
             self._thread.join()
             raise LaunchFailed(
-                f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; choose another port"
+                f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; "
+                'choose another host or port'
             ) from error
 
     @property

@@ -184,7 +184,7 @@ BAD = {
 def test_bad_yaml_is_refused_with_one_line_and_soon(what: str, tmp_path: Path) -> None:
     file = tmp_path / 'file.yaml'
     file.write_text(BAD[what])
-    with pytest.raises(InvalidParameter, match=r"scene '.*' is no YAML that can be read: ") as caught:
+    with pytest.raises(InvalidParameter, match=r"scene '.*' is not YAML that can be read: ") as caught:
         load_yaml(file, 'scene')
     assert '\n' not in str(caught.value)
 

@@ -85,6 +85,13 @@ def add_seed(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--seed', type=int, default=0, help='seed of whatever is random')
 
 
+def core_count(text: str) -> int:
+    """Return a number of cores, negative to leave some of all free as joblib does; argparse reports what it raises."""
+    if not (count := int(text)):
+        raise argparse.ArgumentTypeError('0 cores compute nothing; 1 or more are needed, or -1 for all')
+    return count
+
+
 def add_parameters(parser: argparse.ArgumentParser, cls: type) -> None:
     """Add an option for each parameter of a dataclass: `--speed-low-m-s` for `speed_low_m_s`."""
     for one in parameters_of(cls):
@@ -199,8 +206,8 @@ def run_program(action: Callable[[], int], name: str = 'texture') -> int:
     Returns
     -------
     int
-        That of the action; 2 for an error of the user, 130 after Ctrl-C, 141 when nobody reads on what the program
-        prints, as behind `| head`.
+        That of the action; 2 for an error of the user or a file that the system refuses, 130 after Ctrl-C, 141 when
+        nobody reads on what the program prints, as behind `| head`.
     """
     try:
         try:
@@ -213,6 +220,11 @@ def run_program(action: Callable[[], int], name: str = 'texture') -> int:
         return CUT_OFF
     except TextureError as error:
         print(f'{name}: {error}', file=sys.stderr)
+        return USER_ERROR
+    except OSError as error:
+        if error.filename is None:  # no file: a fault of the program, whose traceback is needed
+            raise
+        print(f"{name}: '{error.filename}' cannot be used: {error.strerror}; give another path", file=sys.stderr)
         return USER_ERROR
     except KeyboardInterrupt:
         print(f'{name}: interrupted', file=sys.stderr)

@@ -370,7 +370,7 @@ def read_array(file: IO[bytes]) -> AnyArray:
     except BROKEN_CONTENT as error:
         raise FileRefused(f'it has no array that can be read: {type(error).__name__}: {error}') from error
     if array.dtype.kind == 'U' and array.size and array.view(np.uint32).max(initial=0) > LAST_CHARACTER:
-        raise FileRefused('it promises texts, and holds what are no characters')
+        raise FileRefused('it promises texts, and holds what are not characters')
     return array
 
 
@@ -396,7 +396,7 @@ class Archive:
         try:
             self._zip = zipfile.ZipFile(file)
         except BROKEN_CONTENT as error:
-            raise FileRefused(f'it is no archive that can be read: {error}') from error
+            raise FileRefused(f'it is not an archive that can be read: {error}') from error
         self.names = tuple(dict.fromkeys(self._zip.namelist()))
         if sum(member.file_size for member in self._zip.infolist()) > most_bytes:
             raise FileRefused(f'it unpacks to more than {most_bytes // MB} MB, which is the limit for such a file')
@@ -501,7 +501,7 @@ def load_yaml(path: Path, what: str) -> Any:
     try:
         return parse_yaml(read_text(path, 4 * MAX_CHARACTERS))
     except PARSE_ERRORS as error:
-        raise InvalidParameter(f"{what} '{path}' is no YAML that can be read: {error}") from error
+        raise InvalidParameter(f"{what} '{path}' is not YAML that can be read: {error}") from error
 
 
 def load_card(path: Path) -> Any:
@@ -743,7 +743,7 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
         If a value has the wrong type or range, or a name is unknown (with the nearest known one).
     """
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
-        raise InvalidParameter(f'{where}: {cls!r} is no class with parameters; name a dataclass')
+        raise InvalidParameter(f'{where}: {cls!r} is not a class with parameters; name a dataclass')
     return cls(**_read(cls, values, where, _checked))
 
 

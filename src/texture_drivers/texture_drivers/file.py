@@ -89,7 +89,7 @@ def _lines(text: TextIO) -> Iterator[str]:
     """Yield the lines of a table that hold something; one that never ends is refused while it is read."""
     while line := text.readline(MAX_LINE + 1):
         if len(line) > MAX_LINE:
-            raise ValueError(f'it has a line of more than {MAX_LINE} characters; that is no table')
+            raise ValueError(f'it has a line of more than {MAX_LINE} characters; that is not a table')
         if line.strip() and not line.startswith('#'):
             yield line
 

@@ -191,7 +191,7 @@ def read_settings(config: str) -> dict[str, Any]:
         try:
             content = parse_yaml(config)
         except PARSE_ERRORS as error:
-            raise InvalidParameter(f'settings {config} are no YAML: {error}') from error
+            raise InvalidParameter(f'settings {config} are not YAML: {error}') from error
     else:
         content = load_yaml(find_file(config, 'texture_drivers', 'config/sensors', 'settings'), 'settings')
     if not isinstance(content, dict):

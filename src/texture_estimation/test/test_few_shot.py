@@ -77,5 +77,5 @@ def test_one_session_or_a_strange_label_is_refused_with_what_to_do(model):
     with pytest.raises(InvalidData, match=r'one session of each surface.*train on several days'):
         adapted(model, monday, slides(TODAY, 1, 2))
     shots = slides(TODAY, 1, 2)
-    with pytest.raises(InvalidData, match="'silk' is no trained surface; label the slides of today with cork, felt"):
+    with pytest.raises(InvalidData, match="'silk' is not a trained surface; label the slides of today with cork, felt"):
         adapted(model, TRAINING, replace(shots, labels=np.where(shots.labels == 'oak', 'silk', shots.labels)))

@@ -84,6 +84,9 @@ def test_missing_files_are_refused(saved):
     refused(saved.parent / 'none.npz', 'there is no model')
     saved.unlink()
     refused(saved, 'belongs next to its card')
+    saved.write_bytes(b'')
+    saved.with_suffix('.json').unlink()
+    refused(saved, 'there is no card')
 
 
 @pytest.mark.parametrize('keep', [0, 10, 1000])
@@ -125,8 +128,8 @@ def array_file(array, name='parameters/hidden.npy'):
 @pytest.mark.parametrize(
     ('content', 'sentence'),
     [
-        (b'', 'no archive'),
-        (b'not a zip', 'no archive'),
+        (b'', 'not an archive'),
+        (b'not a zip', 'not an archive'),
         (array_file(np.array([print])), 'no array that can be read'),
         (array_file(np.zeros(3, np.int8)), 'holds int8; float32, float64, int32, int64 are allowed'),
         (array_file(np.zeros(3), 'parameters/../../x.npy'), 'train it again'),

@@ -77,7 +77,7 @@ def test_probabilities_are_calibrated_on_slides_held_out(make_examples):
         ({'estimator': 'sklearn.ensemble._forest:ExtraTreesClassifier'}, 'a public class of scikit-learn'),
         ({'estimator': 'sklearn.ensemble:ExtraTrees'}, "there is no 'ExtraTrees'"),
         ({'estimator': 'sklearn.nothing:ExtraTrees'}, "there is no 'ExtraTrees'"),
-        ({'estimator': 'sklearn.ensemble:ExtraTreesRegressor'}, 'is no classifier'),
+        ({'estimator': 'sklearn.ensemble:ExtraTreesRegressor'}, 'is not a classifier'),
         ({'estimator': 'sklearn.ensemble:VotingClassifier'}, 'needs other estimators'),
         ({**TREES, 'n_trees': 5}, "no parameter of 'sklearn.ensemble:ExtraTreesClassifier' 'n_trees'"),
         ({**TREES, 'n_estimators': {'a': 1}}, 'a number, a text, true, false, null or a list'),

@@ -49,7 +49,7 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     shots, shot_labels, _ = _slide_means(today)
     names = list(model.trained_labels)
     if strange := sorted(set(shot_labels) - set(names)):
-        raise InvalidData(f"'{strange[0]}' is no trained surface; label the slides of today with {', '.join(names)}")
+        raise InvalidData(f"'{strange[0]}' is not a trained surface; label the slides of today with {', '.join(names)}")
     centre, scale = means.mean(axis=0), means.std(axis=0)
     scale[scale <= 1e-9 * (1.0 + np.abs(centre))] = np.inf  # a constant feature tells nothing
     standard = (means - centre) / scale

@@ -539,7 +539,7 @@ def parse_split(text: str, seed: int = 0) -> Split:
     try:
         return SPLITS[name](text, argument, seed)
     except ValueError as error:
-        raise InvalidParameter(f"the split is '{text}': {error}; {ALLOWED}") from error
+        raise InvalidParameter(f"the split is '{text}'; {ALLOWED}") from error
 
 
 def _leave_one_out(name: str, argument: str) -> Split:
@@ -563,8 +563,8 @@ SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
     ),
 }
 ALLOWED = (
-    f'write stratified:FOLDS, leave-one-out:CONDITION ({", ".join(CONDITIONS)}; place:PARTS), '
-    'chronological:TRAINING_FRACTION or random:SPLITS'
+    f'write stratified:FOLDS (2 or more), leave-one-out:CONDITION ({", ".join(CONDITIONS)}; place:PARTS), '
+    'chronological:TRAINING_FRACTION (between 0 and 1) or random:SPLITS'
 )
 
 
@@ -604,6 +604,10 @@ def split_slides(
     labels, columns = dataset.labels, slide_groups(dataset, groups)
     if type(splitter).__name__.startswith('Stratified'):
         _check_folds(labels, getattr(splitter, 'n_splits', 1))
+    if isinstance(splitter, LeaveOneGroupOut) and len(np.unique(columns)) < 2:
+        raise InvalidData(
+            f"the slides cannot be split: all are of one group, '{columns[0]}'; use another split or record more slides"
+        )
     try:
         splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:

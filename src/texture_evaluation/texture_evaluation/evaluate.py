@@ -254,11 +254,11 @@ def summary(report: EvaluationReport) -> list[str]:
     ]
     wrong, unknown = figures['wrong_known'], figures['unknown']
     lines.append(
-        f'wrong but taken for known: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
-        f'taken for unknown: {percent(unknown["early"])}, {percent(unknown["final"])}'
+        f'known and wrong: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
+        f'rejected: {percent(unknown["early"])}, {percent(unknown["final"])}'
     )
     if figures['unknown_accepted'] is not None:
-        lines.append(f'unknown surfaces taken for known ones: {percent(figures["unknown_accepted"])}')
+        lines.append(f'slides over other surfaces called known: {percent(figures["unknown_accepted"])}')
     if report.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')
     return [*lines, *report.tare_faults]

@@ -175,7 +175,7 @@ def test_a_missing_bag_a_foreign_folder_and_a_foreign_file_are_refused_with_a_se
     with pytest.raises(InvalidData, match='there is no bag'):
         list(read_bag(tmp_path / 'nothing'))
     for foreign in (tmp_path, tmp_path / 'notes.txt'):
-        with pytest.raises(InvalidData, match='is no bag; a folder'):
+        with pytest.raises(InvalidData, match='is not a bag; a folder'):
             list(read_bag(foreign))
 
 

@@ -138,7 +138,7 @@ def test_a_wrong_source_material_slide_or_channel_is_refused_with_a_sentence(tmp
     (tmp_path / 'broken' / 'material01.npz').write_bytes(b'nothing')
     with pytest.raises(InvalidData, match='no files materialNN'):
         import_biotac20(tmp_path, tmp_path / 'out')
-    with pytest.raises(InvalidData, match='is no file of this data set'):
+    with pytest.raises(InvalidData, match='is not a file of this data set'):
         import_biotac20(tmp_path / 'broken', tmp_path / 'out')
     with pytest.raises(UnknownName, match="did you mean 'material07'"):
         import_biotac20(source, tmp_path / 'out', materials=['material70'])

@@ -155,7 +155,7 @@ def test_what_cannot_be_exported_is_refused_with_a_sentence(dataset, tmp_path) -
     with pytest.raises(InvalidParameter, match='nothing is overwritten'):
         export_slides(dataset, tmp_path / 'out', 'hdf5')
     (tmp_path / 'card.json').write_text('{"labels": []}')
-    with pytest.raises(InvalidData, match=r'is no card of a texture model'):
+    with pytest.raises(InvalidData, match=r'is not the card of a texture model'):
         model_card(tmp_path / 'card.json')
 
 

@@ -88,9 +88,9 @@ def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: P
     assert report.malformed_rows == 3 * 6
     # Two lines stand above the first row, and lines count from 1.
     assert report.examples[:3] == [
-        "'2031-05-01 cork_thick v20.csv', row 53, column 'acc_x': 'oops' is no finite number",
+        "'2031-05-01 cork_thick v20.csv', row 53, column 'acc_x': 'oops' is not a finite number",
         "'2031-05-01 cork_thick v20.csv', row 63, column 'all': 1 cells, 6 are needed",
-        "'2031-05-01 cork_thick v20.csv', row 73, column 'grip': 'nan' is no finite number",
+        "'2031-05-01 cork_thick v20.csv', row 73, column 'grip': 'nan' is not a finite number",
     ]
     assert sum(report.slides.values()) == 18  # a malformed row is no border
     samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()

@@ -547,7 +547,7 @@ def _no_bag(path: Path) -> str:
         return f"there is no bag '{path}'; give the folder that was recorded or imported"
     if path.is_dir() and next(path.glob('*.mcap'), None):
         return f"the bag '{path}' has no metadata.yaml, its recording was cut off; give its .mcap files one by one"
-    return f"'{path}' is no bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
+    return f"'{path}' is not a bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
 
 
 def read_named(

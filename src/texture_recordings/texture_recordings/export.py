@@ -466,7 +466,8 @@ def model_card(path: str | Path, licence: str = 'other') -> str:
         accuracy = float(training['held_out_window_accuracy'])
         description, name = str(recipe['description']), str(card['name'])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InvalidData(f"'{path}' is no card of a texture model: {error}; give MODEL.json") from error
+        reason = 'it is not text' if isinstance(error, UnicodeDecodeError) else error
+        raise InvalidData(f"'{path}' is not the card of a texture model: {reason}; give MODEL.json") from error
     facts = {'license': licence, 'library_name': 'tactile-texture', 'tags': ['tactile', 'texture', 'robotics']}
     lines = [description, '', '| | |', '|---|---|', *(f'| {key} | {value} |' for key, value in rows), '']
     lines += [

@@ -153,7 +153,7 @@ def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[BiotacSli
                     fields = {name: content[f'{slide}/{name}'] for name in FIELDS}
                     yield BiotacSlide(file.stem, slide, epoch=float(content[f'{slide}/epoch']), **fields)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
+        raise InvalidData(f"'{file}' is not a file of this data set: {error}; fetch it again") from error
 
 
 def frame_indices(frame_time: AnyArray) -> AnyArray:
@@ -330,7 +330,9 @@ class SlideSet:
         for key in arrays:
             match = re.fullmatch(self.key, key)
             if match is None:
-                raise InvalidData(f"'{self.files}' holds '{key}', which is no slide of this data set; fetch it again")
+                raise InvalidData(
+                    f"'{self.files}' holds '{key}', which is not a slide of this data set; fetch it again"
+                )
             surface, order = self.order(*match.groups())
             found[surface].append((order, key))
         for name in materials:
@@ -365,7 +367,7 @@ class SlideSet:
                     slide = self.slide(order, array)
                 except (ValueError, LookupError, ArithmeticError) as error:
                     raise InvalidData(
-                        f"'{key}' of '{self.files}' is no slide of this data set: {error}; fetch it again"
+                        f"'{key}' of '{self.files}' is not a slide of this data set: {error}; fetch it again"
                     ) from error
                 named = ExplorationState(
                     0, key, self.motion, Phase.SLIDE, speed_m_s=slide.speed_m_s, force_n=slide.force_n,
@@ -403,7 +405,7 @@ def _slides_in(file: Path) -> dict[str, AnyArray]:
             content = Arrays(opened)
             return {key: _rows_of(key, content[key]) for key in content.names}
     except (OSError, ValueError, KeyError) as error:
-        raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
+        raise InvalidData(f"'{file}' is not a file of this data set: {error}; fetch it again") from error
 
 
 def _rows_of(key: str, values: AnyArray) -> AnyArray:

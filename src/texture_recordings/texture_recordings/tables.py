@@ -691,7 +691,7 @@ def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequenc
             for name in numbers:
                 read[f'number {name}'] = values = _parsed(rows, at[name], form.decimal)
                 found += [
-                    MalformedRow(block[index][0], name, f"'{row[at[name]][:40]}' is no finite number")
+                    MalformedRow(block[index][0], name, f"'{row[at[name]][:40]}' is not a finite number")
                     for index in np.flatnonzero(np.isnan(values)).tolist()
                     if (row := rows[index])
                 ]
@@ -973,7 +973,7 @@ def table_columns(columns: Mapping[str, AnyArray], place: str, numbers: Sequence
         read[name] = array.astype(np.float64)
         bad = ~np.isfinite(read[name])
         malformed += [
-            MalformedRow(index, name, 'is no finite number') for index in np.flatnonzero(bad)[:EXAMPLES].tolist()
+            MalformedRow(index, name, 'is not a finite number') for index in np.flatnonzero(bad)[:EXAMPLES].tolist()
         ]
         read[name][bad] = np.nan
     malformed.sort(key=lambda row: row.row)

@@ -37,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run one benchmark, or all for which the data is there: 1 if one of these fails."""
+    options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
     benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick)
     if options.name != ALL:
         _run_one(options.name, benchmark_options)

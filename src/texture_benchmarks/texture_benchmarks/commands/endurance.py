@@ -10,7 +10,7 @@ from pathlib import Path
 from texture_benchmarks.ros.soak import SoakPlan, endure, endure_hazards
 from texture_benchmarks.soak import check_hazards, check_requirements, write, write_hazards
 from texture_core.cli import add_seed
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidParameter
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -27,10 +27,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run, report, and return 1 if something did not hold."""
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidData(f"'{options.out}' cannot be used: {error.strerror}; name another with --out") from error
+    if not (options.duration > 0 and options.quiet > 0):
+        raise InvalidParameter(
+            f'--duration is {options.duration:g} and --quiet {options.quiet:g}; both must be above 0'
+        )
+    options.out.mkdir(parents=True, exist_ok=True)
     plan = SoakPlan(options.duration, options.quiet, options.seed, options.model)
     if options.hazards:
         begin_s = time.monotonic()

@@ -84,10 +84,12 @@ def _configure_dashboard(parser: argparse.ArgumentParser) -> None:
 
 def _dashboard(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    from texture_bringup.nodes.dashboard import DashboardNode  # noqa: PLC0415 – see above
+    from texture_bringup.nodes.dashboard import DashboardNode, DashboardParams  # noqa: PLC0415 – see above
+    from texture_core.config import from_mapping  # noqa: PLC0415
     from texture_core.ros import run_node  # noqa: PLC0415
 
     parameters = {'host': options.host, 'port': options.port, 'recordings': options.recordings}
+    from_mapping(DashboardParams, parameters)  # says what is allowed, where ROS says that it is refused
     run_node(DashboardNode, parameters, options.namespace)
     return 0
 
@@ -101,7 +103,9 @@ def _configure_demo(parser: argparse.ArgumentParser) -> None:
 def _demo(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if a slide was mistaken."""
     from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate  # noqa: PLC0415 – see above
+    from texture_estimation.recipe import load_recipe  # noqa: PLC0415
 
+    load_recipe(options.recipe)  # refused before the nodes start
     with ProgressLog() as progress:
         progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
         all_right = demonstrate(options.out, options.recipe, options.seed, DemoPlan(), progress)

@@ -374,7 +374,7 @@ def _classifier(name: str) -> Any:
             f"there is no '{cls_name}' in '{module}'; name a classifier such as {EXAMPLE}"
         ) from error
     if not (isinstance(cls, type) and issubclass(cls, BaseEstimator) and _classifies(cls, is_classifier)):
-        raise InvalidParameter(f"'{name}' is no classifier; name one such as {EXAMPLE}")
+        raise InvalidParameter(f"'{name}' is not a classifier; name one such as {EXAMPLE}")
     return cls
 
 

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from texture_core.cli import Command, add_channels, add_dask, add_seed, add_slides, task
+from texture_core.cli import Command, add_channels, add_dask, add_seed, add_slides, core_count, task
 from texture_core.config import refuse_inputs, shipped, write_json
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import load_model
@@ -60,7 +60,9 @@ def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
     parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
     parser.add_argument('--chart', metavar='FILE', help='draw the recipes there; .png, .svg or .pdf')
-    parser.add_argument('--jobs', type=int, default=1, metavar='N', help='folds computed at once; -1: one per core')
+    parser.add_argument(
+        '--jobs', type=core_count, default=1, metavar='N', help='folds computed at once; -1: one per core'
+    )
     add_dask(parser)
     add_slides(parser)
     add_channels(parser)

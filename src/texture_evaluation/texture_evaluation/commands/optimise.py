@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 
-from texture_core.cli import add_channels, add_dask, add_seed, add_slides
+from texture_core.cli import add_channels, add_dask, add_seed, add_slides, core_count
 from texture_core.config import from_mapping
 from texture_estimation.search import Generation, SearchParams
 from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
@@ -30,7 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--generations', type=int, default=usual.generations, metavar='N', help='the first included')
     parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random splits evaluated on')
     parser.add_argument('--all-halves', action='store_true', help='evaluate every individual on all, not only the best')
-    parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
+    parser.add_argument('--jobs', type=core_count, default=-1, metavar='N', help='cores to use; -1: all')
     add_dask(parser)
     parser.add_argument('--resume', action='store_true', help='continue from the checkpoint next to FILE')
     add_slides(parser)

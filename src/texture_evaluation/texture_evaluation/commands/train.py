@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from texture_core.cli import add_channels, add_slides
+from texture_core.config import shipped
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import FAST_TOPIC, load_recipe
@@ -36,6 +37,8 @@ def run(options: argparse.Namespace) -> int:
         graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
         print('\n'.join(graded_summary(graded, Path(options.out))))
         return 0
+    if options.recipe in shipped('texture_estimation', 'config/roughness'):
+        raise InvalidParameter(f"recipe '{options.recipe}' learns grades of roughness; give them with --grades FILE")
     if options.channels == 'all' and set(load_recipe(options.recipe).feature_set.topics) <= {FAST_TOPIC}:
         raise InvalidParameter(
             f"recipe '{options.recipe}' uses the vibration alone; train one with slow channels, such as "
