@@ -113,7 +113,7 @@ def check_finger(
 def _numbers(found: Mapping[str, InputComparison]) -> str:
     return ', '.join(
         f'{topic} gain {np.median(one.gain_db):+.1f} dB, response within {np.abs(one.response_db).max():.1f} dB and '
-        f'{one.uneven_db:.1f} dB rms, of which {RESPONSE_DB:g} is allowed'
+        f'{one.uneven_db:.1f} dB rms ({RESPONSE_DB:g} dB rms is allowed)'
         + (f', noise × {one.noise_ratio:.1f}, drift {one.drift:.1f} rms' if one.rest_is_known else '')
         for topic, one in found.items()
     )

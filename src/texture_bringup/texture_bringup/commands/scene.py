@@ -43,9 +43,12 @@ def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
     Path
         Of the file.
     """
-    row_inches = 1.75 if len(views) > 1 else 3.2
-    with chart(path, (13.0, 0.8 + row_inches * len(views)), title) as figure:
-        rows = figure.subplots(len(views), 4, squeeze=False, width_ratios=[1.5, 1, 1, 1])
+    alone = len(views) == 1  # its panels are two by two, so that they can be read in a page
+    with chart(path, (8.6, 5.6) if alone else (13.0, 0.8 + 1.75 * len(views)), title) as figure:
+        if alone:
+            rows = figure.subplots(2, 2).reshape(1, 4)
+        else:
+            rows = figure.subplots(len(views), 4, squeeze=False, width_ratios=[1.5, 1, 1, 1])
         for (relief, profile, signal, spectrum), view in zip(rows, views, strict=True):
             image = _relief(relief, view)
             figure.colorbar(image, ax=relief, label='µm', fraction=0.03)
@@ -56,7 +59,8 @@ def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
         power = 'its power' + ('; dotted: speed / pitch' if any(view.lines_hz for view in views) else '')
         for axes, name in zip(rows[0][1:], ('height along the path', 'signal', power), strict=True):
             axes.set_title(name)
-        rows[0][1].legend(loc='upper center', bbox_to_anchor=(0.5, -0.3), ncols=2, fontsize=7)
+        below = -0.22 if alone else -0.3
+        rows[0][1].legend(loc='upper center', bbox_to_anchor=(0.5, below), ncols=2, fontsize=8 if alone else 7)
     return Path(path)
 
 
