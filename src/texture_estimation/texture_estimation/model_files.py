@@ -301,9 +301,10 @@ def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
     try:
         card = load_json(path, MAX_CARD_BYTES)
     except (OSError, ValueError) as error:
+        if isinstance(error, FileNotFoundError) and Path(given).exists():
+            raise ModelMismatch(f"there is no card '{path}' of '{given}'; give the path of a trained model") from error
         if isinstance(error, FileNotFoundError):
-            lacking = f"card '{path}' of '{given}'" if Path(given).exists() else f"model '{given}'"
-            raise ModelMismatch(f'there is no {lacking}; give the path of a trained model') from error
+            raise ModelMismatch(f"there is no model '{given}'; give the path of a trained model") from error
         raise ModelMismatch(
             f"model card '{path}' cannot be read: {error}; '{given}' was given; give the path of a trained model"
         ) from error
