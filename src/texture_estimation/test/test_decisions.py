@@ -329,7 +329,7 @@ def test_training_fits_the_limit_that_a_recipe_asks_for(make_examples):
     asked = dataclasses.replace(recipe.training, false_rejection_rate=0.1, low_confidence_rejection_rate=0.2)
     many = make_examples(slides=12)
     assert train(dataclasses.replace(recipe, training=asked), many).decisions.confidence_floor.log_odds
-    none = dataclasses.replace(asked, low_confidence_rejection_rate=0.0)
+    none = dataclasses.replace(asked, low_confidence_rejection_rate=0.0, max_known_error_rate_on_track=1.0)
     assert train(dataclasses.replace(recipe, training=none), many).decisions.confidence_floor == ConfidenceFloor()
 
 

@@ -108,6 +108,27 @@ def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_
     assert np.mean(list(known.values())) > 0.9
 
 
+def test_early_labels_that_are_often_wrong_are_unknown_and_late_ones_stay_known(make_examples, estimates_of):
+    many, new = (make_examples(slides=30, spread=2.0, windows=16, seed=seed) for seed in (5, 6))
+    said = {}
+    for most in (1.0, 0.005):
+        asked = dataclasses.replace(RECIPE.training, false_rejection_rate=0.04, max_known_error_rate_on_track=most)
+        model = train(dataclasses.replace(RECIPE, training=asked), many)
+        said[most] = [
+            (name.split('/')[0], estimates_of(model, new.values[new.groups == name]))
+            for name in np.unique(new.groups).tolist()
+        ]
+    wrong = {
+        most: np.mean([one[0].known and one[0].label != label for label, one in own]) for most, own in said.items()
+    }
+    right = {
+        most: np.mean([one[-1].known and one[-1].label == label for label, one in own]) for most, own in said.items()
+    }
+    assert wrong[1.0] > 0.1
+    assert wrong[0.005] < 0.03
+    assert right[0.005] > right[1.0] - 0.05
+
+
 def augmented(examples, response, copies=2, shift=0.0):
     """Return the examples with copies of their windows, changed by a shift."""
     groups = np.tile(examples.groups, copies)

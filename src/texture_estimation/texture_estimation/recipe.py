@@ -158,6 +158,13 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=1.0,
     )
+    max_known_error_rate_on_track: float = param(
+        0.005,
+        'The same of held-out slides where the training has one place, session and finger: the label of another finger '
+        'or place is wrong more often than these slides show, most of all early in a slide; 1: no limit.',
+        low=0.0,
+        high=1.0,
+    )
     held_out_places: int = param(
         1,
         'Into how many parts of the track slides are cut that were all made over one track: what is fitted to '

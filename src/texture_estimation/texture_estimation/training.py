@@ -600,8 +600,8 @@ def fit_open_set(
         return StoppingRule(), None, ConfidenceFloor()
     if detector is None:
         return fit_stopping_rule(courses, decisions.max_error_rate, by_novelty=False), None, ConfidenceFloor()
-    # Slides over one track cannot show how rarely a label is wrong elsewhere.
-    most = decisions.max_known_error_rate if held_out_parts(examples) is not None else 1.0
+    one_track = held_out_parts(examples) is None
+    most = decisions.max_known_error_rate_on_track if one_track else decisions.max_known_error_rate
     floor = fit_confidence_floor(courses, decisions.low_confidence_rejection_rate, most)
     courses = [
         replace(
