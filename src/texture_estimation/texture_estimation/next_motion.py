@@ -177,8 +177,8 @@ class NextTouchModel:
             raise InvalidData(
                 'one slide over each texture with each motion does not tell how much slides differ; add some'
             )
-        fit, sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
-        return cls(tuple(names.tolist()), sure * fit.projection, tuple(made), sure * fit.means)
+        (projection, means), sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
+        return cls(tuple(names.tolist()), sure * projection, tuple(made), sure * means)
 
     @classmethod
     def of_slides(
@@ -357,21 +357,10 @@ def _check(made: Sequence[SlideMotion], names: AnyArray, slid: AnyArray) -> None
             raise InvalidData(f'{motion} has no slide over {missing}; slide over every texture with every motion')
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """The axes, (n_features, n_axes), and on them the mean of each texture, (n_motions, n_textures, n_axes)."""
-
-    projection: Array
-    means: Array
-
-    def log_likelihoods(self, values: Array, cells: AnyArray) -> Array:
-        """Return those of slides by texture, (n_slides, n_textures)."""
-        off = (values @ self.projection)[:, None, :] - self.means[cells // self.means.shape[1]]
-        return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
-
-
-def _fit(values: Array, cells: AnyArray, n_textures: int) -> _Fit:
+def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]:
     """Learn from the mean features of slides, (n_slides, n_features).
+
+    Return the axes, (n_features, n_axes), and on them the mean of each texture, (n_motions, n_textures, n_axes).
 
     Slides share their covariance, whatever the texture and the motion. Means of few slides lie apart by chance: along
     each axis they are drawn to the middle of their motion as far as their spread is not more than chance, and what
@@ -405,7 +394,7 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> _Fit:
     projection = axes / scale[:, None] / np.sqrt(1.0 + chance * drawn)
     own = by_motion @ projection
     middle = own.mean(axis=1, keepdims=True)
-    return _Fit(projection, middle + drawn * (own - middle))
+    return projection, middle + drawn * (own - middle)
 
 
 def _scale(values: Array, off: Array, freedom: int) -> Array:
@@ -439,7 +428,9 @@ def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     for part in range(PARTS):
         own, others = parts == part, parts != part
         if own.any() and np.count_nonzero(others) > least:
-            likelihoods.append(_fit(values[others], cells[others], n_textures).log_likelihoods(values[own], cells[own]))
+            projection, means = _fit(values[others], cells[others], n_textures)
+            expected = ClassConditionalGaussian(means[cells[own] // n_textures])  # of each slide, under its motion
+            likelihoods.append(expected.log_likelihoods(values[own] @ projection))
             truths.append(cells[own] % n_textures)
     log_likelihoods, truth = np.concatenate(likelihoods), np.concatenate(truths)
     if not len(truth):

@@ -179,24 +179,9 @@ def ranks(rows: Array) -> Array:
     (..., n_samples)
         Whole numbers, or halves for equal samples.
     """
-    order = np.argsort(rows, axis=-1, kind='stable')
-    ordered = np.take_along_axis(rows, order, axis=-1)
-    place = np.arange(rows.shape[-1])
-    begins = np.ones(rows.shape, dtype=bool)
-    begins[..., 1:] = ordered[..., 1:] != ordered[..., :-1]
-    first = np.maximum.accumulate(np.where(begins, place, 0), axis=-1)
-    last = _until_next(begins, place)
-    ranked = np.empty_like(rows)
-    np.put_along_axis(ranked, order, (first + last) / 2.0, axis=-1)
-    return ranked
+    from scipy.stats import rankdata  # noqa: PLC0415  # takes a second, and few recipes need it
 
-
-def _until_next(begins: NDArray[np.bool_], place: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the last place of the run of equal samples that each place is in."""
-    ends = np.ones_like(begins)
-    ends[..., :-1] = begins[..., 1:]
-    backwards = np.where(ends, place, place[-1])[..., ::-1]
-    return np.minimum.accumulate(backwards, axis=-1)[..., ::-1]
+    return rankdata(rows, axis=-1) - 1.0
 
 
 def _mean_correlation(inputs: Sequence[Array]) -> Array:
