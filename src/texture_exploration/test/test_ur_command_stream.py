@@ -10,7 +10,16 @@ from texture_core.errors import DeviceError
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms import ur as ur_probe
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.ur import COMMAND, Counts, UrArm, UrArmParams, UrCommand, UrReport, command_of
+from texture_exploration.arms.ur import (
+    COMMAND,
+    STOP_DECELERATION_M_S2,
+    Counts,
+    UrArm,
+    UrArmParams,
+    UrCommand,
+    UrReport,
+    command_of,
+)
 from texture_exploration.arms.ur_worker import UrCommandStream, Watchdog
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
@@ -145,6 +154,19 @@ def test_a_slide_commands_force_and_speed_by_turns_and_ends_with_the_finger_lift
     assert pressed[1::2] == ['speedL'] * len(pressed[1::2])
     assert names.index('zeroFtSensor') < names.index('forceMode')
     assert link.robot.pressing_n == 0.0
+
+
+def test_a_finger_that_turns_back_out_of_force_control_is_led_back_before_anything_is_waited_for():
+    sent = []
+    link = SteppedLink(sent)
+    link.stream.trusted = True
+    for command in [UrCommand(0, (0.05, 0.0, 0.0), 2.0)] * 3 + [UrCommand(0, (-0.05, 0.0, 0.02), None)] * 2:
+        link.stream.cycle(command)
+    names = [name for name, *_ in sent]
+    back = next(place for place, (name, vx, *_) in enumerate(sent) if name == 'speedL' and vx < 0.0)
+    assert sent[back] == ['speedL', -0.05, 0.0, 0.0, STOP_DECELERATION_M_S2]
+    assert 'forceModeStop' not in names[:back]
+    assert names[back + 1 :] == ['setWatchdog', 'forceModeStop', 'setWatchdog', 'speedL']
 
 
 # --------------------

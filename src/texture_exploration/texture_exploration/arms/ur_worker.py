@@ -211,7 +211,7 @@ class UrCommandStream:
         ur_command = self._lifted_first(ur_command)
         mode = _mode(ur_command)
         self._braking &= mode is Mode.STANDSTILL
-        if mode is not self._mode and not self._change(mode):
+        if mode is not self._mode and not self._change(mode, ur_command):
             return
         if mode is Mode.FORCE:
             self._air.presume_contact()
@@ -242,10 +242,14 @@ class UrCommandStream:
         self.unsteady = self._air.seek(self._height_m)
         return ur_command._replace(velocity_m_s=self._up, force_n=None)
 
-    def _change(self, mode: Mode) -> bool:
+    def _change(self, mode: Mode, ur_command: UrCommand | None) -> bool:
         """Leave the present mode; return whether the new one has begun."""
+        # A command that streams takes effect at once; those that follow wait for each other.
+        if self._mode is Mode.FORCE and ur_command is not None and self._turns_back(ur_command.velocity_m_s):
+            # The finger has met something, and would be driven into it until the end of force control is acknowledged.
+            self._count(self._speed(ur_command._replace(velocity_m_s=self._along(ur_command.velocity_m_s))))
+            return False
         if mode is Mode.STANDSTILL and not self._braking:
-            # A command that streams takes effect at once; those that follow wait for each other.
             self._braking = True
             self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / self._params.rate_hz)))
             return False
@@ -306,13 +310,21 @@ class UrCommandStream:
 
     def _speed(self, ur_command: UrCommand) -> bool:
         velocity = [*ur_command.velocity_m_s, 0.0, 0.0, 0.0]
-        if sum(now * before for now, before in zip(ur_command.velocity_m_s, self._led_m_s, strict=True)) < 0.0:
+        if self._turns_back(ur_command.velocity_m_s):
             self._turned_ns = self._measured_ns
         self._led_m_s = ur_command.velocity_m_s
         # Whoever turns back has met something: as hard as a stop.
         turns = self._measured_ns - self._turned_ns < TURN_NS
         acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, self._params.arm_acceleration_m_s2)
         return bool(self._control.speedL(velocity, acceleration, 1.0 / self._params.rate_hz))
+
+    def _turns_back(self, velocity_m_s: Vector) -> bool:
+        return sum(now * before for now, before in zip(velocity_m_s, self._led_m_s, strict=True)) < 0.0
+
+    def _along(self, velocity_m_s: Vector) -> Vector:
+        """Return the part of a velocity along the surface: force control still leads the other one."""
+        x, y, _ = self._frame.direction(velocity_m_s)
+        return self._frame.to_base((x, y, 0.0))
 
     def _force(self, ur_command: UrCommand) -> bool:
         """Say by turns how to press and how to slide."""
