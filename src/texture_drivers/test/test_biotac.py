@@ -97,6 +97,13 @@ def test_a_parity_error_is_counted_and_leaves_the_other_fingers_alone() -> None:
     assert replies.refused.tolist() == [0, 0, 0]
 
 
+def test_a_place_without_a_biotac_gives_no_numbers() -> None:
+    for line in (b'\x00', b'\xff'):
+        replies = decode((b'\x80\x00' + WORDS[2021] + line * 2) * 44, BIOTAC, fingers=2)
+        assert replies.damaged.tolist() == [0, 44]
+        assert np.isnan(replies.pac[:, 1]).all()
+
+
 @pytest.mark.parametrize('word', ERROR_WORDS)
 def test_error_words_are_no_values(word: int) -> None:
     replies = decode((b'\x80\x00' + word.to_bytes(2, 'big')) * 44, BIOTAC, fingers=1)
@@ -201,6 +208,18 @@ def test_a_lost_frame_is_a_jump_of_22_samples() -> None:
     assert sensor.counts['lost'] == 44
     assert sensor.counts['samples'] == sum(len(batch.samples) for batch in topics['signal'])
     assert sensor.counts['bogus'] == 3
+
+
+def test_a_damaged_word_is_nan_in_its_own_channel_and_finger() -> None:
+    content = bytearray(reply(fingers=(100, 200)))
+    content[6 * 38 + 4] ^= 1  # slot 38 is PDC; the second finger
+    sensor = opened(FakeLink(numbered(range(40), bytes(content), fingers=2)), fingers=(0, 1))
+    topics = run(sensor, 40)
+    first, second = topics['finger0/signal_static'][-1].samples[0], topics['finger1/signal_static'][-1].samples[0]
+    assert (first == 100).all()
+    assert np.flatnonzero(np.isnan(second)).tolist() == [2]
+    assert (topics['finger1/signal'][-1].samples == 200).all()
+    assert sensor.counts['damaged_words'] == len(topics['finger1/signal_static'])
 
 
 def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:

@@ -33,6 +33,8 @@ from texture_drivers.tsf85 import (
     Tsf85MessageConverter,
     Tsf85Parser,
     load_vendor_csv,
+    start_command,
+    stop_command,
 )
 
 DEADLINE_S = 10.0
@@ -348,6 +350,14 @@ def test_the_stream_is_found_again_after_any_noise(noise: bytes) -> None:
     assert packets[-20:] == Tsf85Parser().feed(SHORT_STAMP) * 20
 
 
+def test_the_commands_are_those_of_the_vendor() -> None:
+    assert start_command() == bytes.fromhex('9A 00 58 01 01')
+    assert start_command(16) == bytes.fromhex('9A 00 58 01 10')
+    assert stop_command() == bytes.fromhex('9A 00 58 01 00')
+    with pytest.raises(ValueError, match='1 to 255'):
+        start_command(0)
+
+
 MS = 1_000_000
 START_NS = 1_700_000_000_000_000_000
 
@@ -475,6 +485,9 @@ def test_each_finger_becomes_signals_in_the_units_of_the_driver(recording):
     assert static.samples.shape == (36, 28)
     assert imu.samples[0] == pytest.approx([0, 0, -9.80665, 0, 0, 0])
     assert recording.rate_hz == pytest.approx(1000.0)
+    # The first line is the baseline and no sample.
+    assert recording.baseline[:, 0].tolist() == [9000, 9100]
+    assert len(recording.time_ms) == 600
 
 
 def test_a_line_in_which_the_image_alone_changed_is_no_sample(tmp_path):

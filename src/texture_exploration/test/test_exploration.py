@@ -67,6 +67,16 @@ def test_a_finger_that_leaves_the_workspace_is_lifted(make_table):
     assert table.arm.state().force_n == 0
 
 
+@pytest.mark.parametrize('phase', MOVING)
+def test_an_arm_that_hangs_aborts_within_the_allowed_age(table, phase):
+    table.when[phase] = table.arm.freeze
+    outcome = table.explore()
+    hung_ns = table.arm.state().time_ns
+    assert re.search(r'has not answered for 1[34]\d ms; the finger was not lifted', outcome.message)
+    assert (table.states[-1].stamp_ns - hung_ns) * 1e-9 == pytest.approx(0.13, abs=0.011)
+    assert table.phases[-1] is Phase.ABORTED
+
+
 def test_a_machine_that_slept_does_not_take_the_arm_for_dead(table):
     table.when[Phase.SLIDE] = table.sleep
     assert table.explore().success

@@ -88,15 +88,16 @@ def test_an_arm_recovers_in_its_own_way_if_it_knows_one(explorer):
     assert explorer.fault() == ''
 
 
-def test_closing_while_it_moves_lifts_the_finger_and_ends_the_thread(explorer):
-    """It closes at the first state of the slide, so that there is something to lift from."""
+def test_closing_while_it_moves_lifts_the_finger_and_ends_the_thread(explorer, monkeypatch):
+    """It closes at the third state of the slide, so that there is something to lift from; time rests until it does."""
     explorer.table.when[Phase.SLIDE] = explorer.table.gate.clear
     exploration = explorer.begin('one', SLOW)
     while explorer.table.gate.is_set():
         assert not exploration.ended.wait(0.001)
-    explorer.stop('the end')
-    explorer.table.gate.set()
+    stop = exploration.stop
+    monkeypatch.setattr(exploration, 'stop', lambda reason: (stop(reason), explorer.table.gate.set()))
     explorer.close()
+    assert exploration.outcome.message == 'the explorer was shut down'
     assert exploration.state.phase is Phase.ABORTED
     assert explorer.arm.state().position[2] > 0.001
     with pytest.raises(MotionRefused, match='shutting down'):

@@ -297,6 +297,14 @@ def test_legs_that_leave_the_workspace_are_refused_with_the_longest_that_do_not(
     cross_slide(fitting, home, TouchParams(), SafetyLimits())
 
 
+def test_the_longest_legs_stay_within_the_workspace(make_table):
+    table = make_table(limits=SafetyLimits(x_high_m=0.06, y_high_m=0.06))
+    with pytest.raises(MotionRefused) as refused:
+        cross_slide(ExplorationRequest('cross_slide', distance_m=0.2), table.home, TouchParams(), table.limits)
+    allowed = float(str(refused.value).partition('is at most ')[2].split()[0])
+    assert table.explore(ExplorationRequest('cross_slide', distance_m=allowed)).success
+
+
 @pytest.mark.parametrize('direction', [0.0, 0.5 * math.pi], ids=['first leg', 'second leg'])
 def test_a_stop_on_either_leg_lifts_and_aborts(table, direction):
     def stop_on(state):

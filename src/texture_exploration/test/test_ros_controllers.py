@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError, InvalidParameter, MotionRefused
+from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, Phase, quaternion_matrix, rotation_matrix
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ros_controllers import (
@@ -261,6 +261,22 @@ def test_a_broadcaster_that_repeats_an_old_pose_counts_as_stale(robot):
     robot.newest_pose = lambda: frozen
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     assert 'no pose has come' in robot.driven.state().fault
+
+
+def test_a_command_that_is_not_repeated_ends_in_zero_velocity(robot):
+    robot.driven.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
+    robot.pass_time(0.05)
+    assert not robot.is_commanded_to_rest
+    robot.pass_time(0.1)
+    assert robot.is_commanded_to_rest
+
+
+def test_a_command_out_of_range_is_refused_and_zero_velocity_is_commanded(robot):
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    with pytest.raises(CommandRefused):
+        robot.driven.command(ArmCommand(tangential_m_s=(math.nan, 0.0)))
+    robot.pass_time(0.01)
+    assert robot.is_commanded_to_rest
 
 
 def test_at_rest_nothing_is_sent_after_a_while_so_that_others_may_command(robot):

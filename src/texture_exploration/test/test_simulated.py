@@ -52,6 +52,20 @@ def test_force_control_is_stable_however_stiff_the_surface_and_long_the_step(clo
     assert arm.state().force_n == pytest.approx(1.0)
 
 
+def test_above_the_surface_force_control_comes_down(clock):
+    arm = make(clock, start_height_m=0.002)
+    run(arm, clock, ArmCommand(force_n=1.0), 1.0)
+    assert arm.state().force_n == pytest.approx(1.0, rel=1e-3)
+
+
+def test_an_arm_that_slept_moves_no_longer_than_a_command_holds(clock):
+    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0, command_timeout_s=0.1)
+    clock.now_ns += 500_000_000
+    arm.command(ArmCommand(normal_m_s=-0.02))  # of one who sees an old state
+    arm.step(0.5)
+    assert arm.state().force_n == pytest.approx(2000.0 * 0.02 * 0.1)
+
+
 def test_an_arm_without_force_mode_that_slept_goes_no_further_than_a_velocity_holds(clock):
     arm = make(clock, force_mode=False, stiffness_n_m=20000.0, max_stiffness_n_m=20000.0, start_height_m=0.0005)
     pressing = ArmCommand(tangential_m_s=(0.05, 0.0), force_n=1.0)
@@ -90,6 +104,14 @@ def test_a_frozen_arm_grows_old_until_it_is_connected_again(clock):
     assert arm.state().time_ns == 0
     arm.connect()
     assert arm.state().time_ns == clock.now_ns
+
+
+def test_a_failed_arm_stands_still_and_says_why(clock):
+    arm = make(clock)
+    arm.fail('protective stop')
+    run(arm, clock, ArmCommand(normal_m_s=0.1), 0.1)
+    assert arm.state().fault == 'protective stop'
+    assert arm.state().position == (0.0, 0.0, 0.01)
 
 
 def test_the_emulator_is_told_where_the_finger_is(clock, tmp_path):
