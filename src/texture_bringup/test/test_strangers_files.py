@@ -30,7 +30,6 @@ from texture_core.errors import TextureError
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_drivers.daq import load_daq
 from texture_drivers.file import load_recording
-from texture_drivers.tsf85 import COLUMNS, FIRST_COLUMN, load_vendor_csv
 from texture_estimation.model import load_model
 from texture_estimation.model_files import AddedSlide, write_added_slide
 from texture_estimation.recipe import load_recipe
@@ -143,13 +142,6 @@ def make_wav(folder: Path) -> None:
     wavfile.write(folder / 'good.wav', 1000, samples)
 
 
-def make_vendor_csv(folder: Path) -> None:
-    rows = np.random.default_rng(4).integers(-9, 9, (20, COLUMNS))
-    rows[:, 0] = np.arange(20)
-    header = ';'.join([FIRST_COLUMN] + ['x'] * (COLUMNS - 1))
-    np.savetxt(folder / 'good.csv', rows, delimiter=';', header=header, comments='', fmt='%d')
-
-
 def make_checkpoint(folder: Path) -> None:
     write_scores(folder / 'good.json', 'abc', {(1, 2): 0.5})
 
@@ -247,7 +239,6 @@ READERS = {
     'launch file': text_file(
         'texture_bringup', 'launch/emulator.launch.xml', lambda path: all_arguments(Path(path), {})
     ),
-    'vendor recording': Reader(make_vendor_csv, lambda folder: load_vendor_csv(folder / 'good.csv'), ('good.csv',)),
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
     'checkpoint': Reader(make_checkpoint, lambda folder: read_scores(folder / 'good.json', 'abc'), ('good.json',)),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import csv
 import fcntl
 import os
 import struct
@@ -25,16 +24,15 @@ from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import (
     AUTOSEND,
     DYNAMIC,
+    START_COMMAND,
     STATIC,
+    STOP_COMMAND,
     TIMESTAMP,
     Item,
     Packet,
     Tsf85,
     Tsf85MessageConverter,
     Tsf85Parser,
-    load_vendor_csv,
-    start_command,
-    stop_command,
 )
 
 DEADLINE_S = 10.0
@@ -351,11 +349,8 @@ def test_the_stream_is_found_again_after_any_noise(noise: bytes) -> None:
 
 
 def test_the_commands_are_those_of_the_vendor() -> None:
-    assert start_command() == bytes.fromhex('9A 00 58 01 01')
-    assert start_command(16) == bytes.fromhex('9A 00 58 01 10')
-    assert stop_command() == bytes.fromhex('9A 00 58 01 00')
-    with pytest.raises(ValueError, match='1 to 255'):
-        start_command(0)
+    assert bytes.fromhex('9A 00 58 01 01') == START_COMMAND
+    assert bytes.fromhex('9A 00 58 01 00') == STOP_COMMAND
 
 
 MS = 1_000_000
@@ -452,52 +447,3 @@ def test_after_a_long_silence_the_gap_is_that_of_the_clock(driver):
 def test_an_image_of_another_kind_is_refused(driver):
     with pytest.raises(InvalidData, match='12 taxels; a TSF-85 has 28'):
         driver.packet(0, image=[1] * 12)
-
-
-HEADER = (
-    ['Time(ms)', 'D0_0', 'D0_1']
-    + [f'S{taxel}_{finger}' for finger in (0, 1) for taxel in range(28)]
-    + [f'{kind}{axis}{finger}' for kind in 'AG' for finger in (0, 1) for axis in 'xyz']
-)
-
-
-def write(path, rows):
-    with path.open('w', newline='') as file:
-        csv.writer(file, delimiter=';').writerows([HEADER, *rows])
-    return path
-
-
-def row(ms, static=5):
-    return [1_700_000_000_000 + ms, ms, -ms, *[static] * 28, *[2 * static] * 28, 0, 0, 16384, 0, 0, -16384, *[0] * 6]
-
-
-@pytest.fixture
-def recording(tmp_path):
-    baseline = [1_699_999_999_000, 0, 0, *[9000] * 28, *[9100] * 28, *[0] * 12]
-    return load_vendor_csv(write(tmp_path / 'slide.csv', [baseline, *(row(ms) for ms in range(600))]))
-
-
-def test_each_finger_becomes_signals_in_the_units_of_the_driver(recording):
-    signals = recording.signals(finger=1)
-    (dynamic,), (static,), (imu,) = signals['signal'], signals['signal_static'], signals['signal_imu']
-    assert dynamic.samples[:3, 0].tolist() == [0, -1, -2]
-    assert (dynamic.stamp_ns, dynamic.sampling_rate_hz) == (1_700_000_000_000_000_000, 1000.0)
-    assert static.samples.shape == (36, 28)
-    assert imu.samples[0] == pytest.approx([0, 0, -9.80665, 0, 0, 0])
-    assert recording.rate_hz == pytest.approx(1000.0)
-    # The first line is the baseline and no sample.
-    assert recording.baseline[:, 0].tolist() == [9000, 9100]
-    assert len(recording.time_ms) == 600
-
-
-def test_a_line_in_which_the_image_alone_changed_is_no_sample(tmp_path):
-    rows = [row(0), *(line for ms in range(100) for line in (row(ms), row(ms, static=6 + ms)))]
-    recording = load_vendor_csv(write(tmp_path / 'slide.csv', rows))
-    assert np.array_equal(recording.signals()['signal'][0].samples[:, 0], np.arange(100))
-
-
-@pytest.mark.parametrize('text', ['', 'a;b\n1;2\n', 'Time(ms);D0_0\n1;2\n3;4\n5;6\n', ';'.join(HEADER) + '\nx;y\n'])
-def test_another_file_is_refused_with_a_sentence(tmp_path, text):
-    (tmp_path / 'other.csv').write_text(text)
-    with pytest.raises(InvalidData, match=r'other\.csv'):
-        load_vendor_csv(tmp_path / 'other.csv')

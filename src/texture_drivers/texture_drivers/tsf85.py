@@ -1,25 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robotiq TSF-85 fingertip: protocol, sample frames, settings, recordings and messages of the vendor, the sensor."""
+"""Robotiq TSF-85 fingertip: protocol, sample frames, settings, messages of the vendor, the sensor."""
 
 from __future__ import annotations
 
-import io
 import math
 import time
-import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import groupby
-from pathlib import Path
 from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from texture_core.config import open_regular, param
+from texture_core.config import param
 from texture_core.errors import DeviceError, InvalidData, InvalidParameter
 from texture_core.types import NANOSECONDS, Array, TactileSignal
 from texture_drivers import serial_line
@@ -40,6 +36,8 @@ HEADER_BYTES = 4  # start, checksum (sent as 0, checked by nobody), command, pay
 READ_SENSORS = 0x61
 AUTOSEND = 0x58
 AUTOSEND_ASYNC = 0x59  # firmware >= 1.1.7
+# Their payload is the period in ms; 0 ends the stream.
+START_COMMAND, STOP_COMMAND = (bytes([START_BYTE, 0, AUTOSEND, 1, period_ms]) for period_ms in (1, 0))
 DATA_COMMANDS = frozenset({READ_SENSORS, AUTOSEND, AUTOSEND_ASYNC})
 
 # An item byte: type in the high nibble, finger in bits 3..2, index (0 in practice) in bits 1..0.
@@ -209,28 +207,6 @@ def _parse_items(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct
         items.append(Item(kind, finger, layout.unpack_from(payload, position + 1)))
         position += 1 + layout.size
     return tuple(items)
-
-
-def start_command(period_ms: int = 1) -> bytes:
-    """Return the command that makes the device send every `period_ms`, 1 to 255.
-
-    Raises
-    ------
-    ValueError
-        If the period is outside 1 to 255 ms.
-    """
-    if not 1 <= period_ms <= 255:
-        raise ValueError(f'the period is {period_ms} ms; 1 to 255 can be sent')
-    return _command(AUTOSEND, bytes([period_ms]))
-
-
-def stop_command() -> bytes:
-    """Return the command that ends the stream."""
-    return _command(AUTOSEND, b'\x00')
-
-
-def _command(command: int, payload: bytes) -> bytes:
-    return bytes([START_BYTE, 0, command, len(payload)]) + payload
 
 
 # --------------------
@@ -679,120 +655,6 @@ TOPICS: Mapping[str, Callable[[Tsf85MessageConverter, Any, int], None]] = {
 
 
 # --------------------
-# Recordings of the vendor's SDK: the CSV that `sensor_quickstart/record_data.py` of robotiq/tactile_sensors writes.
-#
-# A header, then one line a packet, separated by semicolons: host time in ms; dynamic value of finger 0 and 1; 28 taxels
-# of finger 0, 28 of finger 1; acceleration of both; rotation of both. The first line holds the baseline of the taxels
-# and no measurement; unless it was told otherwise, the program has subtracted it from those that follow.
-
-RECORDING_AXES = 3
-FIRST_COLUMN = 'Time(ms)'
-MAX_LINE = 10_000  # characters; a number has 25 at most
-COLUMNS = 1 + FINGERS * (1 + TAXELS + RECORDING_AXES + RECORDING_AXES)
-
-
-@dataclass(frozen=True, eq=False)
-class VendorRecording:
-    """What was recorded, in counts; n lines.
-
-    Parameters
-    ----------
-    time_ms : (n,)
-        When the host polled the packet, since the epoch: coarse, in bursts, and no proof of evenness.
-    dynamic : (n, 2)
-        Of both fingers, as are the others.
-    static : (n, 2, 28)
-        Less the baseline, if it was subtracted.
-    acceleration, rotation : (n, 2, 3)
-    baseline : (2, 28)
-    """
-
-    time_ms: Array
-    dynamic: Array
-    static: Array
-    acceleration: Array
-    rotation: Array
-    baseline: Array
-
-    @property
-    def samples(self) -> NDArray[np.intp]:
-        """Lines that are samples, (n_samples,): where more than the taxels changed, or not even they.
-
-        New firmware sends an image in a packet of its own, for which the recorder writes the rest a second time.
-        """
-        changed = np.diff(np.concatenate([self.dynamic, *self._motion()], axis=1), axis=0).any(axis=1)
-        new_image = np.diff(self.static, axis=0).any(axis=(1, 2))
-        return np.flatnonzero(np.concatenate([[True], changed | ~new_image]))
-
-    @property
-    def rate_hz(self) -> float:
-        """Samples a second, on the average; far from 1000 it tells of lines that the recorder lost."""
-        time_ms = self.time_ms[self.samples]
-        return float((len(time_ms) - 1) / (time_ms[-1] - time_ms[0]) * 1000)
-
-    def signals(self, finger: int = 0, settings: Tsf85Settings | None = None) -> Mapping[str, list[TactileSignal]]:
-        """Return one finger as the driver would have published it, by topic.
-
-        The file has no stamps of the device: samples are numbered through at 1 kHz from the first one's time on, and
-        what the recorder lost goes unseen; see `rate_hz`. Images are taken at ticks of 60 Hz.
-        """
-        settings = replace(settings or Tsf85Settings(), imu=True, magnetometer=False)
-        lines = self.samples
-        ticks = lines[np.arange(0, len(lines), RATE_HZ / STATIC_RATE_HZ).astype(int)]
-        motion = np.concatenate([values[lines, 3 * finger : 3 * finger + 3] for values in self._motion()], axis=1)
-        dynamic, static = self.dynamic[lines, finger, None], self.static[ticks, finger]
-        streams = {
-            SIGNAL: (DYNAMIC_SENSOR, DYNAMIC_CHANNELS, (UNIT,), RATE_HZ, dynamic),
-            BATCH_STATIC: (STATIC_SENSOR, STATIC_CHANNELS, (UNIT,) * TAXELS, STATIC_RATE_HZ, static),
-            IMU: (MOTION_SENSOR, settings.channels, settings.units, RATE_HZ, motion * settings.gains),
-        }
-        stamp_ns = round(self.time_ms[0] * NANOSECONDS / 1000)
-        return {
-            topic: [TactileSignal(stamp_ns, sensor, channels, units, rate_hz, 0, samples.astype(np.float32))]
-            for topic, (sensor, channels, units, rate_hz, samples) in streams.items()
-        }
-
-    def _motion(self) -> tuple[Array, Array]:
-        """Return acceleration and rotation, each (n, 6): finger after finger."""
-        n = len(self.time_ms)
-        return self.acceleration.reshape(n, -1), self.rotation.reshape(n, -1)
-
-
-def load_vendor_csv(path: Path) -> VendorRecording:
-    """Return what the vendor's recorder wrote.
-
-    Raises
-    ------
-    InvalidData
-        If there is no such file, or it is another one.
-    """
-    try:
-        with open_regular(path) as file, io.TextIOWrapper(file, encoding='utf-8-sig') as text:
-            names = text.readline(MAX_LINE).strip().split(';')
-            lines = (line for line in iter(lambda: text.readline(MAX_LINE), '') if line.strip())
-            with warnings.catch_warnings():
-                warnings.simplefilter('ignore')  # an empty table is refused below, in our words
-                table = np.loadtxt(lines, delimiter=';', ndmin=2)
-    except OSError as error:
-        raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
-    except ValueError as error:
-        raise InvalidData(f"recording '{path}' is not usable: {error}") from error
-    if names[0] != FIRST_COLUMN or len(names) != COLUMNS or table.shape[1] != COLUMNS or len(table) < 3:
-        raise InvalidData(
-            f"recording '{path}' has {len(names)} columns from '{names[0]}' on and {len(table)} lines; a recording of "
-            f"the vendor's program has {COLUMNS} from '{FIRST_COLUMN}' on and at least 3 lines"
-        )
-    if not table[-1, 0] > table[1, 0]:
-        raise InvalidData(f"recording '{path}' has times that do not rise; record it again")
-    ends = np.cumsum([1, FINGERS, FINGERS * TAXELS, FINGERS * RECORDING_AXES])
-    time_ms, dynamic, static, acceleration, rotation = np.split(table, ends, axis=1)
-    taxels = static.reshape(-1, FINGERS, TAXELS)
-    axes = (len(table) - 1, FINGERS, RECORDING_AXES)
-    acceleration, rotation = acceleration[1:].reshape(axes), rotation[1:].reshape(axes)
-    return VendorRecording(time_ms[1:, 0], dynamic[1:], taxels[1:], acceleration, rotation, baseline=taxels[0])
-
-
-# --------------------
 # The TSF-85 fingertip as a sensor of the suite.
 
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
@@ -929,7 +791,7 @@ class Tsf85(SerialSensor):
         self._published = fingers or (params.finger,)
         prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
         decoder = Tsf85Decoder(layout, params, prefixes)
-        super().__init__(params, now_ns, decoder, start_command=start_command(), stop_command=stop_command())
+        super().__init__(params, now_ns, decoder, start_command=START_COMMAND, stop_command=STOP_COMMAND)
         self._serial = ''
         self._revived = self._revivals = 0
 
