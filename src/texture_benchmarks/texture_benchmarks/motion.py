@@ -31,7 +31,13 @@ from texture_exploration.arms.ros_controllers import RosControllersArm, RosContr
 from texture_exploration.arms.simulated import PLANE, RATE_HZ, SimulatedArm, SimulatedArmParams, SurfaceShape
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import PERIOD_S, Exploration, ExplorationOutcome, Explorer
-from texture_exploration.force_control import ForceLoopParams, stability_chart, stability_limit_gain
+from texture_exploration.force_control import (
+    ForceController,
+    ForceLoopParams,
+    LoopModel,
+    lowest_unstable_gain,
+    stability_limit_gain,
+)
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import TouchParams
@@ -414,6 +420,69 @@ def surface_chart(surfaces: Mapping[str, Trials], path: Path) -> Path:
             axes.set_ylim(bottom=0)
         figure.axes[0].legend(loc='best')
     return path
+
+
+CYCLES = 60  # a simulated loop is judged after so many delays
+SMALL = 0.1
+FINE = 20  # simulation steps per period
+
+
+def simulated_stability_limit_gain(loop: LoopModel) -> float:
+    """Return the gain from which a running `ForceController` makes a disturbance grow, m/s/N."""
+    return lowest_unstable_gain(loop, lambda gain: _disturbance_decays(replace(loop, gain_m_s_n=gain)), bisections=12)
+
+
+def _disturbance_decays(loop: LoopModel) -> bool:
+    """Run the controller on a spring, finely integrated, after a jolt of 1 N; return whether the swinging shrinks."""
+    running = ForceController(loop.gain_m_s_n, loop.integral_s)
+    fine_s = loop.period_s / FINE
+    late = round(loop.delay_s / fine_s)
+    periods = math.ceil(CYCLES * (loop.delay_s + loop.period_s) / loop.period_s)
+    error, peaks = 1.0, np.empty(periods)
+    velocities = np.zeros(late + FINE * periods)
+    for period in range(periods):
+        now = FINE * period
+        velocities[late + now : late + now + FINE] = running.update(error, loop.period_s)
+        error += loop.stiffness_n_m * fine_s * float(velocities[now : now + FINE].sum())
+        peaks[period] = abs(error)
+        if peaks[period] > 1e6:
+            return False
+    third = periods // 3
+    # The integral part may leave a small slow rest that still rises; a swinging that grows began with 1.
+    return bool(peaks[-third:].max() < max(SMALL, peaks[third : 2 * third].max()))
+
+
+def stability_chart(
+    stiffness_n_m: Sequence[float],
+    delay_s: Sequence[float],
+    period_s: float = 0.004,
+    integral_s: float = 0.5,
+) -> dict[str, Array]:
+    """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated.
+
+    Parameters
+    ----------
+    stiffness_n_m
+        Stiffnesses of the contact, N/m, s of them.
+    delay_s
+        Delays of the loop, d of them.
+    period_s
+        Time between two commands.
+    integral_s
+        Integral time of the controller.
+
+    Returns
+    -------
+    dict
+        'stiffness_n_m' (s,), 'delay_s' (d,), and 'predicted' and 'simulated' (s, d) in m/s/N.
+    """
+    loops = [[LoopModel(k, 0.0, delay, period_s, integral_s) for delay in delay_s] for k in stiffness_n_m]
+    return {
+        'stiffness_n_m': np.array(stiffness_n_m, dtype=float),
+        'delay_s': np.array(delay_s, dtype=float),
+        'predicted': np.array([[stability_limit_gain(loop) for loop in row] for row in loops]),
+        'simulated': np.array([[simulated_stability_limit_gain(loop) for loop in row] for row in loops]),
+    }
 
 
 def border_chart(border: Mapping[str, Array], path: Path) -> Path:

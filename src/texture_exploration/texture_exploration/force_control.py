@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -25,7 +25,6 @@ from typing import NamedTuple
 import numpy as np
 
 from texture_core.config import param
-from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 
 # --------------------
@@ -266,7 +265,7 @@ class SlopeObserver:
 
 
 # --------------------
-# Stability limit of the force control: predicted from the sampled loop, and found by simulation.
+# Stability limit of the force control, predicted from the sampled loop.
 #
 # The contact integrates the velocity to a force, F' = −k·u; u is held for a period T and comes into effect after a
 # delay of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on the force error e is exactly
@@ -279,9 +278,6 @@ class SlopeObserver:
 # Source: Åström & Wittenmark, Computer-Controlled Systems, 1997, section 2.3 (sampling a system with delay).
 
 BISECTIONS = 40
-CYCLES = 60  # a simulated loop is judged after so many delays
-SMALL = 0.1
-FINE = 20  # simulation steps per period
 
 
 @dataclass(frozen=True)
@@ -330,68 +326,10 @@ def spectral_radius(loop: LoopModel) -> float:
 @lru_cache(maxsize=4096)
 def stability_limit_gain(loop: LoopModel) -> float:
     """Return the gain from which the loop is unstable, m/s/N, by its eigenvalues; its own gain does not count."""
-    return _bisect(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
+    return lowest_unstable_gain(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
 
 
-def simulated_stability_limit_gain(loop: LoopModel) -> float:
-    """Return the gain from which a running `ForceController` makes a disturbance grow, m/s/N."""
-    return _bisect(loop, lambda gain: _disturbance_decays(replace(loop, gain_m_s_n=gain)), bisections=12)
-
-
-def _disturbance_decays(loop: LoopModel) -> bool:
-    """Run the controller on a spring, finely integrated, after a jolt of 1 N; return whether the swinging shrinks."""
-    running = ForceController(loop.gain_m_s_n, loop.integral_s)
-    fine_s = loop.period_s / FINE
-    late = round(loop.delay_s / fine_s)
-    periods = math.ceil(CYCLES * (loop.delay_s + loop.period_s) / loop.period_s)
-    error, peaks = 1.0, np.empty(periods)
-    velocities = np.zeros(late + FINE * periods)
-    for period in range(periods):
-        now = FINE * period
-        velocities[late + now : late + now + FINE] = running.update(error, loop.period_s)
-        error += loop.stiffness_n_m * fine_s * float(velocities[now : now + FINE].sum())
-        peaks[period] = abs(error)
-        if peaks[period] > 1e6:
-            return False
-    third = periods // 3
-    # The integral part may leave a small slow rest that still rises; a swinging that grows began with 1.
-    return bool(peaks[-third:].max() < max(SMALL, peaks[third : 2 * third].max()))
-
-
-def stability_chart(
-    stiffness_n_m: Sequence[float],
-    delay_s: Sequence[float],
-    period_s: float = 0.004,
-    integral_s: float = 0.5,
-) -> dict[str, Array]:
-    """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated.
-
-    Parameters
-    ----------
-    stiffness_n_m
-        Stiffnesses of the contact, N/m, s of them.
-    delay_s
-        Delays of the loop, d of them.
-    period_s
-        Time between two commands.
-    integral_s
-        Integral time of the controller.
-
-    Returns
-    -------
-    dict
-        'stiffness_n_m' (s,), 'delay_s' (d,), and 'predicted' and 'simulated' (s, d) in m/s/N.
-    """
-    loops = [[LoopModel(k, 0.0, delay, period_s, integral_s) for delay in delay_s] for k in stiffness_n_m]
-    return {
-        'stiffness_n_m': np.array(stiffness_n_m, dtype=float),
-        'delay_s': np.array(delay_s, dtype=float),
-        'predicted': np.array([[stability_limit_gain(loop) for loop in row] for row in loops]),
-        'simulated': np.array([[simulated_stability_limit_gain(loop) for loop in row] for row in loops]),
-    }
-
-
-def _bisect(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
+def lowest_unstable_gain(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
     """Return the lowest gain that is not stable, around that of the pure delay, π / 2 / (k · delay)."""
     high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator bears 2 / (k·T)
     # Far below, the integral part makes a slow swing, which a short run could take for an unstable one.
@@ -498,14 +436,6 @@ class ForceLoopParams:
         low=0.0,
         high=0.1,
     )
-    force_gain_m_s_n: float = param(
-        0.0,
-        'Normal speed per force error; 0 derives it from the estimated contact stiffness. A larger'
-        ' value settles faster and is less stable.',
-        unit='m/s/N',
-        low=0.0,
-        high=1.0,
-    )
     max_stiffness_n_m: float = param(
         5000.0,
         'Stiffest contact of finger and surface that is expected; larger values lower the '
@@ -567,23 +497,6 @@ class ForceLoopParams:
     def default_gain(self, stiffness_n_m: float, period_s: float) -> float:
         """Return the gain for a contact, m/s/N: below the stability limit by the margin."""
         return stability_limit_gain(self.loop(stiffness_n_m, period_s)) / self.gain_margin
-
-    def check_gain(self, period_s: float) -> None:
-        """Refuse a gain that is not stable on the stiffest contact.
-
-        Raises
-        ------
-        InvalidParameter
-            With the gain that would do.
-        """
-        limit = stability_limit_gain(self.loop(self.max_stiffness_n_m, period_s))
-        if self.force_gain_m_s_n >= limit:
-            raise InvalidParameter(
-                f"parameter 'force_gain_m_s_n' is {self.force_gain_m_s_n:g}; on a contact of "
-                f'{self.max_stiffness_n_m:g} N/m with a loop delay of '
-                f'{1e3 * self.loop_delay_s:g} ms, once every {1e3 * period_s:g} ms, that is '
-                f'unstable from {limit:.2g} m/s/N on; choose {limit / self.gain_margin:.2g}, or 0 to let it be chosen'
-            )
 
     @property
     def max_impact_depth_m(self) -> float:
@@ -672,15 +585,9 @@ class ForceLoop:
         The loop.
     period_s
         How often `velocity_m_s` is called.
-
-    Raises
-    ------
-    InvalidParameter
-        If the loop would be unstable.
     """
 
     def __init__(self, params: ForceLoopParams, period_s: float) -> None:
-        params.check_gain(period_s)
         self._params = params
         self._period_s = period_s
         self.stiffness = StiffnessEstimate(params.touching_n)
@@ -880,12 +787,12 @@ class ForceLoop:
 
     def _new_controller(self) -> ForceController:
         params = self._params
-        gain = params.force_gain_m_s_n or params.default_gain(params.max_stiffness_n_m, self._period_s)
+        gain = params.default_gain(params.max_stiffness_n_m, self._period_s)
         return ForceController(gain, params.integral_s, FORCE_SPEED_M_S)
 
     def _choose_gain(self) -> None:
         estimated_n_m = self.stiffness.value_n_m
-        if self._params.force_gain_m_s_n or math.isnan(estimated_n_m) or estimated_n_m == self._chosen_for:
+        if math.isnan(estimated_n_m) or estimated_n_m == self._chosen_for:
             return
         self._chosen_for = estimated_n_m
         self.controller.gain_m_s_n = self._params.default_gain(estimated_n_m, self._period_s)

@@ -526,11 +526,6 @@ class RosControllersArm(SurfaceArm):
         Makes the topics when connecting.
     own_thread
         Command by itself at `rate_hz` once connected. If False, whoever owns the arm calls `step`.
-
-    Raises
-    ------
-    InvalidParameter
-        If the force control would be unstable.
     """
 
     Params = RosControllersParams

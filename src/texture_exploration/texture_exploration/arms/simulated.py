@@ -199,11 +199,6 @@ class SimulatedArm(Arm):
         Move by itself at 250 Hz once connected. If False, whoever owns the arm calls `step`.
     shape
         Of the surface under the finger.
-
-    Raises
-    ------
-    InvalidParameter
-        If the force control would be unstable.
     """
 
     Params = SimulatedArmParams
