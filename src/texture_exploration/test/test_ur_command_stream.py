@@ -13,7 +13,6 @@ from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import (
     COMMAND,
     STOP_DECELERATION_M_S2,
-    Counts,
     UrArm,
     UrArmParams,
     UrCommand,
@@ -100,7 +99,7 @@ class SteppedLink:
     def report(self):
         robot, stream = self.robot, self.stream
         measured = (tuple(vector[:3].tolist()) for vector in (robot.pose, robot.velocity, robot.force))
-        return UrReport(self.now_ns, *measured, 0.1, 1, True, False, stream.unsteady, stream.trusted, Counts())
+        return UrReport(self.now_ns, *measured, 0.1, 1, True, False, stream.unsteady, stream.trusted, {})
 
     def check(self):
         pass

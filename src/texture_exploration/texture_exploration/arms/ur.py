@@ -123,27 +123,17 @@ class UrCommand(NamedTuple):
     force_n: float | None
 
 
-class Counts(NamedTuple):
-    """What was counted since the arm was connected.
-
-    `late`: gaps of more than 20 ms in what the controller sends. `refused`: commands that it did not take. `zeroed`:
-    how often the force sensor was zeroed. `slow_acknowledgements`: commands that took longer than the watchdog waits
-    while the arm moves; `slowest_acknowledgement_ms`: the longest that any took.
-    """
-
-    late: int = 0
-    refused: int = 0
-    zeroed: int = 0
-    slow_acknowledgements: int = 0
-    slowest_acknowledgement_ms: int = 0
-
-
 class UrReport(NamedTuple):
     """What the controller measured last, in the base frame, and how it is.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
     says that the force sensor could not be zeroed, because the force changed all the while the finger rose; `zeroed`,
     that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
+
+    `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
+    `refused`: commands that it did not take. `zeroed`: how often the force sensor was zeroed. `slow_acknowledgements`:
+    commands that took longer than the watchdog waits while the arm moves; `slowest_acknowledgement_ms`: the longest
+    that any took.
     """
 
     time_ns: int
@@ -156,7 +146,7 @@ class UrReport(NamedTuple):
     silent: bool
     unsteady: bool
     zeroed: bool
-    counts: Counts
+    counts: Mapping[str, int]
 
 
 def encoded(kind: bytes, content: UrCommand | UrReport) -> bytes:
@@ -340,8 +330,7 @@ class WorkerLink:
         while data := self._receive():
             kind = data[:1]
             if kind == REPORT:
-                *measured, counts = json.loads(data[1:])
-                self.report = UrReport._make([*measured, Counts(*counts)])
+                self.report = UrReport._make(json.loads(data[1:]))
                 self._state_received.set()
             elif kind == FAILURE:
                 self._failure = data[1:].decode()
@@ -815,8 +804,8 @@ class UrArm(SurfaceArm):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of this connection; see `texture_exploration.arms.ur.Counts`."""
-        return self._report().counts._asdict()
+        """Totals of this connection; see `texture_exploration.arms.ur.UrReport`."""
+        return self._report().counts
 
     def _connected(self) -> WorkerLink:
         if self._link is None:

@@ -32,7 +32,6 @@ from texture_exploration.arms.ur import (
     REPORT,
     STOP,
     STOP_DECELERATION_M_S2,
-    Counts,
     UrArmParams,
     UrCommand,
     UrReport,
@@ -384,7 +383,7 @@ class Observer:
         self.connected = True
         self.silent = self.unsteady = self.zeroed = False
         self.watchdog_s = 1.0 / params.watchdog_hz
-        self.counts = Counts()
+        self.counts: Mapping[str, int] = {}
         self.newest: UrReport | None = None
         self._receive = receive
         self._channel = channel
@@ -433,7 +432,7 @@ class Observer:
             silent=self.silent,
             unsteady=self.unsteady,
             zeroed=self.zeroed,
-            counts=self.counts._replace(late=self._late),
+            counts={'late': self._late, **self.counts},
         )
         self.newest = report
         try:
@@ -511,12 +510,12 @@ class Worker:
         # After the cycle and not at once: a force that is told as zeroed is one of after the zeroing.
         self._observer.unsteady, self._observer.zeroed = commands.unsteady, commands.trusted
         self._observer.watchdog_s = watchdog.moving_s
-        self._observer.counts = Counts(
-            refused=commands.refused,
-            zeroed=commands.zeroings,
-            slow_acknowledgements=watchdog.slow,
-            slowest_acknowledgement_ms=round(watchdog.slowest_s * 1e3),
-        )
+        self._observer.counts = {
+            'refused': commands.refused,
+            'zeroed': commands.zeroings,
+            'slow_acknowledgements': watchdog.slow,
+            'slowest_acknowledgement_ms': round(watchdog.slowest_s * 1e3),
+        }
 
     def _watch_program(self) -> None:
         """Notice whether another program runs than ours: one that plays again after a stop was started by others.
