@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -45,8 +45,6 @@ class BenchmarkOptions:
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
-    # Folder of data sets that are imported already, each in its own folder; see `imported`
-    bags: Path | None = None
 
     def recordings(self, name: str) -> Path:
         """Return the folder of a recorded data set, by its name; InvalidData says that it is missing."""
@@ -137,10 +135,6 @@ def imported(
     options: BenchmarkOptions, name: str, slides: str = '', materials: Sequence[str] = ()
 ) -> Iterator[list[Path]]:
     """Give the bags of a data set, or of a part of it, to a `with` block."""
-    kept = options.bags / name if options.bags else None
-    if kept and kept.is_dir() and not (slides or materials):
-        yield sorted(kept.iterdir())
-        return
     source = options.recordings(name)
     with tempfile.TemporaryDirectory() as folder:
         yield IMPORTS[name](source, Path(folder), slides, materials)
@@ -151,19 +145,3 @@ def trained_apart(recipe: Recipe) -> Recipe:
     hop_s = recipe.feature_set.windows.hop_s
     apart_s = hop_s * math.ceil(APART_S / hop_s - ROUNDING)
     return replace(recipe, training=replace(recipe.training, hop_s=apart_s))
-
-
-@contextmanager
-def importing_once(options: BenchmarkOptions, names: Sequence[str]) -> Iterator[BenchmarkOptions]:
-    """Import what is there of some data sets, and give a bench that has their bags to a `with` block.
-
-    One that cannot be imported is left to the benchmarks that need it: they say why, and the others go on.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        for name in () if options.quick else names:  # a quick run reads parts
-            half_done = Path(folder) / f'{name}.part'
-            if options.data and (options.data / name).is_dir():
-                with suppress(InvalidData, OSError):
-                    IMPORTS[name](options.data / name, half_done)
-                    half_done.rename(Path(folder) / name)
-        yield replace(options, bags=Path(folder))

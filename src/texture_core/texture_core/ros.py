@@ -23,6 +23,7 @@ from builtin_interfaces.msg import Duration as DurationMessage
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point
+from numpy.typing import NDArray
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -49,6 +50,7 @@ from texture_core.types import (
     NANOSECONDS,
     POSITION,
     QUALITIES,
+    AnyArray,
     Array,
     ExplorationRequest,
     ExplorationState,
@@ -451,6 +453,7 @@ MESSAGES: Mapping[type, type] = {
     TextureEstimate: msg.TextureEstimate,
     RoughnessEstimate: msg.RoughnessEstimate,
     ModelInfo: msg.ModelInfo,
+    TactileSignal: msg.TactileSignal,
 }
 DATA_CLASSES = {message: cls for cls, message in MESSAGES.items()}
 STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
@@ -465,8 +468,6 @@ def to_msg(value: Any) -> Any:
     InvalidData
         If a time in s is more than the message can hold.
     """
-    if isinstance(value, TactileSignal):
-        return _signal_to_msg(value)
     plan = _plan(type(value))
     values = {there: wire(getattr(value, here)) if wire else getattr(value, here) for here, there, wire, _ in plan.rest}
     if plan.stamp:
@@ -484,8 +485,6 @@ def from_msg(message: Any) -> Any:
     InvalidData
         If the message contradicts itself.
     """
-    if isinstance(message, msg.TactileSignal):
-        return _signal_from_msg(message)
     cls = DATA_CLASSES[type(message)]
     plan = _plan(cls)
     values = {
@@ -495,43 +494,20 @@ def from_msg(message: Any) -> Any:
         values[plan.stamp], values['frame_id'] = to_ns(message.header.stamp), message.header.frame_id
     if plan.position:
         values.update({name: getattr(message.position, name[0]) for name in POSITION})
+    if cls is TactileSignal:
+        values['samples'] = _samples(message)
     return cls(**values)
 
 
-def _signal_to_msg(signal: TactileSignal) -> msg.TactileSignal:
-    message = msg.TactileSignal(
-        header=Header(stamp=to_stamp(signal.stamp_ns), frame_id=signal.frame_id),
-        sensor=signal.sensor,
-        channels=list(signal.channels),
-        units=list(signal.units),
-        tared=signal.tared,
-        sampling_rate_hz=float(signal.sampling_rate_hz),
-        first_sample=signal.first_sample,
-    )
-    # An array.array is taken as it is; a list would be checked element by element.
-    message.samples = array.array('f', np.ascontiguousarray(signal.samples, dtype=np.float32).tobytes())
-    return message
-
-
-def _signal_from_msg(message: msg.TactileSignal) -> TactileSignal:
-    channels = tuple(message.channels)
-    flat = np.array(message.samples, dtype=np.float32)
-    if not channels or len(flat) % len(channels):
+def _samples(message: msg.TactileSignal) -> NDArray[np.float32]:
+    """Return the samples of a signal, (n_samples, n_channels)."""
+    flat, channels = np.array(message.samples, dtype=np.float32), len(message.channels)
+    if not channels or len(flat) % channels:
         raise InvalidData(
-            f"signal message of '{message.sensor}' has {len(flat)} samples for {len(channels)} channels; "
+            f"signal message of '{message.sensor}' has {len(flat)} samples for {channels} channels; "
             'a multiple of the number of channels is needed'
         )
-    return TactileSignal(
-        stamp_ns=to_ns(message.header.stamp),
-        sensor=message.sensor,
-        channels=channels,
-        units=tuple(message.units),
-        sampling_rate_hz=message.sampling_rate_hz,
-        first_sample=message.first_sample,
-        samples=flat.reshape(-1, len(channels)),
-        frame_id=message.header.frame_id,
-        tared=message.tared,
-    )
+    return flat.reshape(-1, channels)
 
 
 def _phase(code: int) -> Phase:
@@ -550,8 +526,9 @@ def _rejection(code: int) -> Rejection:
         raise InvalidData(f'a texture estimate has the rejection {code}; allowed are {allowed}') from error
 
 
-def _doubles(values: Array) -> array.array[float]:
-    return array.array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
+def _numbers(code: str, values: AnyArray) -> array.array[float]:
+    """Return numbers of type 'd' or 'f' as an array.array, which rclpy takes as it is; a list it checks one by one."""
+    return array.array(code, np.ascontiguousarray(values, dtype=code).tobytes())
 
 
 def _duration(seconds: float) -> DurationMessage:
@@ -567,7 +544,8 @@ CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
     float: (float, None),
     tuple[str, ...]: (list, tuple),
     tuple[float, ...]: (partial(array.array, 'd'), tuple),
-    Array: (_doubles, partial(np.array, dtype=np.float64)),
+    Array: (partial(_numbers, 'd'), partial(np.array, dtype=np.float64)),
+    NDArray[np.float32]: (partial(_numbers, 'f'), None),
     Phase: (lambda phase: phase.code, _phase),
     Rejection: (int, _rejection),
 }

@@ -10,13 +10,12 @@ from functools import partial
 from pathlib import Path
 
 from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all, run_benchmark
-from texture_benchmarks.study import BenchmarkOptions, importing_once
+from texture_benchmarks.study import BenchmarkOptions
 from texture_core.cli import add_seed, task
 from texture_core.errors import InvalidData
 
 ALL = 'all'
 NO_DATA = 3  # exit code of a process
-IMPORTED = ('biotac20', 'ntp21')  # what many of them read is imported once
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -44,8 +43,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     began_s = time.monotonic()
     names = [name for name in BENCHMARKS if options.long or name not in LONG]
-    with importing_once(benchmark_options, IMPORTED) as sharing:
-        codes = run_all(names, partial(_run_to_exit_code, benchmark_options=sharing))
+    codes = run_all(names, partial(_run_to_exit_code, benchmark_options=benchmark_options))
     failed = [name for name, code in codes.items() if code not in (0, NO_DATA)]
     without = [name for name, code in codes.items() if code == NO_DATA]
     print(f'{list(codes.values()).count(0)} benchmarks in {(time.monotonic() - began_s) / 60:.1f} min')
