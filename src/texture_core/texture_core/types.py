@@ -730,13 +730,10 @@ def quaternion_matrix(quaternion: Sequence[float]) -> Array:
         Its columns are the axes of the turned frame; NaN for a quaternion of length 0, which is no rotation.
     """
     vector, w = np.array(quaternion[:3], dtype=float), float(quaternion[3])
-    length = float(np.sqrt(vector @ vector + w * w))
-    if length == 0.0:
+    length = float(np.linalg.norm(vector))
+    if length == 0.0 == w:
         return np.full((3, 3), np.nan)
-    vector, w = vector / length, w / length
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    return rotation_matrix(2.0 * np.arctan2(length, w) / (length or 1.0) * vector)
 
 
 def rotation_vector(matrix: Array) -> Array:

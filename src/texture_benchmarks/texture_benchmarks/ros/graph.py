@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from rclpy.context import Context
@@ -30,21 +30,20 @@ from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 
 POLL_S = 0.05
+GraphT = TypeVar('GraphT', bound='Graph')
 
 
 class Graph:
-    """Take part in a ROS graph from `with` to the end of the block."""
+    """Take part in a ROS graph until the end of a `with` block."""
 
-    def __init__(self, domain_id: int | None = None, namespace: str = '/') -> None:
-        self._domain_id = domain_id
-        self._namespace = namespace
+    def __init__(self, domain_id: int | None = None, name: str = 'probe') -> None:
         self._context = Context()
-
-    def __enter__(self) -> Graph:
-        self._context.init(domain_id=self._domain_id)
-        self.node = Node('probe', context=self._context, namespace=self._namespace)
+        self._context.init(domain_id=domain_id)
+        self.node = Node(name, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+
+    def __enter__(self: GraphT) -> GraphT:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 import re
@@ -17,20 +16,19 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 from unittest import mock
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped, WrenchStamped
 from rcl_interfaces.msg import Log
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
+from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
 from texture_benchmarks import soak
+from texture_benchmarks.ros.graph import Graph, GraphT
 from texture_bringup.demo import free_domain, isolated
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
@@ -43,28 +41,24 @@ from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
 
 
-class Listener:
-    """Hold a node that spins from `with` to the end of the block."""
+class Listener(Graph):
+    """Take part in a graph in a thread of its own, from `with` to the end of the block."""
 
-    def __init__(self, name: str, domain_id: int, **options: Any) -> None:
-        self._context = Context()
-        self._context.init(domain_id=domain_id)
-        self.node = Node(name, context=self._context, **options)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin, name=name, daemon=True)
+    def __init__(self, domain_id: int) -> None:
+        super().__init__(domain_id, 'watcher')
+        self._thread = threading.Thread(target=self._spin, name='watcher', daemon=True)
 
-    def __enter__(self) -> Self:
+    def __enter__(self: GraphT) -> GraphT:
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._context.try_shutdown()
         self._thread.join()
-        self.node.destroy_node()
+        super().__exit__()
 
     def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
+        with suppress(ExternalShutdownException):
             self._executor.spin()
 
 
@@ -85,7 +79,7 @@ class Watcher(Listener):
         self.totals: defaultdict[str, soak.Totals] = defaultdict(soak.Totals)
         self.said: Counter[tuple[str, str, str]] = Counter()
         self.received_s: dict[str, float] = {}
-        super().__init__('watcher', domain_id)
+        super().__init__(domain_id)
         node = self.node
         node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         node.create_subscription(Log, '/rosout', self._on_log, LOG_QOS)
@@ -399,7 +393,7 @@ class HazardRig(Listener):
     """An emulated controller, an explorer and what befalls them; use it in a `with` block."""
 
     def __init__(self, domain_id: int, clients: Sequence[Operator]) -> None:
-        super().__init__('watcher', domain_id)
+        super().__init__(domain_id)
         self.force = soak.ForceAccount()
         self._explorations, self._settings = clients
         self._domain_id = domain_id
@@ -407,7 +401,7 @@ class HazardRig(Listener):
         self._explorer = self._new_explorer()
         self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> HazardRig:
         self._controller.__enter__()
         self._explorer.__enter__()
         return super().__enter__()
