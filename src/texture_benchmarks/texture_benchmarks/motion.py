@@ -147,6 +147,7 @@ def force_control_metrics(log: Log, request: ExplorationRequest, outcome: Explor
     peak_n = max((state.force_n for _, state in log), default=math.nan)
     if not sliding:
         return ForceControlMetrics(outcome.success, outcome.message, peak_n=peak_n)
+    # Logs hold the true force: that which the arm measures may be what is wrong.
     force = np.array([state.force_n for state in sliding]) / request.force_n
     speed = np.array([math.hypot(*state.velocity) for state in sliding]) / request.speed_m_s
     times_s = np.array([state.time_ns for state in sliding]) * 1e-9

@@ -127,7 +127,7 @@ def variants(scene: Scene, touch_protocol: TouchProtocol) -> dict[str, Scene]:
 def _without(scene: Scene, name: str) -> Scene:
     """Return a scene without an effect; what else is random stays as it was, so that slides are compared one by one."""
     if isinstance(scene.effects[name], SlideError):
-        return replace(scene, effects={**scene.effects, name: SlideError(0.0, 0.0)})
+        return replace(scene, effects={**scene.effects, name: SlideError(0.0, 0.0)})  # it still draws its numbers
     return scene.without(name)
 
 
@@ -290,6 +290,7 @@ def _repeat(
 
     values, codes = tested(scene)
     answers, again = (learned(scene, part).predict(values) for part in (0, 1))
+    # Two learners of other slides with all terms differ, too: only what a term changes beyond that is its own.
     right, usual = float(np.mean(answers == codes)), float(np.mean(answers != again))
     differences = {}
     for term, other in others.items():

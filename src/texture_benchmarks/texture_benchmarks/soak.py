@@ -163,6 +163,7 @@ class SampleAccount:
             self._first = first_sample, stamp_ns
         else:
             self.gaps += first_sample - self._next_sample
+        # A loss that the driver has not noticed is in neither book: stamps then run ahead of the index.
         index, since_ns = self._first
         apart_s = (first_sample - index) / rate_hz - (stamp_ns - since_ns) / NANOSECONDS
         self.drift_s = max(self.drift_s, abs(apart_s))

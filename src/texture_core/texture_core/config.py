@@ -528,6 +528,7 @@ def parse_yaml(text: str) -> Any:
     """
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
+    # The tree of nodes has each alias once: values are counted before any is made.
     node = yaml.compose(text, yaml.SafeLoader)
     if node is not None and _count_values(node, {}) > MAX_VALUES:
         raise ValueError(f'its aliases stand for more than {MAX_VALUES} values; write less')

@@ -883,7 +883,9 @@ class BagWriter:
             raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
         storage: Any = self._writer.storage
         self._storage = storage
-        self._close_chunk = self._storage.close_chunk  # without a checksum
+        # rosbags writes 0 for the checksum of a chunk, so that nobody could tell a whole chunk from one that the disk
+        # has in part: the checksum is written over it.
+        self._close_chunk = self._storage.close_chunk
         self._storage.close_chunk = self._close_with_checksum
 
     def write(self, topic: str, value: Any, log_ns: int) -> None:

@@ -1015,6 +1015,7 @@ def _ways(slides: Sequence[LabelledSlide], grids: Sequence[AnyArray]) -> tuple[l
         axis = np.linalg.svd(together - together.mean(axis=0), full_matrices=False)[2][0]
         ways = [np.interp(grid, at, own @ axis) for grid, at, own in zip(grids, stamps, points, strict=True)]
         return ways, min(map(np.min, ways)), max(map(np.max, ways))
+    # Without positions all slides of a surface are taken to run over one track, from one end of it or the other.
     speeds = [np.array([state.speed_m_s for state in slide.sliding]) for slide in slides]
     if not all(np.isfinite(own).all() for own in speeds):
         speeds = [np.ones(len(own)) for own in speeds]

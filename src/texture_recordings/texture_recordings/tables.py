@@ -305,10 +305,6 @@ class TableMapping:
         """Return the names of the columns that are read as numbers, beside those of the streams."""
         return [one.time.column for one in self.streams.values()] + [one.column for one in self.conditions.values()]
 
-    def quantity(self, name: str) -> Quantity:
-        """Return where a condition comes from."""
-        return self.conditions.get(name, Quantity())
-
 
 def load_mapping(name_or_path: str | Path) -> TableMapping:
     """Return the mapping in a file, or one that the package ships in config/mappings, by name.
@@ -520,7 +516,7 @@ class TableFiles:
         if self._child is None:
             self._begin()
         self._limit_s = DEADLINE_S * max(1.0, size / DEADLINE_BYTES)
-        self._left_s = START_S
+        self._left_s = START_S  # until the child says that it has its libraries: they are not the file's fault
         self._memory = MEMORY_BYTES + MEMORY_TIMES * size
         with suppress(OSError):  # it has ended: the answer says why
             self._connection.send((kind, str(path), place, mapping, dict(fields or {}), self._memory))
@@ -696,9 +692,16 @@ def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequenc
                     if (row := rows[index])
                 ]
             malformed += sorted(found, key=lambda row: row.row)[: EXAMPLES - len(malformed)]
-            rows = _without_headings(rows, [at[name] for name in numbers])
+            # A row without any number, such as names or units that a logger wrote again, is none of a sample: its texts
+            # are none of a sample, too, and a slide must not end at them.
+            empty = np.logical_and.reduce([np.isnan(read[f'number {name}']) for name in numbers])
             for name in texts:
-                read[f'text {name}'] = np.array([row and row[at[name]][:MAX_TEXT].replace('\0', '') for row in rows])
+                read[f'text {name}'] = np.array(
+                    [
+                        None if row is None or left_out else row[at[name]][:MAX_TEXT].replace('\0', '')
+                        for row, left_out in zip(rows, empty, strict=True)
+                    ]
+                )
             blocks.append(read)
     if not blocks:
         raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
@@ -753,24 +756,11 @@ def _parsed(rows: Sequence[list[str] | None], place: int, decimal: str) -> Array
     return values
 
 
-def _without_headings(rows: Sequence[list[str] | None], places: Sequence[int]) -> list[list[str] | None]:
-    """Return None for rows that hold words alone where numbers belong: names or units, which a logger wrote again.
-
-    Their texts are none of a sample, and a slide must not end at them.
-    """
-    return [
-        None if row and places and all(row[place] and math.isnan(_number(row[place], 0.0)) for place in places) else row
-        for row in rows
-    ]
-
-
-def _number(cell: str, if_nan: float = math.nan) -> float:
-    """Return a number, NaN for what is none; NaN that is written so becomes `if_nan`."""
+def _number(cell: str) -> float:
     try:
-        number = float(cell)
+        return float(cell)
     except ValueError:
         return math.nan
-    return if_nan if math.isnan(number) else number
 
 
 def _without_gaps(texts: AnyArray) -> AnyArray:
@@ -1691,6 +1681,8 @@ class _TableSlides:
         if keys is None:
             return reference, spans(SlideRows(reference.time_s, reference.rate_hz, None, place), borders)
         clock = self._clocks.get(borders.column, '')
+        # Rows of the column and of a stream correspond where their clocks and numbers do; otherwise, as of topics of a
+        # bag, only their times can be compared.
         same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
         if same:
             return same[0], spans(SlideRows(same[0].time_s, same[0].rate_hz, keys, place), borders)
@@ -1734,6 +1726,7 @@ class _TableSlides:
     def _stream(self, name: str, params: StreamColumns) -> Stream:
         names = self._chosen[name]
         columns = [self._columns.numbers[column] for column in names]
+        # Arrays of a file need not be of one length: those of one stream must.
         if len({len(column) for column in columns}) > 1:
             raise InvalidData(
                 f"'{self._place}': the columns of '{name}' have {sorted({len(c) for c in columns})} rows; put "
@@ -1765,7 +1758,7 @@ class _TableSlides:
         own = self._own_hz
         if time_column:
             own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
-        counts.rate_hz = counts.rate_hz or own
+        counts.rate_hz = counts.rate_hz or own  # of the first file: windows of all are to have as many samples
         if not MIN_HZ <= counts.rate_hz <= MAX_HZ:
             raise InvalidData(
                 f"'{self._place}': the rate of '{name}' is {counts.rate_hz:g} Hz by its times; give a column of "
@@ -1859,7 +1852,7 @@ class _TableSlides:
 
     def _track(self, name: str, cut: _Cut) -> tuple[Array, Array]:
         """Return times and values of a condition in SI units, (n,) each."""
-        quantity = self._mapping.quantity(name)
+        quantity = self._mapping.conditions.get(name, Quantity())
         factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
         if quantity.column in self._fields or not quantity.column:
             text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
