@@ -108,19 +108,6 @@ def test_a_new_exploration_begins_without_evidence_and_a_late_estimate_enters_on
     assert [(past['id'], past.get('label')) for past in frame['past']] == [('b', None), ('a', 'cork')]
 
 
-def test_a_past_exploration_is_replayed_in_the_frames_that_were_shown() -> None:
-    feed = Feed()
-    for k in range(3):
-        feed.on_state(sliding('a'))
-        feed.on_texture(TextureEstimate(k, 'a', f'label{k}'))
-        feed.frame(0.0)
-    feed.on_state(sliding('a', Phase.DONE))
-    feed.frame(0.0)
-    replay = json.loads(feed.history.replay('a'))
-    assert [frame['texture']['label'] for frame in replay['frames'][:3]] == ['label0', 'label1', 'label2']
-    assert feed.history.replay('b') is None
-
-
 def test_a_failing_node_and_a_silent_one_are_red() -> None:
     node_statuses = NodeStatuses()
     node_statuses.update('sensor', 'ERROR', 'unplugged', 0.0)

@@ -34,9 +34,6 @@ class Nodes:
     async def offered(self):
         return {'linear_slide': []}
 
-    def replay(self, exploration_id):
-        return '{"stride": 1, "frames": []}' if exploration_id == 'known' else None
-
 
 def with_client(story, access=Access('127.0.0.1')):  # noqa: B008
     """Run a story against a server of its own."""
@@ -74,9 +71,7 @@ def test_the_page_asks_for_what_the_server_offers_and_for_all_of_it() -> None:
     assert set(asked) == set(BUTTONS)
 
 
-@pytest.mark.parametrize(
-    'path', ['/none', '/../package.xml', '/%2e%2e/package.xml', '/api/past/unknown', '/api/explore']
-)
+@pytest.mark.parametrize('path', ['/none', '/../package.xml', '/%2e%2e/package.xml', '/api/explore'])
 def test_an_unknown_path_is_not_found(path) -> None:
     async def story(client, _nodes):
         answer = await client.get(path)
@@ -94,7 +89,6 @@ def test_a_command_is_passed_on_and_a_refusal_is_reported() -> None:
         assert (status, json.loads(text)['success']) == (409, False)
         assert 'allowed is 0.002' in text
         assert json.loads(await (await client.get('/api/motions')).text()) == {'linear_slide': []}
-        assert (await client.get('/api/past/known')).status == 200
 
     with_client(story)
 

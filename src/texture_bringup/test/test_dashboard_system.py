@@ -69,12 +69,6 @@ class Wire:
     def stop(self):
         assert 'lifted' in self.post('stop', {})
 
-    def replay_newest(self):
-        frames = []
-        self._until(lambda frame: frames.append(frame) or True)
-        with urllib.request.urlopen(f'{self._address}api/past/{frames[0]["past"][0]["id"]}') as answer:
-            assert json.load(answer)['frames']
-
 
 def free_tcp_port():
     with socket.socket() as probe:
@@ -126,4 +120,3 @@ def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_explora
     operator.wait_for_phase('slide')
     operator.stop()
     operator.wait_for_past('aborted')
-    operator.replay_newest()

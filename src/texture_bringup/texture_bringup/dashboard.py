@@ -14,10 +14,8 @@ import re
 import secrets
 import socket
 import threading
-import zlib
-from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -136,72 +134,6 @@ def _name(url: str) -> str:
         return (urlsplit(url).hostname or '').lower()
     except ValueError:
         return ''
-
-
-# --------------------
-# Past explorations, each with the frames that were shown during it, for replay.
-
-MAX_EXPLORATIONS = 12
-MAX_FRAMES = 300  # of one exploration; a longer one is thinned to every second frame, again and again
-
-
-@dataclass
-class Past:
-    """One exploration: its summary, and the texts of its frames, compressed: a page in memory for each is too much."""
-
-    summary: dict[str, Any]
-    frames: list[bytes] = field(default_factory=list)
-    stride: int = 1
-    seen: int = 0
-
-    def add(self, frame: str) -> None:
-        """Keep every `stride`-th frame."""
-        if self.seen % self.stride == 0:
-            self.frames.append(zlib.compress(frame.encode(), 1))
-        self.seen += 1
-        if len(self.frames) > MAX_FRAMES:
-            self.frames, self.stride = self.frames[::2], self.stride * 2
-
-
-class History:
-    """Keep the newest explorations."""
-
-    def __init__(self) -> None:
-        self._past: OrderedDict[str, Past] = OrderedDict()
-
-    def add(self, exploration_id: str, summary: dict[str, Any], frame: str = '') -> None:
-        """Note what is now known of an exploration, and the frame shown now if it is going on.
-
-        Parameters
-        ----------
-        exploration_id
-            Id of the exploration.
-        summary
-            Plain values for the page.
-        frame
-            Frame of the page, as JSON; '' if it is over.
-        """
-        past = self._past.setdefault(exploration_id, Past({}))
-        past.summary = {**past.summary, **summary, 'id': exploration_id}
-        if frame:
-            past.add(frame)
-        while len(self._past) > MAX_EXPLORATIONS:
-            self._past.popitem(last=False)
-
-    def __contains__(self, exploration_id: str) -> bool:
-        return exploration_id in self._past
-
-    def listed(self) -> list[dict[str, Any]]:
-        """Return the summaries, newest first."""
-        return [past.summary for past in reversed(self._past.values())]
-
-    def replay(self, exploration_id: str) -> str | None:
-        """Return the frames of an exploration as a JSON list with the time between them; None if it is not kept."""
-        past = self._past.get(exploration_id)
-        if past is None:
-            return None
-        frames = ', '.join(zlib.decompress(frame).decode() for frame in past.frames)
-        return f'{{"stride": {past.stride}, "frames": [{frames}]}}'
 
 
 # --------------------
@@ -525,7 +457,7 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
     ----------
     commands
         Carries out what the page asks for, as `nodes.dashboard.DashboardNode` does: a coroutine of what is asked for
-        each of `BUTTONS`, a coroutine `offered`, and `replay`. A TextureError is shown to the user.
+        each of `BUTTONS`, and a coroutine `offered`. A TextureError is shown to the user.
     access
         Who may ask for what.
     page
@@ -536,12 +468,6 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
 
     async def motions(_request: web.Request) -> web.StreamResponse:
         return web.json_response(await commands.offered())
-
-    async def past(request: web.Request) -> web.StreamResponse:
-        replay = commands.replay(request.match_info['id'])
-        if replay is None:
-            return _said(404, 'this exploration is no longer kept')
-        return web.Response(text=replay, content_type='application/json')
 
     async def static(request: web.Request) -> web.StreamResponse:
         file, kind = PAGE[request.path]
@@ -554,7 +480,6 @@ def make_app(commands: Any, access: Access, page: Path) -> web.Application:
 
     app.router.add_get('/ws', viewers.watch)
     app.router.add_get('/api/motions', motions)
-    app.router.add_get('/api/past/{id}', past)
     for name in BUTTONS:
         app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
     for path in PAGE:
@@ -748,6 +673,7 @@ def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
 # What the page shows: the newest of everything, in bounded memory, as one JSON text a frame.
 
 FRAME_PERIOD_S = 0.1
+MAX_EXPLORATIONS = 12  # that are listed; the page itself keeps the frames that it has shown of them, for replay
 SIGNAL_S, SPECTRUM_S = 2.0, 0.5
 POINTS, BINS = 240, 128
 MAX_LABELS = 200
@@ -759,7 +685,7 @@ class Feed:
     """Take what the nodes publish; give frames. Used from one thread at a time."""
 
     def __init__(self) -> None:
-        self.history = History()
+        self._past: dict[str, dict[str, Any]] = {}  # summaries by exploration, the newest last
         self.node_statuses = NodeStatuses()
         self._ring = Ring(SIGNAL_S)
         self._taxels = Taxels()
@@ -780,19 +706,19 @@ class Feed:
 
     def on_state(self, state: ExplorationState) -> None:
         """Take what the finger is doing; a new exploration begins without evidence."""
-        if state.exploration_id and state.exploration_id not in self.history:
+        if state.exploration_id and state.exploration_id not in self._past:
             self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
             self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
         self._state = state
         if state.exploration_id:
             seen = {'motion': state.motion, 'phase': state.phase.value, 'surface': state.surface}
-            self.history.add(state.exploration_id, {'stamp_ns': str(state.stamp_ns), **seen})
+            self._note(state.exploration_id, seen)
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
         reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'known': estimate.known}
-        if estimate.exploration_id in self.history:
-            self.history.add(estimate.exploration_id, reported)
+        if estimate.exploration_id in self._past:
+            self._note(estimate.exploration_id, reported)
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -802,18 +728,19 @@ class Feed:
 
     def on_roughness(self, estimate: RoughnessEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        if estimate.exploration_id in self.history:
-            self.history.add(estimate.exploration_id, {'grade': _number(estimate.grade)})
+        if estimate.exploration_id in self._past:
+            self._note(estimate.exploration_id, {'grade': _number(estimate.grade)})
         if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
             self._roughness = estimate
 
-    @property
-    def exploring(self) -> bool:
-        """Whether an exploration is going on, whose frames are kept."""
-        return bool(self._state.exploration_id) and self._state.phase not in ENDED
+    def _note(self, exploration_id: str, seen: Mapping[str, Any]) -> None:
+        """Add to the summary of an exploration; the oldest is forgotten."""
+        self._past[exploration_id] = {**self._past.get(exploration_id, {}), **seen, 'id': exploration_id}
+        if len(self._past) > MAX_EXPLORATIONS:
+            del self._past[next(iter(self._past))]
 
     def frame(self, time_s: float) -> str:
-        """Return everything the page shows at a time of the monotonic clock, s, and keep it for replay."""
+        """Return everything the page shows at a time of the monotonic clock, s."""
         frame = {
             'signal': self._signal(),
             'spectrum': self._spectrum(),
@@ -821,17 +748,12 @@ class Feed:
             'state': self._shown_state(),
             'texture': self._evidence(),
             'roughness': {name: _plain(value) for name, value in asdict(self._roughness).items()},
-        }
-        text = json.dumps(frame, allow_nan=False)
-        if self.exploring:
-            self.history.add(self._state.exploration_id, {}, text)
-        rest = {
             'lights': self.node_statuses.shown(time_s),
-            'past': self.history.listed(),
+            'past': list(reversed(self._past.values())),
             'recording': self.recording,
             'working': self.working,
         }
-        return f'{text[:-1]}, {json.dumps(rest)[1:]}'
+        return json.dumps(frame, allow_nan=False)
 
     def _signal(self) -> dict[str, Any]:
         ring = self._ring

@@ -6,9 +6,11 @@ const FRAME_MS = 100;
 const BARS = 6;
 const CURVES = ['--accent', '--second', '--third'];
 const AXIS = { left: 48, bottom: 18, top: 14 };
+const MAX_FRAMES = 300; // of one exploration; a longer one is thinned to every second frame, again and again
 const ENDED = ['idle', 'done', 'aborted'];
 const at = (id) => document.getElementById(id);
 let replaying = null;
+const kept = new Map(); // what was shown of each exploration that is listed: texts, every how many, how many came
 let last = 0;
 let connected = false;
 let curve = { id: '', points: [] };
@@ -254,32 +256,42 @@ function showRest(frame) {
   at('record').dataset.on = frame.recording ? 'yes' : '';
   at('recording').textContent = frame.recording;
   at('working').textContent = frame.working;
-  const past = frame.past.map(({ id, motion, phase, label, grade, surface }) => ({ id, motion, phase, label, grade, surface }));
+  [...kept.keys()].filter((id) => !frame.past.some((item) => item.id === id)).forEach((id) => kept.delete(id));
+  const past = frame.past.map((item) => ({ ...item, kept: kept.has(item.id) }));
   fill(at('past'), past, (item) => {
     const row = element('li', '');
     const grade = item.grade === null || item.grade === undefined ? '' : `roughness ${item.grade.toFixed(1)}`;
     const truth = item.surface ? `(over ${item.surface})` : '';
     const button = element('button', 'Replay');
+    button.hidden = !item.kept;
     button.addEventListener('click', () => replay(item.id));
     row.append(element('span', [item.motion, item.phase, item.label || 'no label', truth, grade, item.id].filter(Boolean).join(' · ')), button);
     return row;
   });
 }
 
-async function replay(id) {
-  const answer = await fetch(`api/past/${encodeURIComponent(id)}`).catch(() => null);
-  if (!answer || !answer.ok) {
-    say('this exploration is no longer kept', true);
-    return;
+// Keep what is shown of an exploration while it goes on.
+function keep({ exploration_id: id, phase }, text) {
+  if (!id || ENDED.includes(phase)) return;
+  const own = kept.get(id) || { texts: [], stride: 1, seen: 0 };
+  if (own.seen % own.stride === 0) own.texts.push(text);
+  own.seen += 1;
+  if (own.texts.length > MAX_FRAMES) {
+    own.texts = own.texts.filter((_, number) => number % 2 === 0);
+    own.stride *= 2;
   }
-  const { stride, frames } = await answer.json();
+  kept.set(id, own);
+}
+
+function replay(id) {
+  const { texts, stride } = kept.get(id);
   window.clearInterval(replaying);
   let k = 0;
   say(`replaying ${id}`);
   window.scrollTo({ top: 0, behavior: 'smooth' });
   replaying = window.setInterval(() => {
-    if (k < frames.length) {
-      showFrame(frames[k]);
+    if (k < texts.length) {
+      showFrame(JSON.parse(texts[k]));
       k += 1;
       return;
     }
@@ -330,6 +342,7 @@ function connect() {
   socket.onmessage = (message) => {
     const frame = JSON.parse(message.data);
     last = Date.now();
+    keep(frame.state, message.data);
     if (replaying === null) showFrame(frame);
     showRest(frame);
   };

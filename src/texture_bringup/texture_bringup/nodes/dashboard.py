@@ -194,10 +194,6 @@ class DashboardNode(Node):
         values = {name: value.double_value for name, value in zip(names, answer.values, strict=True)}
         return offered(SafetyLimits(**values))
 
-    def replay(self, exploration_id: str) -> str | None:
-        """Return the kept frames of an exploration."""
-        return self._feed.history.replay(exploration_id)
-
     # ROS
 
     def _make_clients(self) -> None:
@@ -241,7 +237,7 @@ class DashboardNode(Node):
     def _show(self) -> None:
         self._recorder.watch()
         self._feed.recording = self._recorder.bag
-        if self._serving.watched or self._feed.exploring:
+        if self._serving.watched:
             self._serving.show(self._feed.frame(time.monotonic()))
 
     def _report(self) -> DiagnosticReport:
