@@ -12,9 +12,9 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -197,33 +197,18 @@ class ProgressLog:
 # What came out of the recognising slides, as a table.
 
 
-@dataclass(frozen=True)
-class RecognisedSlide:
-    """One slide: what lay under the finger, and what was said of it."""
+Row = tuple[str, TextureEstimate]  # what lay under the finger, and what was said of it
 
-    surface: str
-    estimate: TextureEstimate
 
-    @property
-    def right(self) -> bool:
-        """Whether the surface was recognised."""
-        return self.estimate.known and self.estimate.label == self.surface
+def is_right(row: Row) -> bool:
+    """Return whether the surface was recognised."""
+    surface, estimate = row
+    return estimate.known and estimate.label == surface
 
 
 def is_refused(estimate: TextureEstimate) -> bool:
     """Return whether an estimate says that its exploration is outside what was trained, and claims nothing."""
     return estimate.rejection is Rejection.OUTSIDE_TRAINING and not estimate.decided
-
-
-def untrained_figures(estimate: TextureEstimate, speed_m_s: float) -> dict[str, Any]:
-    """Return what is written of the slide at a speed that was not trained."""
-    return {
-        'speed_m_s': speed_m_s,
-        'label': estimate.label,
-        'known': estimate.known,
-        'decided': estimate.decided,
-        'message': estimate.message,
-    }
 
 
 def latencies_s(bag: Path) -> Mapping[str, float]:
@@ -235,15 +220,16 @@ def latencies_s(bag: Path) -> Mapping[str, float]:
     return {name: statistics.median(values) for name, values in found.items()}
 
 
-def table(rows: Sequence[RecognisedSlide], latencies: Mapping[str, float]) -> list[str]:
+def table(rows: Sequence[Row], latencies: Mapping[str, float]) -> list[str]:
     """Return the lines of the table of results; latencies in s by exploration."""
-    width = max(13, *(len(row.surface) for row in rows))
+    width = max(13, *(len(surface) for surface, _ in rows))
     lines = [f'{"surface":<{width}}  {"recognised as":<{width}}    confidence  sliding used  latency']
-    for row in rows:
-        latency_s = latencies.get(row.estimate.exploration_id)
+    for surface, estimate in rows:
+        latency_s = latencies.get(estimate.exploration_id)
+        mark = '✓' if is_right((surface, estimate)) else '✗'
         lines.append(
-            f'{row.surface:<{width}}  {row.estimate.label or "nothing":<{width}}  {"✓" if row.right else "✗"} '
-            f'{row.estimate.confidence:10.3f}  {row.estimate.evidence_s:10.1f} s  '
+            f'{surface:<{width}}  {estimate.label or "nothing":<{width}}  {mark} '
+            f'{estimate.confidence:10.3f}  {estimate.evidence_s:10.1f} s  '
             + (f'{1000 * latency_s:4.0f} ms' if latency_s is not None else '   –')
         )
     return lines
@@ -346,33 +332,29 @@ def explore_patiently(
 SHOWN_S = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Recorded:
-    """What a bag holds: slide states and estimates of each exploration, all vibration batches."""
+def recorded(
+    bag: Path,
+) -> tuple[dict[str, list[ExplorationState]], dict[str, list[TextureEstimate]], list[TactileSignal]]:
+    """Return what a bag holds: slide states and estimates of each exploration, all vibration batches."""
+    states: defaultdict[str, list[ExplorationState]] = defaultdict(list)
+    estimates: defaultdict[str, list[TextureEstimate]] = defaultdict(list)
+    batches: list[TactileSignal] = []
+    for _, _, value in read_bag(bag, ('exploration', 'signal', 'texture')):
+        if isinstance(value, TactileSignal):
+            batches.append(value)
+        elif isinstance(value, TextureEstimate) and value.probabilities:
+            estimates[value.exploration_id].append(value)
+        elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
+            states[value.exploration_id].append(value)
+    return states, estimates, batches
 
-    states: defaultdict[str, list[ExplorationState]] = field(default_factory=lambda: defaultdict(list))
-    estimates: defaultdict[str, list[TextureEstimate]] = field(default_factory=lambda: defaultdict(list))
-    batches: list[TactileSignal] = field(default_factory=list)
 
-    @classmethod
-    def of(cls, bag: Path) -> Recorded:
-        """Read a bag."""
-        found = cls()
-        for _, _, value in read_bag(bag, ('exploration', 'signal', 'texture')):
-            if isinstance(value, TactileSignal):
-                found.batches.append(value)
-            elif isinstance(value, TextureEstimate) and value.probabilities:
-                found.estimates[value.exploration_id].append(value)
-            elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
-                found.states[value.exploration_id].append(value)
-        return found
-
-    def samples(self, name: str) -> Array:
-        """Return the samples of an exploration while the finger slid, (n_samples,)."""
-        start_ns, end_ns = self.states[name][0].stamp_ns, self.states[name][-1].stamp_ns
-        inside = [batch for batch in self.batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
-        samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
-        return samples
+def sliding_samples(states: Sequence[ExplorationState], batches: Iterable[TactileSignal]) -> Array:
+    """Return the samples of an exploration while the finger slid, (n_samples,)."""
+    start_ns, end_ns = states[0].stamp_ns, states[-1].stamp_ns
+    inside = [batch for batch in batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
+    samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
+    return samples
 
 
 def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> None:
@@ -393,13 +375,13 @@ def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport,
     note
         Lines below the panels.
     """
-    found = Recorded.of(bag)
-    surfaces = {name: found.states[name][0].surface for name in found.estimates}
-    own = {name: found.estimates[name] for name in surfaces if surfaces[name] == surface}
-    name = min(own, key=lambda each: own[each][0].confidence)
-    slides = {label: found.samples(each) for each, label in {**surfaces, name: surface}.items()}
-    slides[surface] = found.samples(name)
-    rate_hz, unit = found.batches[0].sampling_rate_hz, found.batches[0].common_unit
+    states, estimates, batches = recorded(bag)
+    surfaces = {name: states[name][0].surface for name in estimates}
+    own = [name for name in surfaces if surfaces[name] == surface]
+    name = min(own, key=lambda each: estimates[each][0].confidence)
+    slides = {label: sliding_samples(states[each], batches) for each, label in {**surfaces, name: surface}.items()}
+    slides[surface] = sliding_samples(states[name], batches)
+    rate_hz, unit = batches[0].sampling_rate_hz, batches[0].common_unit
     title = f'How a slide over {surface} is recognised (simulated Robotiq TSF-85)'
     with chart(path, (11.0, 8.8), title, points=11.0) as figure:
         (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
@@ -417,7 +399,7 @@ def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport,
         spectrum.set(xlabel='frequency (Hz)', ylabel=f'power density ({f"{unit}²" if unit else "1"}/Hz)')
         spectrum.set_title('2. Its spectrum is the mark of the surface')
         spectrum.legend(loc='upper right')
-        _draw_evidence(evidence, model.labels, found.estimates[name], colours)
+        _draw_evidence(evidence, model.labels, estimates[name], colours)
         draw_confusion(table, report.labels, report.confusion)
         table.set_title('4. Single windows of all test slides')
         if note:
@@ -490,7 +472,7 @@ def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: Pro
         rows = _recognise(rig, out, plan, progress)
         untrained = _explore_untrained(rig, plan, progress)
     report = _report(rows, untrained, out, plan, progress)
-    return all(row.right for row in rows) and len(report.known) >= len(rows) and is_refused(untrained)
+    return all(map(is_right, rows)) and len(report.known) >= len(rows) and is_refused(untrained)
 
 
 def _learn(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> None:
@@ -511,7 +493,7 @@ def _train(out: Path, recipe: str, progress: ProgressLog) -> None:
         progress.line(line)
 
 
-def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> list[RecognisedSlide]:
+def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> list[Row]:
     progress.section('Recognising: new slides at other places; each may end as soon as its label is decided')
     rows = []
     with rig.recording(out / RECOGNITION_BAG):
@@ -519,7 +501,7 @@ def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -
             progress.part(f'{surface:<18}', first=True)
             requests = plan.requests(surface, plan.recognition_slides, early_stopping=True)
             for number, explored in enumerate(rig.explore(surface, requests, progress.part)):
-                rows.append(RecognisedSlide(surface, explored.texture))
+                rows.append((surface, explored.texture))
                 progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
             progress.part('', last=True)
     return rows
@@ -536,18 +518,18 @@ def _explore_untrained(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> T
 
 
 def _report(
-    rows: list[RecognisedSlide], untrained: TextureEstimate, out: Path, plan: DemoPlan, progress: ProgressLog
+    rows: list[Row], untrained: TextureEstimate, out: Path, plan: DemoPlan, progress: ProgressLog
 ) -> EvaluationReport:
     progress.section('Result')
     latencies: Mapping[str, float] = latencies_s(out / RECOGNITION_BAG)
     for line in table(rows, latencies):
         progress.line(line)
-    right = sum(row.right for row in rows)
-    progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
+    progress.line(f'{sum(map(is_right, rows))} of {len(rows)} slides over simulated surfaces recognised')
     progress.line('latency: from the last sample of a window to its estimate at another process')
     model = load_model(out / MODEL)
     report = evaluate(model, [out / RECOGNITION_BAG])
-    figures = {**report.as_json(), 'untrained_speed': untrained_figures(untrained, plan.untrained_speed_m_s)}
+    said = {name: getattr(untrained, name) for name in ('label', 'known', 'decided', 'message')}
+    figures = {**report.as_json(), 'untrained_speed': {'speed_m_s': plan.untrained_speed_m_s, **said}}
     write_json(figures, out / FIGURES)
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')

@@ -7,6 +7,7 @@ import argparse
 import os
 import signal
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from texture_bringup.launcher import (
@@ -17,7 +18,7 @@ from texture_bringup.launcher import (
     given_arguments,
     read,
 )
-from texture_core.cli import Command, add_namespace, add_seed
+from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
 
@@ -65,32 +66,18 @@ def _say(line: str) -> None:
 
 
 def _configure_dashboard(parser: argparse.ArgumentParser) -> None:
-    from texture_bringup.dashboard import TOKEN_VARIABLE  # noqa: PLC0415 – see above
-    from texture_bringup.nodes.dashboard import DashboardParams  # noqa: PLC0415
+    from texture_bringup.nodes.dashboard import DashboardParams  # noqa: PLC0415 – see above
 
-    default = DashboardParams()
-    parser.add_argument(
-        '--host',
-        default=default.host,
-        help=f'address to listen on (default {default.host}); beyond loopback the page needs the token that is '
-        f'printed, or the one in {TOKEN_VARIABLE}',
-    )
-    parser.add_argument(
-        '--port', type=int, default=default.port, help=f'port (default {default.port}); 0: any that is free'
-    )
-    parser.add_argument('--recordings', default=default.recordings, help='folder for new bags')
+    add_parameters(parser, DashboardParams)
     add_namespace(parser)
 
 
 def _dashboard(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     from texture_bringup.nodes.dashboard import DashboardNode, DashboardParams  # noqa: PLC0415 – see above
-    from texture_core.config import from_mapping  # noqa: PLC0415
     from texture_core.ros import run_node  # noqa: PLC0415
 
-    parameters = {'host': options.host, 'port': options.port, 'recordings': options.recordings}
-    from_mapping(DashboardParams, parameters)  # says what is allowed, where ROS says that it is refused
-    run_node(DashboardNode, parameters, options.namespace)
+    run_node(DashboardNode, asdict(parameters_from(options, DashboardParams)), options.namespace)
     return 0
 
 

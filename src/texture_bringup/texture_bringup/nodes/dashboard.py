@@ -54,7 +54,11 @@ LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 class DashboardParams:
     """Parameters of the web page and of its recordings."""
 
-    host: str = param('127.0.0.1', 'Address to listen on; beyond loopback the page needs its token.')
+    host: str = param(
+        '127.0.0.1',
+        'Address to listen on; beyond loopback the page needs the token that is printed, or that of '
+        'TEXTURE_DASHBOARD_TOKEN.',
+    )
     port: int = param(8085, 'TCP port to listen on; 0 takes any free port.', low=0, high=65535)
     recordings: str = param('recordings', 'Folder in which the button `record` makes new bags.')
 
