@@ -115,7 +115,7 @@ def planned_explorations(rng: np.random.Generator, surfaces: Sequence[str]) -> I
 
 # What each node counts on /diagnostics; the other numbers there may fall, too.
 COUNTERS: Mapping[str, tuple[str, ...]] = {
-    'emulator': ('samples', 'skipped samples', 'bytes nobody took', 'refused datagrams'),
+    'emulator': ('samples', 'skipped samples', 'bytes nobody took', 'refused finger states'),
     'sensor': ('samples', 'lost', 'bogus', 'refused_bytes', 'damaged_stamps', 'reopened', 'revived', 'clock_steps'),
     'feature_extractor': ('windows', 'skipped', 'lost_samples', 'restarts', 'old_states', 'invalid_messages'),
     'classifier': ('estimates', 'refused_vectors', 'not_finite_vectors', 'lost_vectors', 'invalid_messages'),
