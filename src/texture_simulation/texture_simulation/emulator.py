@@ -49,7 +49,7 @@ class LiveSensor:
 
     def __init__(
         self,
-        model: models.SensorModel | models.Tsf85Pair | models.BioTacHand,
+        model: models.SensorModel | models.JoinedFingers,
         device: fingers.EmulatedDevice,
         send: Callable[[Any], None],
         skip: Callable[[int], None],
@@ -106,10 +106,10 @@ def live_tsf85(scene: Scene, surface: Surface, link: Path, rng: np.random.Genera
 
 def live_tsf85_pair(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return a TSF-85 of which both fingers touch."""
-    return _on_tsf85(models.Tsf85Pair(scene, surface, rng), link, rng)
+    return _on_tsf85(models.tsf85_pair(scene, surface, rng), link, rng)
 
 
-def _on_tsf85(model: models.Tsf85Model | models.Tsf85Pair, link: Path, rng: np.random.Generator) -> LiveSensor:
+def _on_tsf85(model: models.Tsf85Model | models.JoinedFingers, link: Path, rng: np.random.Generator) -> LiveSensor:
     device = fingers.EmulatedTsf85(link, rng)
     pace = RATE_HZ, models.TSF85_OVERSAMPLING
     return LiveSensor(model, device, lambda measured: device.advance(*measured), device.skip, pace)
@@ -120,10 +120,10 @@ def live_biotac(
 ) -> LiveSensor:
     """Return a BioTac alone on its board, or a board with BioTacs on three fingers: all are served with each frame."""
     layout = BIOTACS['biotac']
-    pace = layout.frame_rate_hz, models.points_per_frame(layout)
+    pace = layout.frame_rate_hz, len(layout.slots)
     if hand:
         device = fingers.EmulatedBioTac(link, rng, models.SERIALS)
-        return LiveSensor(models.BioTacHand(scene, surface, rng, layout), device, device.advance, device.skip, pace)
+        return LiveSensor(models.biotac_hand(scene, surface, rng, layout), device, device.advance, device.skip, pace)
     device = fingers.EmulatedBioTac(link, rng)
     model = models.BioTacModel(scene, surface, rng, layout=layout)
     return LiveSensor(model, device, lambda counts: device.advance(counts[:, :, None]), device.skip, pace)
@@ -132,14 +132,14 @@ def live_biotac(
 def live_daq(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 3."""
     model, device = models.DaqModel(scene, surface, rng), fingers.EmulatedDaq(link, rng)
-    pace = daq.RATE_HZ, models.DAQ_OVERSAMPLING
+    pace = daq.RATE_HZ, 1
     return LiveSensor(model, device, device.sample, lambda samples: device.skip(samples / daq.RATE_HZ), pace)
 
 
 def live_pvdf(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 5."""
     model, device = models.PvdfModel(scene, surface, rng), fingers.EmulatedPvdf(link, rng)
-    pace = pvdf.FILM_RATE_HZ, models.PVDF_OVERSAMPLING
+    pace = pvdf.FILM_RATE_HZ, 1
 
     def skip(samples: int) -> None:
         device.skip(samples / pvdf.FILM_RATE_HZ)

@@ -224,9 +224,8 @@ def individual_rng(finger: int) -> np.random.Generator:
 # the load squeezes away. TDC, TAC: the finger is cooled by what it touches. Bands and resolutions of the pressures are
 # those of the manual; the sensitivities are ours, in the order of magnitude of public recordings of slides at 10 N.
 
-# Points of the path in a slot: at 0.4 m/s and below the skin blurs what 4.4 kHz would fold down.
-BIOTAC_OVERSAMPLING = 1
-BIOTAC_PATH_RATE_HZ = BIOTAC_OVERSAMPLING * SLOT_RATE_HZ
+# A point of the path in a slot: at 0.4 m/s and below the skin blurs what 4.4 kHz would fold down.
+BIOTAC_PATH_RATE_HZ = SLOT_RATE_HZ
 PA_PER_N = 1500.0  # fluid pressure
 PAC_PA, PDC_PA = 0.37, 36.5  # of a count
 PAC_BASELINE, PDC_BASELINE = 2030.0, 2200.0  # PAC idles at mid-scale: 2020 to 2035 in the QuickStart Guide's sample
@@ -236,9 +235,7 @@ PAC_BAND = np.concatenate(
         filters.butter(2, 1040.0, 'lowpass', fs=BIOTAC_PATH_RATE_HZ, output='sos'),
     ]
 )
-PAC_POINTS = slice(
-    2 * BIOTAC_OVERSAMPLING - 1, None, 2 * BIOTAC_OVERSAMPLING
-)  # PAC is sampled in every second slot, at its end
+PAC_POINTS = slice(1, None, 2)  # PAC is sampled in every second slot, at its end
 ELECTRODE_BASELINE = (2800.0, 3400.0)  # range of the electrodes without load
 ELECTRODE_COUNTS_PER_N = 400.0  # of the electrode under the load; falls off with the distance
 ELECTRODE_PITCH_M = 3e-3
@@ -312,7 +309,7 @@ class BioTacModel(SensorModel):
 
     def _frames(self, placed: Trajectory, pressure_pa: Array) -> Samples:
         """Return the slow channels at the start of each frame, (..., n_frames, n_slow_channels) counts."""
-        starts = slice(0, None, points_per_frame(self._layout))
+        starts = slice(0, None, len(self._layout.slots))
         at = placed.at(starts)
         pdc = PDC_BASELINE + pressure_pa[..., starts, None] / PDC_PA
         electrodes = np.swapaxes(self._electrodes(at), -1, -2)
@@ -343,17 +340,12 @@ class BioTacModel(SensorModel):
         return self._baseline / (1 + load / self._baseline)
 
 
-def points_per_frame(layout: BioTacLayout) -> int:
-    """Return how many points of the path, at 4.4 kHz, one frame takes."""
-    return BIOTAC_OVERSAMPLING * len(layout.slots)
-
-
 def biotac_kind(layout: BioTacLayout) -> SensorKind:
     """Return a kind of BioTac."""
     return SensorKind(
         make=partial(BioTacModel, layout=layout),
         path_rate_hz=BIOTAC_PATH_RATE_HZ,
-        step_points=points_per_frame(layout),
+        step_points=len(layout.slots),
         streams=(
             SimulatedStream('signal', biotac.PAC_SENSOR, (PAC,), biotac.UNIT, layout.pac_rate_hz, 1 / SLOT_RATE_HZ),
             SimulatedStream(
@@ -373,8 +365,7 @@ def biotac_kind(layout: BioTacLayout) -> SensorKind:
 DAQ_RATE_HZ = daq.RATE_HZ
 # A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
 # that 2.5 kHz would fold down; what is faster is blurred more (contact.py).
-DAQ_OVERSAMPLING = 1
-DAQ_PATH_RATE_HZ = DAQ_OVERSAMPLING * DAQ_RATE_HZ
+DAQ_PATH_RATE_HZ = DAQ_RATE_HZ
 FILMS, GAUGES = 4, 4
 ELEMENTS = FILMS + GAUGES
 DAQ_CHANNELS = tuple(
@@ -412,11 +403,11 @@ class DaqModel(SensorModel):
         Parameters
         ----------
         path
-            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample; a sample is taken at the last of its points.
+            Points at `PATH_RATE_HZ`, one a sample.
 
         Returns
         -------
-        (n_points / OVERSAMPLING, 8) counts: films then gauges, of each the outer ones first
+        (n_points, 8) counts: films then gauges, of each the outer ones first
         """
         return self._counts.counts(self._exact(path), np.int16)
 
@@ -425,8 +416,7 @@ class DaqModel(SensorModel):
         # The force that each element senses, (..., 8, n).
         pressed_n = placed.force_n[..., None, :] + self.touch.variation_n(placed, DAQ_BLUR_M, self._offset_m)
         pressed_n[..., :FILMS, :] = self._leak(pressed_n[..., :FILMS, :])
-        sensed_n = self._band(pressed_n)[..., DAQ_OVERSAMPLING - 1 :: DAQ_OVERSAMPLING]
-        return np.swapaxes(sensed_n, -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
+        return np.swapaxes(self._band(pressed_n), -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
 
 
 @lru_cache(maxsize=16)
@@ -440,7 +430,7 @@ def _elements(finger: int) -> tuple[tuple[Array, Array], Array]:
 DAQ_KIND = SensorKind(
     make=DaqModel,
     path_rate_hz=DAQ_PATH_RATE_HZ,
-    step_points=DAQ_OVERSAMPLING,
+    step_points=1,
     streams=(SimulatedStream(daq.TOPIC, daq.SENSOR, DAQ_CHANNELS, 'V', DAQ_RATE_HZ),),
 )
 
@@ -666,8 +656,8 @@ PAPILLARRAY_KIND = SensorKind(
 # The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses the
 # slow part. The gains are ours: the paper tells none.
 
-PVDF_OVERSAMPLING = 1  # at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more
-PVDF_PATH_RATE_HZ = PVDF_OVERSAMPLING * pvdf.FILM_RATE_HZ
+# A point a sample: at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more.
+PVDF_PATH_RATE_HZ = pvdf.FILM_RATE_HZ
 PC_PER_C = 1e12
 PVDF_LEAK = ChargeLeak(pvdf.RESISTANCE_OHM, pvdf.CAPACITANCE_F, pvdf.D33_PC_N / PC_PER_C)
 # Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
@@ -705,11 +695,11 @@ class PvdfModel(SensorModel):
         Parameters
         ----------
         path
-            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample of the film; a sample is taken at the last of its points.
+            Points at `PATH_RATE_HZ`, one a sample of the film.
 
         Returns
         -------
-        film : (n_points / OVERSAMPLING,) counts
+        film : (n_points,) counts
         force : (n_force,) counts
             Those whose time, at 64 Hz from the very first point on, lies in this piece.
         """
@@ -719,7 +709,7 @@ class PvdfModel(SensorModel):
 
     def _charge(self, force_n: Array) -> Samples:
         """Return the counts of the charge, (..., n_samples, 1)."""
-        charge_pc = pvdf.D33_PC_N * self._film(force_n)[..., PVDF_OVERSAMPLING - 1 :: PVDF_OVERSAMPLING, None]
+        charge_pc = pvdf.D33_PC_N * self._film(force_n)[..., None]
         return np.asarray(charge_pc / pvdf.FILM_PC_PER_COUNT)
 
     def _force(self, force_n: Array) -> Samples:
@@ -733,7 +723,7 @@ class PvdfModel(SensorModel):
 PVDF_KIND = SensorKind(
     make=PvdfModel,
     path_rate_hz=PVDF_PATH_RATE_HZ,
-    step_points=PVDF_OVERSAMPLING,
+    step_points=1,
     streams=(
         SimulatedStream(pvdf.FILM_TOPIC, pvdf.FILM_SENSOR, pvdf.FILM_CHANNELS, 'pC', pvdf.FILM_RATE_HZ),
         SimulatedStream(pvdf.FORCE_TOPIC, pvdf.FORCE_SENSOR, pvdf.FORCE_CHANNELS, 'N', pvdf.FORCE_RATE_HZ),
@@ -875,7 +865,7 @@ SENSORS: Mapping[str, SensorKind] = {
 
 
 # --------------------
-# Two fingers of a TSF-85 that slide together.
+# Fingers that slide together, each an individual that touches a place of its own.
 
 
 class JoinedContacts:
@@ -900,35 +890,44 @@ class JoinedContacts:
             contact.relocate()
 
 
-class Tsf85Pair:
-    """Two fingers of a TSF-85 that move as one, each an individual that touches a place of its own."""
+class JoinedFingers:
+    """The models of fingers that move as one.
 
-    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
-        self._models = [Tsf85Model(scene.of_finger(finger), surface, rng, finger=finger) for finger in (0, 1)]
-        self.touch = JoinedContacts([model.touch for model in self._models])
+    Parameters
+    ----------
+    models
+        One a finger, in their order.
+    join
+        Joins what they measure along a piece of path.
+    """
 
-    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        """Return what both measure along the next piece of path: (n_samples, 2) and (n_images, 2, n_taxels) counts."""
-        dynamic, images = zip(*(model.advance(path) for model in self._models), strict=True)
-        return np.stack(dynamic, axis=-1), np.stack(images, axis=1)
+    def __init__(self, models: Sequence[SensorModel], join: Callable[[Sequence[Any]], Any]) -> None:
+        self._models = models
+        self._join = join
+        self.touch = JoinedContacts([model.touch for model in models])
+
+    def advance(self, path: Trajectory) -> Any:
+        """Return what all measure along the next piece of path."""
+        return self._join([model.advance(path) for model in self._models])
 
 
-# --------------------
-# Three BioTacs on one board that slide together.
+def tsf85_pair(scene: Scene, surface: Surface, rng: np.random.Generator) -> JoinedFingers:
+    """Return two fingers of a TSF-85: they measure (n_samples, 2) and (n_images, 2, n_taxels) counts."""
+    models = [Tsf85Model(scene.of_finger(finger), surface, rng, finger=finger) for finger in (0, 1)]
+    return JoinedFingers(models, _join_pair)
+
+
+def _join_pair(measured: Sequence[tuple[NDArray[np.int16], NDArray[np.uint16]]]) -> tuple[Any, Any]:
+    dynamic, images = zip(*measured, strict=True)
+    return np.stack(dynamic, axis=-1), np.stack(images, axis=1)
+
 
 SERIALS = ('BT-0', 'BT-1', 'BT-2')  # by place
 
 
-class BioTacHand:
-    """BioTacs that move as one, each an individual that touches a place of its own."""
-
-    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> None:
-        self._models = [
-            BioTacModel(scene.of_finger(place), surface, rng, layout=layout, finger=place)
-            for place in range(len(SERIALS))
-        ]
-        self.touch = JoinedContacts([model.touch for model in self._models])
-
-    def advance(self, path: Trajectory) -> NDArray[np.uint16]:
-        """Return what all places measure along the next piece of path, (n_frames, n_slots, n_places) counts."""
-        return np.stack([model.advance(path) for model in self._models], axis=-1)
+def biotac_hand(scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> JoinedFingers:
+    """Return three BioTacs on one board: they measure (n_frames, n_slots, n_places) counts."""
+    models = [
+        BioTacModel(scene.of_finger(place), surface, rng, layout=layout, finger=place) for place in range(len(SERIALS))
+    ]
+    return JoinedFingers(models, partial(np.stack, axis=-1))
