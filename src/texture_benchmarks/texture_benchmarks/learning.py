@@ -207,5 +207,5 @@ def _chart(runs: Sequence[IncrementalRun], stages: Sequence[int], new: int, path
         )
         axes.set_xticks(stages, [f'{stage}' for stage in stages])
         axes.minorticks_off()
-        axes.legend(loc='lower right')
+        figure.legend(loc='outside lower center', ncols=2)  # the lines leave no corner free
     return path
