@@ -46,7 +46,7 @@ def test_an_unknown_kind_gets_the_nearest_one() -> None:
 def test_a_file_that_is_no_yaml_is_refused(tmp_path: Path) -> None:
     path = tmp_path / 'bad.yaml'
     path.write_text('surfaces: [')
-    with pytest.raises(InvalidParameter, match='no YAML'):
+    with pytest.raises(InvalidParameter, match='is not YAML that can be read'):
         load_scene(str(path))
 
 
