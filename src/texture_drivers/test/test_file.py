@@ -106,7 +106,7 @@ def test_rate_topic_and_unit_can_be_set(params):
     [
         ('{sped: 2}', InvalidParameter, "did you mean 'speed'"),
         ('{speed: -1}', InvalidParameter, 'allowed is 0.0 to 1000.0'),
-        ('{speed: ', InvalidParameter, 'no YAML'),
+        ('{speed: ', InvalidParameter, 'are not YAML'),
         ('[1, 2]', UnknownName, 'no settings'),
         ('nothing', UnknownName, 'Known: daq'),
     ],
