@@ -7,6 +7,7 @@ They hold and slide; whatever ends the command of motors ends their torque, and 
 import math
 import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -26,7 +27,6 @@ from texture_exploration.arms.dynamixel import (
     DynamixelFinger,
     DynamixelHand,
     MotorState,
-    torque_off_packet,
 )
 from texture_exploration.arms.hand import SimulatedHand, load_profile, read_profile
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
@@ -157,6 +157,8 @@ def test_a_cable_that_is_pulled_out_stops_the_motors(bus, hand):
     bus.unplug()
     until(lambda: 'cannot be reached' in fault_of(hand))
     until(lambda: all(table[WATCHDOG] == TRIPPED for table in bus.motors.tables.values()))
+    with pytest.raises(DeviceError, match='check that it is plugged in'):
+        hand.connect()
     bus.plug()
     hand.connect()
     until(lambda: fault_of(hand) == '')
@@ -339,6 +341,19 @@ def test_a_late_answer_to_a_ping_is_not_taken_for_a_position(bus, hand, monkeypa
     assert goals[0] == 2048  # where the motor is; three bytes of a pong and one of its checksum are another number
 
 
+def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_model_number(bus, hand, monkeypatch):
+    answer, asked = bus._one, []
+
+    def late(motor, instruction, params):
+        asked.append((motor, instruction))
+        position = answer(motor, READ, struct.pack('<HH', 132, 4)) if asked.count((1, PING)) == 1 else b''
+        return (position if (motor, instruction) == (1, PING) else b'') + answer(motor, instruction, params)
+
+    monkeypatch.setattr(bus, '_one', late)
+    hand.connect()  # not 'motor 1 is of model 2048', which is its position
+    until(lambda: fault_of(hand) == '')
+
+
 def test_two_motors_with_one_id_are_reported(bus, hand):
     bus.motors.twice = {5}
     hand.connect()
@@ -394,23 +409,24 @@ def test_the_guard_sends_what_the_sdk_would_send(tmp_path):
     with serial.Serial(os.ttyname(slave)):  # raw
         line = DynamixelBus(os.ttyname(slave), LEAP)
         line.torque_off(LEAP.ids)
-        assert os.read(master, 1000) == torque_off_packet(64, LEAP.ids)
+        assert os.read(master, 1000) == line.torque_off_packet()
         line.close()
     os.close(slave)
     os.close(master)
 
 
-@pytest.mark.parametrize('command', [ArmCommand(force_n=math.nan), ArmCommand(normal_m_s=-5.0)])
 @pytest.mark.parametrize('kind', ['simulated', 'dynamixel'])
-def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand, kind, command):
-    """What is refused is in test_command_limits."""
+def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand, kind):
     tested = hand if kind == 'dynamixel' else SimulatedHand()
     tested.connect()
-    with pytest.raises(CommandRefused, match='was refused and the arm stopped: the '):
-        tested.command(['index'], command)
-    if command.force_n is not None:
+    for force_n in (math.nan, math.inf, -1.0, 60.0):
         with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
-            tested.grip({'index': command.force_n})
+            tested.command(['index'], ArmCommand(force_n=force_n))
+        with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
+            tested.grip({'index': force_n})
+    for command in (ArmCommand(tangential_m_s=(math.nan, 0.0)), ArmCommand(normal_m_s=-5.0)):
+        with pytest.raises(CommandRefused, match='was refused and the arm stopped: the speed'):
+            tested.command(['index'], command)
     before = tested.state().time_ns
     until(lambda: tested.state().time_ns > before and tested.state().fault == '')
     tested.close()
@@ -434,7 +450,8 @@ def rub(arm):
 
     explorer = Explorer(
         arm,
-        TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_share=20.0, mean_speed_share=1.0),  # when busy
+        # The emulated bus makes up for up to 0.1 s that a busy machine lost: seen over 30 ms, up to 4.3 times as fast.
+        TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_share=3.4),
         SafetyLimits(state_timeout_s=1.0),
         note,
     )
@@ -516,14 +533,16 @@ def test_motors_that_do_not_answer_are_let_go_too(bus):
     line.close()
 
 
-def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_measurement(bus):
+@pytest.mark.parametrize('size', [1, 40])  # as of the register of errors, and of all from the torque to the goal
+def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_measurement(bus, size):
     line = DynamixelBus(str(bus.port.link), LEAP)
     line.start()
-    late, receive = [bus._status(LEAP.ids[0], bytes(1))], bus.receive  # one byte, as of its register of errors
+    late, receive = [bus._status(LEAP.ids[0], bytes(size))], bus.receive
     bus.receive = lambda data: (late.pop() if late else b'') + receive(data)
-    assert line.read() == {}
+    motors = line.read()
     assert line.missing == set()
-    assert set(line.read()) == set(LEAP.ids)
+    assert set(motors) == set(LEAP.ids)
+    assert motors[LEAP.ids[0]].position_rad == pytest.approx(0.0, abs=0.01)  # zeros would be a turn of -180 degrees
     line.close()
 
 
@@ -557,6 +576,7 @@ def test_a_hand_of_another_model_or_without_power_is_reported(bus, monkeypatch):
     monkeypatch.setattr('texture_exploration.arms.dynamixel.TRIES', 2)
     with pytest.raises(DeviceError, match=r"is of model 1240 .*; the profile 'xm430' is for"):
         DynamixelHand('xm430', str(bus.port.link)).connect()
+    assert torque_is_off(bus)
     bus.motors.absent = set(LEAP.ids)
     with pytest.raises(DeviceError, match='no motor answers'):
         DynamixelHand('leap', str(bus.port.link)).connect()

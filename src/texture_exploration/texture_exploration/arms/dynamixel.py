@@ -50,6 +50,7 @@ WAIT_S = 0.001
 # A status packet: `FF FF FD 00 | id | length | 55 | error | parameters | CRC`; its length counts from the 55 on.
 PACKET_ID, PACKET_LENGTH, PACKET_PARAMETERS = 4, 5, 9
 NO_PARAMETERS = 4  # length of a status packet without parameters
+SYNC_WRITE, BROADCAST = 0x83, 0xFE  # instruction, and the id of all motors
 FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
@@ -183,14 +184,17 @@ class DynamixelBus:
         """Set mode, limits and goals of a motor without torque; return whether it answers."""
         profile = self._profile
         self._reasons.pop(motor, None)
-        with self._line():
-            model, result, _ = self._packets.ping(self._port, motor)
+        model, result = self._ping(motor)
         self._garbled = result == self._sdk.COMM_RX_CORRUPT
         position = self.read_register(motor, 'present_position') if result == SUCCESS else None
         if position is None:
             if self._garbled:
                 self._reasons[motor] = f'{profile.owner(motor)} {GARBLED}'
             return False
+        if model not in profile.models:  # or a late answer to an earlier question was taken for one to this
+            model, result = self._ping(motor)
+            if result != SUCCESS:
+                return False
         if model not in profile.models:
             raise DeviceError(
                 f"{profile.owner(motor)} is of model {describe(model)}; the profile '{profile.name}' is for "
@@ -271,21 +275,21 @@ class DynamixelBus:
     def read(self) -> dict[int, MotorState]:
         """Return what all motors measure, {} if a cycle is lost; who does not answer is moved to `missing`."""
         asked = [motor for motor in self._profile.ids if motor not in self.missing]
-        group = self._sdk.GroupSyncRead(self._port, self._packets, *self._block)
-        for motor in asked:
-            group.addParam(motor)
+        measured: dict[int, MotorState] = {}
         with self._line():
-            result = group.txRxPacket() if asked else SUCCESS
-        if result != SUCCESS:
-            # They answer in turn: the first that is silent hides all that come after it.
-            silent = next(motor for motor in asked if not group.data_dict[motor])
-            if not self._answers(silent):
-                self.missing.add(silent)
-            return {}
-        # An answer that came too late for an earlier question is taken for one to this: it is shorter.
-        if any(len(group.data_dict[motor]) != group.data_length for motor in asked):
-            return {}
-        return {motor: self._measured(group, motor) for motor in asked}
+            result = self._packets.syncReadTx(self._port, *self._block, asked, len(asked), False) if asked else SUCCESS
+            for motor in asked if result == SUCCESS else ():
+                data, result = self._receive(motor, self._block[1])
+                if result != SUCCESS:
+                    break
+                measured[motor] = self._measured(data)
+        if result == SUCCESS:
+            return measured
+        # They answer in turn: the first that is silent hides all that come after it.
+        silent = next(motor for motor in asked if motor not in measured)
+        if not self._answers(silent):
+            self.missing.add(silent)
+        return {}
 
     def write_goals(self, goals: Mapping[int, tuple[float, float]]) -> None:
         """Send highest current (A; no more than the motor's limit) and position (rad) of motors."""
@@ -302,6 +306,14 @@ class DynamixelBus:
         """Let motors go, also those that do not answer: they may hear."""
         self._energised.difference_update(motors)
         self._sync_write('torque_enable', dict.fromkeys(motors, 0))
+
+    def torque_off_packet(self) -> bytes:
+        """Return the instruction packet (sync write, protocol 2.0) that lets all motors go, for who has no SDK."""
+        address, _ = self._profile.table['torque_enable']
+        params = address.to_bytes(2, 'little') + b'\x01\x00' + b''.join(bytes([m, 0]) for m in self._profile.ids)
+        body = bytes([SYNC_WRITE]) + params
+        packet = b'\xff\xff\xfd\x00' + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, 'little') + body
+        return packet + self._packets.updateCRC(0, packet, len(packet)).to_bytes(2, 'little')
 
     def let_go(self) -> None:
         """Let all motors go and see that they did, as far as they can be reached; raises nothing that a line does."""
@@ -410,19 +422,24 @@ class DynamixelBus:
         return None
 
     def _read_block(self, motor: int, address: int, size: int) -> tuple[bytes, int]:
-        """Return `size` bytes of a motor's table, and the result of the SDK.
-
-        The SDK cuts its data out of any packet of the motor, and out of the checksum if the packet is too short. The
-        late answer to an earlier question, such as a ping, would be taken for a position or a current limit.
-        """
+        """Return `size` bytes of a motor's table, and the result of the SDK."""
         with self._line():
             result = self._packets.readTx(self._port, motor, address, size)
-            while result == SUCCESS:
-                packet, result = self._packets.rxPacket(self._port, False)
-                if result == SUCCESS and packet[PACKET_ID] == motor:
-                    length = packet[PACKET_LENGTH] + (packet[PACKET_LENGTH + 1] << 8)
-                    if length == size + NO_PARAMETERS:
-                        return bytes(packet[PACKET_PARAMETERS : PACKET_PARAMETERS + size]), result
+            return self._receive(motor, size) if result == SUCCESS else (b'', result)
+
+    def _receive(self, motor: int, size: int) -> tuple[bytes, int]:
+        """Return the `size` bytes that a motor answers next, and the result of the SDK; what is no such answer goes by.
+
+        The SDK cuts its data out of any packet of the motor, whether it is too long or too short. The late answer to an
+        earlier question, such as a ping or how the motor is, would be taken for a position or a current limit.
+        """
+        result = SUCCESS
+        while result == SUCCESS:
+            packet, result = self._packets.rxPacket(self._port, False)
+            if result == SUCCESS and packet[PACKET_ID] == motor:
+                length = packet[PACKET_LENGTH] + (packet[PACKET_LENGTH + 1] << 8)
+                if length == size + NO_PARAMETERS:
+                    return bytes(packet[PACKET_PARAMETERS : PACKET_PARAMETERS + size]), result
         return b'', result
 
     def _answers(self, motor: int) -> bool:
@@ -430,12 +447,19 @@ class DynamixelBus:
             # That all were asked at once was the first try.
             return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES - 1))
 
-    def _measured(self, group: Any, motor: int) -> MotorState:
+    def _ping(self, motor: int) -> tuple[int, int]:
+        """Return the model number that a motor tells, and the result of the SDK."""
+        with self._line():
+            model, result, _ = self._packets.ping(self._port, motor)
+        return model, result
+
+    def _measured(self, data: bytes) -> MotorState:
         profile = self._profile
 
         def value(register: str) -> int:
             address, size = profile.table[register]
-            return signed(group.getData(motor, address, size), size)
+            at = address - self._block[0]
+            return int.from_bytes(data[at : at + size], 'little', signed=True)
 
         return MotorState(
             current_a=value('present_current') * profile.current_a,
@@ -477,8 +501,7 @@ def signed(value: int, size: int) -> int:
 
 # --------------------
 # A process that switches the torque of the motors off when the process that commanded them is gone.
-#
-SYNC_WRITE, BROADCAST = 0x83, 0xFE
+
 REPEATS = 5  # nobody answers a sync write; one may meet what was still on the line
 PAUSE_S = 0.02
 
@@ -491,29 +514,11 @@ class TorqueGuard(GuardProcess):
     device, baud
         Line of the motors.
     packet
-        What to write to it, see `torque_off_packet`.
+        What to write to it, see `DynamixelBus.torque_off_packet`.
     """
 
     def __init__(self, device: str, baud: int, packet: bytes) -> None:
         super().__init__(__name__, device, str(baud), packet.hex())
-
-
-def torque_off_packet(address: int, motors: Iterable[int]) -> bytes:
-    """Return the instruction packet (sync write, protocol 2.0) that writes 0 to one byte at `address` of motors."""
-    params = address.to_bytes(2, 'little') + b'\x01\x00' + b''.join(bytes([motor, 0]) for motor in motors)
-    body = bytes([SYNC_WRITE]) + params
-    packet = b'\xff\xff\xfd\x00' + bytes([BROADCAST]) + (len(body) + 2).to_bytes(2, 'little') + body
-    return packet + crc16(packet).to_bytes(2, 'little')
-
-
-def crc16(data: bytes) -> int:
-    """Return the checksum of protocol 2.0: polynomial 8005, start 0, not reflected."""
-    value = 0
-    for byte in data:
-        value ^= byte << 8
-        for _ in range(8):
-            value = ((value << 1) ^ 0x8005 if value & 0x8000 else value << 1) & 0xFFFF
-    return value
 
 
 def main() -> None:
@@ -698,8 +703,7 @@ class DynamixelHand:
         bus = guard = None
         try:
             bus = DynamixelBus(self._device, self.profile)
-            off = torque_off_packet(self.profile.table['torque_enable'][0], self.profile.ids)
-            guard = TorqueGuard(self._device, self.profile.baud, off)
+            guard = TorqueGuard(self._device, self.profile.baud, bus.torque_off_packet())
             self._highest_a = bus.limits_a
             bus.start()
             self._doubt = self._doubtful(bus.deaf)
