@@ -11,7 +11,7 @@ from unittest import mock
 
 import pytest
 
-from texture_core.errors import CommandRefused
+from texture_core.errors import CommandRefused, DeviceError
 from texture_core.ros_testing import NodeProcess
 from texture_exploration.arms.arm import Arm, ArmCommand
 from texture_exploration.arms.catalogue import ARMS
@@ -99,8 +99,10 @@ def test_a_command_out_of_range_is_refused_and_the_arm_stands_still(arm):
         ArmCommand(tangential_m_s=(math.nan, 0.0)),
         ArmCommand(tangential_m_s=(0.0, math.inf)),
         ArmCommand(tangential_m_s=(5.0, 0.0)),
+        ArmCommand(normal_m_s=math.inf),
         ArmCommand(normal_m_s=-5.0),
         ArmCommand(force_n=-1.0),
+        ArmCommand(force_n=1000.0),
         ArmCommand(force_n=math.nan),
     ]
     for command in refused:
@@ -111,8 +113,10 @@ def test_a_command_out_of_range_is_refused_and_the_arm_stands_still(arm):
     assert arm.state().fault == ''
 
 
-def test_closing_twice_and_connecting_again_is_no_fault(arm):
+def test_a_closed_arm_refuses_commands_and_closing_twice_and_connecting_again_is_no_fault(arm):
     arm.close()
+    with pytest.raises(DeviceError, match='not connected'):
+        arm.command(ArmCommand(tangential_m_s=(0.01, 0.0)))
     arm.close()
     arm.connect()
     before = arm.state().time_ns

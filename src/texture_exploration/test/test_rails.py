@@ -72,10 +72,8 @@ def test_an_overload_lifts_the_finger_and_is_a_fault_until_cleared(rails, arm):
 
 def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):
     states = []
-    # Emulated rails make up for time that a busy machine lost, fast for a moment: the speed is measured below.
-    explorer = Explorer(
-        arm, TouchParams(peak_speed_share=20.0, mean_speed_share=1.0), SafetyLimits(state_timeout_s=1.0), states.append
-    )
+    # Emulated rails make up for up to 0.1 s that a busy machine lost: seen over 30 ms, up to 4.3 times as fast.
+    explorer = Explorer(arm, TouchParams(peak_speed_share=3.4), SafetyLimits(state_timeout_s=1.0), states.append)
     explorer.connect()
     request = ExplorationRequest('linear_slide', speed_m_s=0.0255, force_n=1.5, distance_m=0.02)
     exploration = explorer.begin('one', request)
@@ -92,6 +90,19 @@ def test_bytes_lost_on_the_line_are_counted_and_survived(rails, arm):
     until(lambda: arm.counts['bad_frames'] > 3)
     before = arm.state().time_ns
     until(lambda: arm.state().time_ns > before)
+
+
+def test_unplugged_rails_are_reported_and_can_be_connected_again(rails, arm):
+    rails.unplug()
+    with pytest.raises(DeviceError, match='cannot be reached'):
+        until(lambda: not arm.state())
+    with pytest.raises(DeviceError, match='cannot be reached'):
+        arm.command(SLIDING)
+    with pytest.raises(DeviceError, match='check that they are plugged in'):
+        arm.connect()
+    rails.plug()
+    arm.connect()
+    assert arm.state().fault == ''
 
 
 def test_a_silent_device_is_reported(rails):
