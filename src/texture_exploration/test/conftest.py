@@ -17,6 +17,7 @@ from texture_exploration.stages import TouchParams
 ROS_TESTS = [
     'test_explorer_node.py',
     'test_explore_preset.py',
+    'test_interrupted_controller.py',
     'test_ros_controllers_process.py',
     'test_services_page.py',
 ]
