@@ -7,7 +7,7 @@ import pytest
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.motions import MOTIONS
-from texture_exploration.stages import LiftFirst, TouchParams
+from texture_exploration.stages import TouchParams
 
 TOUCH = TouchParams()
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.03)
@@ -21,9 +21,7 @@ def lifting_first(monkeypatch):
     monkeypatch.setitem(
         MOTIONS,
         'linear_slide',
-        lambda request, home, touch, limits: LiftFirst(
-            plan(request, home, touch, limits), touch, limits, lambda: zeroed[0]
-        ),
+        lambda *planned: plan(*planned).lift_first(lambda: zeroed[0]),
     )
     return zeroed
 

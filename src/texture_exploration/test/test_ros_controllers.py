@@ -23,7 +23,7 @@ from texture_exploration.arms.ros_controllers import RosControllersParams as Par
 from texture_exploration.explorer import Exploration, Explorer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import LiftFirst, TouchParams
+from texture_exploration.stages import TouchParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 PERIOD_NS = 4_000_000
@@ -136,7 +136,7 @@ class Robot:
             'one',
             request,
             arm=self.driven,
-            motion=LiftFirst(motion, touch, limits, lambda: self.driven.zeroed),
+            motion=motion.lift_first(lambda: self.driven.zeroed),
             limits=limits,
             clock=lambda: self.now_ns,
             on_state=note,

@@ -39,7 +39,7 @@ from texture_exploration.arms.ur import (
 from texture_exploration.explorer import Exploration, Explorer, Pacer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import REACTION_S, LiftFirst, TouchParams
+from texture_exploration.stages import REACTION_S, TouchParams
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = [
@@ -702,7 +702,7 @@ def test_a_wall_in_the_slide_and_on_the_way_to_the_start_is_met_gently_and_left_
             'one',
             request,
             arm=arm,
-            motion=LiftFirst(motion, touch, limits, lambda: arm.zeroed),
+            motion=motion.lift_first(lambda: arm.zeroed),
             limits=limits,
             clock=time.monotonic_ns,
             on_state=lambda state: None,

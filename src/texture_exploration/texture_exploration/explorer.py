@@ -52,7 +52,7 @@ from texture_exploration.safety import (
     SafetyLimits,
     SurfacePatch,
 )
-from texture_exploration.stages import LiftFirst, Motion, MotionStep, Rise, TouchParams
+from texture_exploration.stages import Motion, MotionStep, Rise, TouchParams
 
 # --------------------
 # Collect the estimates of one exploration.
@@ -890,7 +890,7 @@ class Explorer:
             except MotionRefused as error:
                 raise MotionRefused(f'{error}; the workspace of a request with a start is the surface patch') from error
         if self._lift_first:
-            motion = LiftFirst(motion, self.touch, self.limits, lambda: self.arm.zeroed)
+            motion.lift_first(lambda: self.arm.zeroed)
         return Exploration(
             exploration_id,
             request,

@@ -32,7 +32,6 @@ from texture_exploration.stages import (
     SettleForceStage,
     SlideStage,
     Stage,
-    StagedMotion,
     TouchParams,
     lead_m,
     ramps_m,
@@ -45,7 +44,7 @@ from texture_exploration.stages import (
 
 def plan_surface_slide(
     follower: Follower, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits
-) -> StagedMotion:
+) -> Motion:
     """Return the motion along a path, for a request whose speed and force are filled in and checked.
 
     Parameters
@@ -63,7 +62,7 @@ def plan_surface_slide(
 
     Returns
     -------
-    StagedMotion
+    Motion
         Go there, touch, press, speed up, slide, brake and lift.
     """
     speed, force = request.speed_m_s, request.force_n
@@ -87,7 +86,7 @@ def plan_surface_slide(
         BrakeStage(along),
         LiftStage(home, force, touch, limits),
     ]
-    return StagedMotion(stages, slide, seek if touch.seek_lost_contact else None)
+    return Motion(stages, slide, seek if touch.seek_lost_contact else None)
 
 
 # --------------------

@@ -370,7 +370,7 @@ class TouchParams:
 
 
 # --------------------
-# What every motion can do, and how it is planned.
+# One step of a motion.
 
 
 @dataclass(frozen=True)
@@ -386,41 +386,6 @@ class MotionStep:
     steady_s: float
     direction_rad: float
     progress: float
-
-
-class Motion(Protocol):
-    """One planned exploration. Knows no clock and no arm: it is stepped with the time and the state of the arm."""
-
-    def step(self, time_ns: int, arm: ArmState) -> MotionStep:
-        """Return what to do at `time_ns` (CLOCK_MONOTONIC), until the phase is DONE or ABORTED."""
-
-    def abort(self, reason: str) -> None:
-        """Lift the finger along the normal and end as ABORTED, from any phase; the first reason counts."""
-
-    def finish(self, reason: str) -> None:
-        """End the slide early, but not before the guaranteed time is over, and go on to DONE."""
-
-    @property
-    def force_n(self) -> float:
-        """The wanted force of the slide."""
-
-    @property
-    def lifted(self) -> bool:
-        """Whether the finger was lifted at the end, and the measured force says so."""
-
-    @property
-    def message(self) -> str:
-        """What happened, in one sentence."""
-
-    @property
-    def error(self) -> ExplorationError:
-        """Why the motion itself aborted; NONE if it did not, or was told to."""
-
-
-# Plans a motion from a request, whose numbers of 0 take the default; the place where the slide begins and to which
-# height it lifts, m, in the frame of the surface; how the finger touches; and what is allowed. MotionRefused if a
-# number is out of its range or does not belong to this motion, or the path leaves the workspace.
-Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
 
 
 # --------------------
@@ -945,8 +910,7 @@ class SlideStage(Stage):
     def __init__(self, along: Along) -> None:
         planned_s = along.follower.length_m / along.speed_m_s
         super().__init__(Phase.SLIDE, planned_s + along.limits.slide_overtime_s, 'the slide to end')
-        self._along = along
-        self.force_n = along.force_n
+        self.along = along
         self._stall = StallWatch(along.touch)
         self._watch = SlideWatch(along.speed_m_s, along.force_n, along.touch)
         self._start_m: float | None = None
@@ -957,7 +921,7 @@ class SlideStage(Stage):
     @property
     def direction_rad(self) -> float:
         """Present direction of travel."""
-        return self._along.follower.direction_rad
+        return self.along.follower.direction_rad
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """The slide counts from here, also if it goes on later after the contact was lost."""
@@ -965,8 +929,8 @@ class SlideStage(Stage):
         self._stall.restart()
         self._watch.restart()
         if self._start_m is None:
-            self._start_m = self._along.follower.travelled_m
-            self._along.follower.begin_slide()
+            self._start_m = self.along.follower.travelled_m
+            self.along.follower.begin_slide()
 
     def finish(self) -> None:
         """End as soon as the guaranteed time is over."""
@@ -980,10 +944,10 @@ class SlideStage(Stage):
         MotionAborted
             At the end, if the slide was not what was asked for.
         """
-        self._along.follower.update(time_ns, arm)
+        self.along.follower.update(time_ns, arm)
         self.steady_s = 0.0
-        self._along.contact.update(arm)
-        steady_s = self._along.follower.steady_m / self._along.speed_m_s
+        self.along.contact.update(arm)
+        steady_s = self.along.follower.steady_m / self.along.speed_m_s
         as_asked = self._watch.update(arm, constant=steady_s > 0.0)
         left_s = self._left_s(time_ns, arm)
         # Anything shorter than a microsecond is rounding, not sliding.
@@ -991,20 +955,20 @@ class SlideStage(Stage):
             if flaw := self._watch.flaw():
                 raise MotionAborted(flaw)
             return None
-        if self._along.contact.touching and as_asked:
+        if self.along.contact.touching and as_asked:
             self.steady_s = min(STEADY_HORIZON_S, left_s, steady_s)
             self._steady_until_ns = max(self._steady_until_ns, time_ns + int(self.steady_s * 1e9))
-        velocity = self._along.follower.velocity(self._along.speed_m_s)
+        velocity = self.along.follower.velocity(self.along.speed_m_s)
         self._stall.update(arm, velocity)
-        return ArmCommand(velocity, force_n=self.force_n)
+        return ArmCommand(velocity, force_n=self.along.force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
         assert self._start_m is not None
         age_s = max(0.0, (time_ns - arm.time_ns) * 1e-9)
-        slid_m = self._along.follower.travelled_m - self._start_m + self._along.speed_m_s * age_s
-        length_m = self._along.follower.length_m
+        slid_m = self.along.follower.travelled_m - self._start_m + self.along.speed_m_s * age_s
+        length_m = self.along.follower.length_m
         self.progress = min(1.0, slid_m / length_m)
-        by_length = (length_m - slid_m) / self._along.speed_m_s
+        by_length = (length_m - slid_m) / self.along.speed_m_s
         return min(by_length, (self._steady_until_ns - time_ns) * 1e-9) if self._finish else by_length
 
 
@@ -1179,7 +1143,8 @@ class Rise(Stage):
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits, signed: bool = True) -> None:
         speed_m_s = touch.approach_m_s(force_n)
         longest_m = max(touch.approach_travel_m, 2 * touch.clearance_m)
-        super().__init__(Phase.APPROACH, limits.lift_timeout_s + longest_m / speed_m_s, 'the finger to be free')
+        phase = Phase.APPROACH if signed else Phase.LIFT
+        super().__init__(phase, limits.lift_timeout_s + longest_m / speed_m_s, 'the finger to be free')
         self._touch = touch
         self._speed_m_s, self._longest_m = speed_m_s, longest_m
         self._first = UNKNOWN_STATE
@@ -1340,110 +1305,7 @@ class CalmDown(Stage):
         return ArmCommand()
 
 
-class LiftFirst:
-    """A motion that begins with a lift and a rest; see `texture_exploration.stages.Motion`.
-
-    Parameters
-    ----------
-    motion
-        What follows.
-    touch, limits
-        How fast, and how far.
-    zeroed
-        Whether the force sensor of the arm can be believed once it stands still in free air.
-    """
-
-    def __init__(self, motion: Motion, touch: TouchParams, limits: SafetyLimits, zeroed: Callable[[], bool]) -> None:
-        self._motion = motion
-        self._touch, self._limits = touch, limits
-        self._zeroed = zeroed
-        force_n = motion.force_n
-        self._ahead: list[Stage] = [
-            Rise(force_n, touch, limits),
-            CalmDown(zeroed, force_n, touch, limits),
-        ]
-        self._stage: Stage | None = None
-        self._reason = ''  # why it ends before the motion has begun
-        self._error = ExplorationError.NONE
-        self._free = False
-
-    def step(self, time_ns: int, arm: ArmState) -> MotionStep:
-        """Return what to do now."""
-        while self._ahead:
-            stage = self._ahead[0]
-            command = self._try_stage(stage, time_ns, arm)
-            if command is not None:
-                phase = Phase.LIFT if self._reason else Phase.APPROACH
-                return MotionStep(command, phase, steady_s=0.0, direction_rad=0.0, progress=0.0)
-            if self._ahead[:1] == [stage]:
-                self._ahead = self._ahead[1:]
-        if self._reason:
-            return MotionStep(ArmCommand(), Phase.ABORTED, steady_s=0.0, direction_rad=0.0, progress=0.0)
-        return self._motion.step(time_ns, arm)
-
-    def abort(self, reason: str) -> None:
-        """Let the motion lift, and end as aborted; a force that is not zeroed yet must show free air by a rise."""
-        if not self._ahead or self._zeroed():
-            self._ahead = []
-            self._motion.abort(reason)
-        elif not self._reason:
-            self._end(reason, Rise(self._motion.force_n, self._touch, self._limits, signed=False))
-
-    def finish(self, reason: str) -> None:
-        """End the slide early."""
-        self._motion.finish(reason)
-
-    @property
-    def force_n(self) -> float:
-        """The wanted force of the slide."""
-        return self._motion.force_n
-
-    @property
-    def lifted(self) -> bool:
-        """Whether the finger was lifted at the end, and the measured force says so."""
-        return self._free if self._reason else self._motion.lifted
-
-    @property
-    def message(self) -> str:
-        """What happened, in one sentence."""
-        if not self._reason:
-            return self._motion.message
-        return self._reason if self._free else f'{self._reason}; the finger was not lifted'
-
-    @property
-    def error(self) -> ExplorationError:
-        """Why the motion itself aborted; NONE if it did not, or was told to."""
-        return self._error or self._motion.error
-
-    def _end(self, reason: str, *stages: Stage) -> None:
-        """End after some stages; the motion does not begin."""
-        self._reason = self._reason or reason
-        self._ahead, self._stage = [*stages], None
-
-    def _try_stage(self, stage: Stage, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Return the command of a stage; None if it is over or cannot go on."""
-        if stage is not self._stage:
-            self._stage = stage
-            stage.begin(time_ns, arm)
-        try:
-            return stage.timed_step(time_ns, arm)
-        except MotionAborted as trouble:
-            self._give_way(stage, trouble)
-            return None
-        finally:
-            self._free = stage.free if isinstance(stage, Rise) else self._free
-
-    def _give_way(self, stage: Stage, trouble: MotionAborted) -> None:
-        """End in the way that is left: back, further up, by the lift of the motion, or where the finger is."""
-        reason, self._error = str(trouble), self._error or trouble.error
-        if isinstance(trouble, WrongWay):
-            self._end(reason, GoBack(trouble.before_n, self._touch))
-        elif isinstance(trouble, WrongSign):
-            self._end(reason, Rise(self._motion.force_n, self._touch, self._limits, signed=False))
-        elif isinstance(stage, CalmDown):
-            self.abort(reason)
-        else:
-            self._end(reason)
+AHEAD = (Rise, CalmDown, GoBack)  # the stages of a motion that lifts first
 
 
 # --------------------
@@ -1452,8 +1314,10 @@ class LiftFirst:
 SEEKS = 3  # a surface that is lost more often is not one to slide on
 
 
-class StagedMotion:
-    """Go through the stages; on any error go to the last one, which lifts the finger.
+class Motion:
+    """One planned exploration: go through the stages; on any error go to the last one, which lifts the finger.
+
+    It knows no clock and no arm: it is stepped with the time and the state of the arm.
 
     Parameters
     ----------
@@ -1464,6 +1328,11 @@ class StagedMotion:
     seek
         Returns new stages that bring the finger back to the surface and to its speed after the contact was lost while
         it moved along; without it a lost contact aborts.
+
+    Attributes
+    ----------
+    error
+        Why the motion itself aborted; NONE if it did not, or was told to.
     """
 
     def __init__(
@@ -1478,13 +1347,33 @@ class StagedMotion:
         self._phase = Phase.IDLE
         self._abort_reason = ''
         self._finish_reason = ''
+        self._zeroed: Callable[[], bool] | None = None  # while the stages ahead of the motion lift first
+        self._ended_ahead = self._free_ahead = False  # it ends by them, and whether the finger was free in them
         self.error = ExplorationError.NONE
 
+    def lift_first(self, zeroed: Callable[[], bool]) -> Motion:
+        """Begin with a lift and a rest, and return itself.
+
+        Parameters
+        ----------
+        zeroed
+            Whether the force sensor of the arm can be believed once it stands still in free air.
+        """
+        along = self._slide.along
+        self._zeroed = zeroed
+        self._remaining_stages[:0] = [self._rise(), CalmDown(zeroed, along.force_n, along.touch, along.limits)]
+        return self
+
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
-        """Return what to do now; a stage that is over hands on to the next within the same step."""
+        """Return what to do at `time_ns` (CLOCK_MONOTONIC), until the phase is DONE or ABORTED.
+
+        A stage that is over hands on to the next within the same step.
+        """
         command = self._try_stage(time_ns, arm)
         while command is None and self._remaining_stages:
             self._stage = self._remaining_stages.pop(0)
+            if not isinstance(self._stage, AHEAD):
+                self._zeroed = None
             self._stage.begin(time_ns, arm)
             command = self._try_stage(time_ns, arm)
         if self._stage is None or command is None:
@@ -1503,12 +1392,19 @@ class StagedMotion:
         )
 
     def abort(self, reason: str) -> None:
-        """Go on with the last stage, which lifts; the first reason counts."""
+        """Lift the finger along the normal and end as ABORTED, from any phase; the first reason counts.
+
+        As long as the force is not zeroed, a finger that lifts first must show free air by a rise.
+        """
         if self._phase in (Phase.DONE, Phase.ABORTED):
+            return
+        if self._zeroed is not None and not self._zeroed():
+            if not self._abort_reason:
+                self._end_ahead(reason, self._rise(signed=False))
             return
         self._abort_reason = self._abort_reason or reason
         if self._stage is not self._lift:
-            self._stage, self._remaining_stages = None, [self._lift]
+            self._stage, self._remaining_stages = None, [] if self._ended_ahead else [self._lift]
 
     def finish(self, reason: str) -> None:
         """End the slide as soon as the guaranteed time is over; without effect before and after it."""
@@ -1519,17 +1415,25 @@ class StagedMotion:
     @property
     def force_n(self) -> float:
         """The wanted force of the slide."""
-        return self._slide.force_n
+        return self._slide.along.force_n
 
     @property
     def lifted(self) -> bool:
         """Whether the finger was lifted at the end, and the measured force says so."""
+        if self._ended_ahead:
+            return self._free_ahead
         return isinstance(self._lift, LiftStage) and self._lift.free
 
     @property
     def message(self) -> str:
         """What happened, in one sentence."""
+        if self._ended_ahead and not self._free_ahead:
+            return f'{self._abort_reason}; the finger was not lifted'
         return self._abort_reason or self._finish_reason or 'the motion ended as asked'
+
+    def _rise(self, signed: bool = True) -> Rise:
+        along = self._slide.along
+        return Rise(along.force_n, along.touch, along.limits, signed)
 
     def _try_stage(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command of the present stage; None if it is over, cannot go on, or there is none."""
@@ -1539,14 +1443,34 @@ class StagedMotion:
         try:
             return stage.timed_step(time_ns, arm)
         except MotionAborted as error:
-            if stage is self._lift:
-                before = f'{self._abort_reason}; ' if self._abort_reason else ''
-                self._abort_reason = f'{before}the finger was not lifted: {error}'
-                self.error = self.error or error.error
-            elif not self._sought(error, stage):
-                self.error = self.error or error.error
-                self.abort(str(error))
+            self._give_way(stage, error)
             return None
+        finally:
+            if isinstance(stage, Rise):
+                self._free_ahead = stage.free
+
+    def _give_way(self, stage: Stage, error: MotionAborted) -> None:
+        """Go on in the way that is left: back, further up, to the surface, by the lift, or stay where the finger is."""
+        if self._sought(error, stage):
+            return
+        reason, self.error = str(error), self.error or error.error
+        if stage is self._lift:
+            before = f'{self._abort_reason}; ' if self._abort_reason else ''
+            self._abort_reason = f'{before}the finger was not lifted: {reason}'
+        elif isinstance(error, WrongWay):
+            self._end_ahead(reason, GoBack(error.before_n, self._slide.along.touch))
+        elif isinstance(error, WrongSign):
+            self._end_ahead(reason, self._rise(signed=False))
+        elif isinstance(stage, (Rise, GoBack)):
+            self._end_ahead(reason)
+        else:
+            self.abort(reason)
+
+    def _end_ahead(self, reason: str, *stages: Stage) -> None:
+        """End after some stages; what follows does not begin."""
+        self._abort_reason = self._abort_reason or reason
+        self._ended_ahead = True
+        self._stage, self._remaining_stages = None, [*stages]
 
     def _sought(self, error: MotionAborted, stage: Stage) -> bool:
         """Put the stages ahead that bring a lost contact back; return whether there are any."""
@@ -1558,3 +1482,9 @@ class StagedMotion:
         again = [stage] if stage is self._slide else []
         self._stage, self._remaining_stages = None, [*self._seek(), *again, *self._remaining_stages]
         return True
+
+
+# Plans a motion from a request, whose numbers of 0 take the default; the place where the slide begins and to which
+# height it lifts, m, in the frame of the surface; how the finger touches; and what is allowed. MotionRefused if a
+# number is out of its range or does not belong to this motion, or the path leaves the workspace.
+Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
