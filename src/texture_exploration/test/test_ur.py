@@ -201,8 +201,8 @@ def _answer_version(connection):
 def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, record_property):
     phases = []
     explorer = Explorer(
-        UrArm(UrArmParams(ip=emulator.ip)),
-        TouchParams(peak_speed_share=20.0),  # emulated, it makes up for lost time; the speed is measured below
+        UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0)),
+        TouchParams(peak_speed_share=3.4),  # emulated, it makes up for up to 0.1 s; the speed is measured below
         SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
     )
@@ -286,15 +286,17 @@ def test_connecting_releases_a_protective_stop_only_if_it_is_reported_to(arm, em
 
 def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, emulator, record_property):
     keep(arm, SLIDING, emulator.moves)
-    with Ticker() as ticker:
-        emulator.controller.freeze()
-        last_ns = emulator.fingers[-1].time_ns
-        keep(arm, SLIDING, lambda: faulty(arm))
-        silent_s = (time.monotonic_ns() - last_ns) * 1e-9
-    record_property('detected_s', silent_s)
-    assert 'silent' in faulty(arm)
-    assert 0.1 <= silent_s < 0.15 + ticker.worst_s
-    emulator.controller.resume()
+    try:
+        with Ticker() as ticker:
+            emulator.controller.freeze()
+            last_ns = emulator.fingers[-1].time_ns
+            keep(arm, SLIDING, lambda: faulty(arm))
+            silent_s = (time.monotonic_ns() - last_ns) * 1e-9
+        record_property('detected_s', silent_s)
+        assert 'silent' in faulty(arm)
+        assert 0.1 <= silent_s < 0.15 + ticker.worst_s
+    finally:
+        emulator.controller.resume()
     wait_for(lambda: faulty(arm) == '' and emulator.rests())
     keep(arm, SLIDING, emulator.moves)
 
@@ -515,6 +517,37 @@ def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move():
         keep(arm, SLIDING, emulator.moves)
 
 
+def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_presses_as_asked():
+    request = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=3.0, distance_m=0.02)
+    sliding = threading.Event()
+    slides = []
+
+    def on_state(state):
+        if state.phase is Phase.SLIDE:
+            sliding.set()
+            slides.append(state.stamp_ns)
+
+    with bench_at('127.0.0.73', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
+        arm = UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0))  # a busy machine is not what is tested here
+        explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), on_state)
+        explorer.connect()
+        try:
+            stopped = explorer.begin('one', request)
+            assert sliding.wait(DEADLINE_S)
+            emulator.controller.ask('emulate protective stop')
+            assert stopped.ended.wait(DEADLINE_S)
+            assert 'protective stop' in stopped.outcome.message
+            explorer.recover()
+            slides.clear()
+            again = explorer.begin('two', request)
+            assert again.ended.wait(DEADLINE_S)
+            assert again.outcome.success, (again.outcome.message, explorer.arm_counts())
+        finally:
+            explorer.close()
+        forces = [finger.force_n for finger in emulator.fingers if slides[0] <= finger.time_ns <= slides[-1]]
+        assert sum(forces) / len(forces) == pytest.approx(3.0, rel=0.1)
+
+
 @pytest.fixture(scope='module')
 def shared():
     """Return a emulator and a connected arm, for faults that leave both whole."""
@@ -579,9 +612,8 @@ DEAFNESS = {
 }
 
 
-@pytest.mark.parametrize(
-    ('what', 'late_s'), [*zip(DEAFNESS, (0.4, 0.0, 0.4), strict=True), (next(iter(DEAFNESS)), 0.0)]
-)
+@pytest.mark.parametrize('what', DEAFNESS)
+@pytest.mark.parametrize('late_s', [0.0, 0.4])
 def test_an_approach_that_hears_nothing_from_the_contact_on_presses_little_harder_than_asked(what, late_s):
     """Asked: 1.5 times the wanted force; a busy machine may hold the emulated watchdog up for another 0.1 s."""
     with bench_at('127.0.0.83', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
