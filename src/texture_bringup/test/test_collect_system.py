@@ -2,6 +2,7 @@
 """The collector and `texture check` on the emulated rig, over a sample that varies."""
 
 import os
+import re
 from dataclasses import asdict, replace
 
 import pytest
@@ -92,7 +93,7 @@ def request_of(params, surface, folder):
 
 
 def test_a_collection_that_is_cancelled_keeps_its_slides_and_an_untaught_patch_is_named(collector, operator, folder):
-    request = request_of(replace(QUICK, places=3, most_places=9), 'suede', folder)
+    request = request_of(replace(QUICK, places=3, most_places=9, bound=0.01), 'suede', folder)
     client, slides = ActionClient(collector.peer, action.Collect, 'collect'), []
     collector.until(client.server_is_ready)
     sent = client.send_goal_async(
@@ -121,4 +122,5 @@ def test_the_finger_is_checked_by_a_slide_over_the_plate(operator, folder, capsy
     assert main(['check', model, '--store', *PLATE]) == 0
     assert 'is stored as the reference of the finger' in capsys.readouterr().out
     assert main(['check', model, *PLATE]) == 0
-    assert 'as trained' in capsys.readouterr().out  # a short approach leaves noise and drift unmeasured
+    # A short approach leaves noise and drift unmeasured.
+    assert re.search(r'(the finger is|gain and response are) as trained', capsys.readouterr().out)
