@@ -95,15 +95,25 @@ def test_a_stop_ends_every_node_and_what_nodes_started(launch) -> None:
     assert any(line.startswith('[good] ready') for line in launched.lines)
 
 
-def test_a_second_ctrl_c_goes_on_to_sigterm_at_once(launch) -> None:
-    launched = launch({'stubborn': STUBBORN})
+def test_further_ctrl_c_leave_a_node_its_time_to_lift_the_finger(launch) -> None:
+    script = 'trap "sleep 1; echo lifted; exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'
+    launched = launch({'lifting': script})
     launched.ready()
-    launched.process.send_signal(signal.SIGINT)
-    launched.wait_for('SIGINT to stubborn')
-    begin = time.monotonic()
-    launched.process.send_signal(signal.SIGINT)
+    for _ in range(4):
+        launched.process.send_signal(signal.SIGINT)
+        time.sleep(0.1)
     assert launched.end() == 0
-    assert time.monotonic() - begin < 4.0
+    assert any('lifted' in line for line in launched.lines)
+    assert not any('SIGTERM to' in line for line in launched.lines)
+
+
+def test_a_node_that_had_to_be_killed_fails_the_launch_and_the_finger_is_named(launch) -> None:
+    launched = launch({'deaf': 'trap "" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'})
+    pid = launched.ready()
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 1
+    assert gone(pid)
+    assert any('whether the finger still presses' in line for line in launched.lines)
 
 
 def test_a_python_node_that_is_still_importing_ends_without_a_traceback(launch) -> None:

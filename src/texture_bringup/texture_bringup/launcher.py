@@ -352,7 +352,8 @@ class Supervisor:
     def run(self) -> int:
         """Run the nodes to their end; return 0 if none died by itself, else 1.
 
-        SIGINT, SIGTERM and SIGHUP stop them; a second one goes on to the next stronger signal at once.
+        SIGINT, SIGTERM and SIGHUP stop them; further ones change nothing, as an explorer needs its time to lift the
+        finger. A node that had to be killed counts as one that died.
         """
         handlers = {number: signal.signal(number, lambda *_: self.stop()) for number in STOPPING_SIGNALS}
         with tempfile.TemporaryDirectory(prefix='texture_launch_') as folder:
@@ -373,12 +374,9 @@ class Supervisor:
         return int(self._failed)
 
     def stop(self) -> None:
-        """Begin to stop all nodes, or, if that has begun, go on to the next stronger signal."""
-        now = time.monotonic()
+        """Begin to stop all nodes, unless that has begun."""
         if self._stopping_since_s is None:
-            self._stopping_since_s = now
-        elif self._signals_sent < len(STOP):
-            self._stopping_since_s = now - STOP[self._signals_sent][0]
+            self._stopping_since_s = time.monotonic()
 
     def _step(self, now: float) -> None:
         if self._stopping_since_s is not None:
@@ -415,6 +413,9 @@ class Supervisor:
                 self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in self._running)}')
             for process in self._running:
                 process.send(number)
+            if number is signal.SIGKILL and self._running:
+                self._failed = True
+                self._say('[launch] nodes were killed that did not end; see whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
         self._forget(process)

@@ -47,6 +47,18 @@ def test_a_fault_in_a_users_planner_is_told_with_its_file_and_line(explorer, tmp
     assert f'failed with ZeroDivisionError: division by zero ({file}:2); mend it there' in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    'limits', [SafetyLimits(x_low_m=0.05), SafetyLimits(y_high_m=-0.02), SafetyLimits(z_low_m=0.05)]
+)
+def test_a_motion_that_would_begin_outside_the_workspace_is_refused(explorer, limits):
+    """Beyond a limit no crossing of it is seen: a wrong pose of the surface would switch the workspace off."""
+    explorer.limits = limits
+    with pytest.raises(MotionRefused, match=r'lies outside the workspace: [xyz] is -?0\.0\d+ m, allowed is') as refused:
+        explorer.begin('one', QUICK)
+    assert refused.value.error == ExplorationError.INVALID_REQUEST
+    assert explorer.counts['refused'] == 1
+
+
 def test_stopping_lifts_the_finger(explorer):
     explorer.table.gate.clear()
     exploration = explorer.begin('one', SLOW)

@@ -883,6 +883,12 @@ class Explorer:
         self._check_idle()
         plan = find(MOTIONS, request.motion, 'motion')
         start = self.patch.start(request, self._ready(), self.limits)
+        # A motion that begins outside would never be seen to leave: a wrong pose of the surface shows here.
+        if outside := self.limits.outside(start):
+            raise MotionRefused(
+                f'the start of the motion lies outside the workspace: {outside}; bring the finger inside and take '
+                'control again, or correct the pose of the surface or the limits'
+            )
         motion = plan(request, start, self.touch, self.limits)
         if request.use_start:
             try:

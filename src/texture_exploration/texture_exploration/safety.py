@@ -328,9 +328,14 @@ class SafetyLimits:
 
     def workspace_violation(self, arm: ArmState) -> str:
         """Return in a sentence where the finger has left the workspace, '' if it has not."""
-        for at, (axis, (low, high)) in zip(arm.position, self.workspace.items(), strict=True):
+        outside = self.outside(arm.position)
+        return f'the finger left the workspace: {outside}' if outside else ''
+
+    def outside(self, position: Vector) -> str:
+        """Return in words how a position in the surface frame, m, lies outside the workspace, or an empty text."""
+        for at, (axis, (low, high)) in zip(position, self.workspace.items(), strict=True):
             if not low <= at <= high:
-                return f'the finger left the workspace: {axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'
+                return f'{axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'
         return ''
 
 
