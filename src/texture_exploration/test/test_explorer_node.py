@@ -374,6 +374,13 @@ def test_a_shutdown_while_moving_lifts_the_finger_and_frees_the_caller(world):
     assert world.explored(call).message == 'the explorer was shut down'
 
 
+def test_a_name_that_no_topic_can_have_is_refused_in_one_sentence(make_world):
+    with pytest.raises(
+        InvalidParameter, match=r"""'signal_topics' has "signal'", which cannot be the name of a topic"""
+    ):
+        make_world(watch_signal=True, signal_topics="signal' x")
+
+
 def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros, tmp_path):
     with closing(FingerReceiver(str(tmp_path / 'finger'))) as emulator:
         program = 'from texture_exploration.nodes.explorer import main; main()'
