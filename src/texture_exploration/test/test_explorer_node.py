@@ -375,9 +375,7 @@ def test_a_shutdown_while_moving_lifts_the_finger_and_frees_the_caller(world):
 
 
 def test_a_name_that_no_topic_can_have_is_refused_in_one_sentence(make_world):
-    with pytest.raises(
-        InvalidParameter, match=r"""'signal_topics' has "signal'", which cannot be the name of a topic"""
-    ):
+    with pytest.raises(InvalidParameter, match=r"'signal_topics' is .*, which names no topics"):
         make_world(watch_signal=True, signal_topics="signal' x")
 
 

@@ -322,15 +322,13 @@ class ExplorerNode(PatientLifecycleNode):
         if not params.watch_signal:
             return no_signal_watch
         # The full name tells which finger of which arm; at the root 'signal' is what everybody calls it.
-        names = {}
-        for topic in params.topics:
-            try:
-                names[topic] = self.resolve_topic_name(topic).removeprefix('/')
-            except RCLError as error:
-                raise InvalidParameter(
-                    f"parameter 'signal_topics' has {topic!r}, which cannot be the name of a topic; give names of "
-                    "letters, digits, '_' and '/', separated by spaces"
-                ) from error
+        try:
+            names = {topic: self.resolve_topic_name(topic).removeprefix('/') for topic in params.topics}
+        except RCLError as error:
+            raise InvalidParameter(
+                f"parameter 'signal_topics' is {' '.join(params.topics)!r}, which names no topics; give names of "
+                "letters, digits, '_' and '/', separated by spaces"
+            ) from error
         watch = SignalWatch(params.signal_timeout_s, time.monotonic_ns, tuple(names.values()))
         for topic, name in names.items():
             # The bytes as they come: what they say is the business of others.
