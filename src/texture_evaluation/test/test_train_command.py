@@ -47,6 +47,17 @@ def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: Text
     assert 'with 6 the confidence is 0.61 at most' in lines[2]
 
 
+@pytest.mark.parametrize(
+    ('slides', 'said'),
+    [({'cork': 4, 'felt': 1}, 'few slides of felt: 1, of others up to 4'), ({'cork': 4, 'felt': 3}, '')],
+)
+def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, said: str) -> None:
+    domain = replace(model.decisions.domain, slides=slides)
+    uneven = replace(model, decisions=replace(model.decisions, domain=domain))
+    found = [line for line in summary(uneven, Path('model.npz')) if line.startswith('few slides')]
+    assert [line.partition(';')[0] for line in found] == ([said] if said else [])
+
+
 def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:
     decisions = dataclasses.replace(model.decisions, error_bound=ErrorBound(149, 0.02))
     enough = dataclasses.replace(model, decisions=decisions)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 
 from texture_core.cli import add_channels, add_slides
@@ -63,11 +64,21 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
+        *_uneven(model.decisions.domain.slides),
         *training.get('tare', []),
         *filter(None, [model.decisions.error_bound.reason, model.decisions.domain.reach_reason]),
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]
+
+
+def _uneven(slides: Mapping[str, int]) -> list[str]:
+    """Return a line on the labels with the fewest slides, where others have twice as many."""
+    fewest, most = min(slides.values(), default=0), max(slides.values(), default=0)
+    if 2 * fewest > most or not most:
+        return []
+    few = ', '.join(label for label, count in slides.items() if count == fewest)
+    return [f'few slides of {few}: {fewest}, of others up to {most}; record as many of each']
 
 
 def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
