@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `texture explore` prints when an exploration does not come to its end."""
 
+import math
+
 import pytest
 
 from texture_bringup.command import main
@@ -8,6 +10,7 @@ from texture_bringup.commands.explore import explored, texture_text
 from texture_core.cli import run_program
 from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest, ExplorationState, Phase, Rejection, TextureEstimate
+from texture_features.correction import write_reference
 
 pytestmark = pytest.mark.ros
 
@@ -66,3 +69,37 @@ def test_a_check_without_its_model_is_refused_before_an_explorer_is_waited_for(m
     monkeypatch.setattr('texture_bringup.commands.explore.slide_over_plate', lambda *_: pytest.fail('the robot moved'))
     assert main(['check', 'absent']) != 0
     assert 'absent' in capsys.readouterr().err
+
+
+USUAL = {'speed_m_s': 0.05, 'force_n': 0.0, 'distance_m': 0.15, 'direction_rad': 0.0}
+STORED = {'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': math.pi / 2}
+
+
+@pytest.mark.parametrize(
+    ('stored', 'options', 'made'),
+    [
+        (STORED, (), STORED),
+        ({}, (), USUAL),  # a reference that does not tell how it was made
+        ({'force_n': 5.0}, (), {**USUAL, 'force_n': 5.0}),
+        (STORED, ('--force', '4', '--direction', '180'), {**STORED, 'force_n': 4.0, 'direction_rad': math.pi}),
+        (STORED, ('--force', '0', '--direction', '0'), {**STORED, 'force_n': 0.0, 'direction_rad': 0.0}),
+        (STORED, ('--speed', '0.02', '--distance', '0.1'), {**STORED, 'speed_m_s': 0.02, 'distance_m': 0.1}),
+        (STORED, ('--store',), USUAL),  # another slide becomes the reference
+    ],
+)
+def test_a_check_repeats_the_slide_of_the_reference_unless_it_is_told_otherwise(
+    monkeypatch, tmp_path, stored, options, made
+):
+    asked = []
+
+    def slide(_bag, request, _namespace):
+        asked.append(request)
+        raise MotionAborted('enough seen')
+
+    monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: None)
+    monkeypatch.setattr('texture_bringup.commands.explore.slide_over_plate', slide)
+    write_reference(tmp_path / 'model', {}, stored)
+    assert main(['check', str(tmp_path / 'model'), *options]) != 0
+    [request] = asked
+    assert {name: getattr(request, name) for name in made} == pytest.approx(made)
+    assert (request.motion, request.surface) == ('linear_slide', 'reference plate')

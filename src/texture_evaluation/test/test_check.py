@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import ModelMismatch
-from texture_core.types import Phase
+from texture_core.types import ExplorationRequest, Phase
 from texture_estimation.model import load_model
 from texture_evaluation.check import check_finger
 from texture_evaluation.train import train_from_bags
+from texture_features.correction import read_reference_slide
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -60,6 +61,25 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     as_trained, sentence = check_finger(model, slides[4], correct=True)  # the old finger is back
     assert as_trained and sentence.endswith('its correction is removed')
     assert load_model(model).feature_set == plain.feature_set
+
+
+def test_the_reference_tells_how_its_slide_was_made(trained):
+    model, slides = trained
+    asked = ExplorationRequest(
+        'linear_slide', speed_m_s=0.03, force_n=5.0, distance_m=0.08, direction_rad=0.5, surface='plate'
+    )
+    check_finger(model, slides[0], store=True, request=asked)
+    assert read_reference_slide(model) == {
+        'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': 0.5
+    }  # fmt: skip
+    # Of a slide from a bag nobody knows what was asked: 3 s at 0.05 m/s and 1 N were simulated.
+    check_finger(model, slides[0], store=True)
+    made = read_reference_slide(model)
+    assert (made['speed_m_s'], made['force_n'], made['distance_m']) == pytest.approx((0.05, 1.0, 0.15), rel=0.05)
+    assert made['direction_rad'] == pytest.approx(slides[0].motion.direction_rad)
+    check_finger(model, replace(slides[0], motion=None), store=True)
+    assert read_reference_slide(model) == {}
+    assert check_finger(model, slides[1])[0]
 
 
 def approached_for_longer(slide, seconds=0.7):

@@ -10,21 +10,22 @@ import numpy as np
 
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
-from texture_core.types import Array, Phase
+from texture_core.types import Array, ExplorationRequest, Phase
 from texture_estimation.few_shot import DAY_SUFFIX, adapted
 from texture_estimation.model import load_model
 from texture_estimation.model_files import model_stem
 from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,
-    REFERENCE,
     RESPONSE_DB,
+    SLIDE_NUMBERS,
     Correction,
     InputComparison,
     InputStatistics,
     compare,
     file_beside,
     read_reference,
+    write_reference,
 )
 from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
 
@@ -62,7 +63,12 @@ def _at_rest(slide: LabelledSlide, topic: str) -> Array:
 
 
 def check_finger(
-    model: str | Path, slide: LabelledSlide, *, store: bool = False, correct: bool = False
+    model: str | Path,
+    slide: LabelledSlide,
+    *,
+    store: bool = False,
+    correct: bool = False,
+    request: ExplorationRequest | None = None,
 ) -> tuple[bool, str]:
     """Compare the finger with the one of the training by a slide over the plate; return whether it is, and a sentence.
 
@@ -76,6 +82,8 @@ def check_finger(
         Take this slide as the reference instead: the finger is the one of the training.
     correct
         Write the correction, or remove one that is needed no more.
+    request
+        By which the slide was made; it is stored with the reference. None takes what the slide shows.
 
     Raises
     ------
@@ -84,9 +92,8 @@ def check_finger(
     """
     topics = load_model(model).recipe.feature_set.topics
     today = statistics_of(slide, topics)
-    path = file_beside(model, REFERENCE)
     if store:
-        write_json({topic: one.as_mapping() for topic, one in today.items()}, path)
+        path = write_reference(model, today, _numbers_of(request) if request else _numbers_shown(slide))
         unknown = '' if all(np.isfinite(one.rest_rms).all() for one in today.values()) else f'; {UNMEASURED}'
         return True, f"the slide is stored as the reference of the finger, '{path}'{unknown}"
     reference = read_reference(model)
@@ -108,6 +115,21 @@ def check_finger(
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
     write_json(Correction.of(found).as_mapping(), correction)
     return False, f"{sentence}. The model is corrected, '{correction}': start it again, with its card as the recipe"
+
+
+def _numbers_of(request: ExplorationRequest) -> dict[str, float]:
+    return {name: getattr(request, name) for name in SLIDE_NUMBERS}
+
+
+def _numbers_shown(slide: LabelledSlide) -> dict[str, float]:
+    """Return the numbers of the request that would make a slide again, none if it was not straight."""
+    made = slide.motion
+    if made is None:
+        return {}
+    numbers = (made.speed_m_s, made.force_n, made.speed_m_s * made.duration_s)
+    # To two digits: what was measured at a limit of the explorer may lie a little beyond it.
+    speed_m_s, force_n, distance_m = (float(f'{number:.2g}') for number in numbers)
+    return {'speed_m_s': speed_m_s, 'force_n': force_n, 'distance_m': distance_m, 'direction_rad': made.direction_rad}
 
 
 def _numbers(found: Mapping[str, InputComparison]) -> str:

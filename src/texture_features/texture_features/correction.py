@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.config import load_json
+from texture_core.config import load_json, write_json
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import Array
 from texture_features.feature import WindowBatch
@@ -289,6 +289,7 @@ class Correction:
 # The files beside a model: what the finger of the training showed, and by what another one is corrected.
 
 CORRECTION, REFERENCE = 'correction', 'reference'
+SLIDE_NUMBERS = ('speed_m_s', 'force_n', 'distance_m', 'direction_rad')  # by which a slide over the plate is repeated
 MOST_BYTES = 4_000_000
 MOST_DB = 60.0  # of a response that can be taken out
 CORRECTED = ' corrected='  # before the fingerprint of a correction, in that of features
@@ -331,6 +332,13 @@ def read_correction(model: str | Path) -> Correction | None:
     return Correction(frequencies_hz, response_db)
 
 
+def write_reference(model: str | Path, inputs: Mapping[str, InputStatistics], slide: Mapping[str, float]) -> Path:
+    """Store what the finger of the training showed on the plate, by topic, and how it slid; return the path."""
+    path = file_beside(model, REFERENCE)
+    write_json({'slide': dict(slide), 'inputs': {topic: one.as_mapping() for topic, one in inputs.items()}}, path)
+    return path
+
+
 def read_reference(model: str | Path) -> dict[str, InputStatistics]:
     """Return what the finger of the training showed on the reference plate, by topic.
 
@@ -339,6 +347,21 @@ def read_reference(model: str | Path) -> dict[str, InputStatistics]:
     ModelMismatch
         If no reference is stored, or the file is damaged.
     """
+    return _read_reference(model)[0]
+
+
+def read_reference_slide(model: str | Path) -> dict[str, float]:
+    """Return the numbers of the request that repeats the slide of the reference; none where it does not tell them.
+
+    Raises
+    ------
+    ModelMismatch
+        As `read_reference`.
+    """
+    return _read_reference(model)[1]
+
+
+def _read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[str, float]]:
     path = file_beside(model, REFERENCE)
     if not path.exists():
         raise ModelMismatch(
@@ -346,6 +369,13 @@ def read_reference(model: str | Path) -> dict[str, InputStatistics]:
             'model was trained with, and store that slide by --store'
         )
     try:
-        return {str(topic): InputStatistics.from_mapping(one) for topic, one in load_json(path, MOST_BYTES).items()}
+        content = load_json(path, MOST_BYTES)
+        # Before the slide was stored, too, the inputs were all there was.
+        inputs, slide = (content['inputs'], content['slide']) if 'inputs' in content else (content, {})
+        numbers = {str(name): float(value) for name, value in slide.items()}
+        for name, value in numbers.items():
+            if name not in SLIDE_NUMBERS or not math.isfinite(value) or (value < 0.0 and name != 'direction_rad'):
+                raise ValueError(f"its slide has '{name}' {value}")
+        return {str(topic): InputStatistics.from_mapping(one) for topic, one in inputs.items()}, numbers
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ModelMismatch(f"reference '{path}' cannot be used: {error}; store it again by --store") from error

@@ -7,10 +7,11 @@ import argparse
 import math
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from texture_estimation.next_motion import NextTouchModel, slide_values
 from texture_evaluation.check import adapt_to_today, check_finger
 from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
-from texture_features.correction import read_reference
+from texture_features.correction import read_reference_slide
 from texture_recordings.dataset import SlideDataset
 
 # Option, field of the request, unit or '', meaning.
@@ -251,6 +252,13 @@ def belief_text(known: NextTouchModel, belief: Array) -> str:
 # Collect slides of a surface; check the finger on the reference plate.
 
 PLATE = 'reference plate'
+# By option: field of the request, unit, meaning, and what is taken where no reference tells it.
+PLATE_NUMBERS = {
+    'speed': ('speed_m_s', 'm/s', 'speed of the slide', 0.05),
+    'force': ('force_n', 'N', 'normal force, 0 for the default of the motion', 0.0),
+    'distance': ('distance_m', 'm', 'length of the slide', 0.15),
+    'direction': ('direction_rad', 'degrees', 'direction from +x towards +y', 0.0),
+}
 
 
 def _configure_collect(parser: argparse.ArgumentParser) -> None:
@@ -273,7 +281,8 @@ def _collect(options: argparse.Namespace) -> int:
             lambda sentence, slides: print(f'{slides} slides: {sentence}', flush=True),
             namespace=options.namespace,
         )
-    print(f"{end.message}; {end.slides} slides in '{bag}'", file=sys.stderr if end.error else sys.stdout)
+    kept = f"; {end.slides} slides in '{bag}'" if bag else ''
+    print(f'{end.message}{kept}', file=sys.stderr if end.error else sys.stdout)
     if end.error is CollectionError.CANCELLED:
         raise KeyboardInterrupt
     return 0 if end.error is CollectionError.NONE else 1
@@ -281,12 +290,14 @@ def _collect(options: argparse.Namespace) -> int:
 
 def _configure_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='path of the model; reference and correction are next to it')
-    parser.add_argument('--store', action='store_true', help='store this slide as that of the finger of the training')
+    parser.add_argument(
+        '--store', action='store_true', help='store this slide as that of the finger of the training, to be repeated'
+    )
     parser.add_argument('--correct', action='store_true', help='write the correction of gain and response, if needed')
     parser.add_argument('--bag', help='take the last labelled slide of a bag instead of sliding now')
-    parser.add_argument('--speed', type=float, default=0.05, help='speed of the slide, m/s (default: %(default)g)')
-    parser.add_argument('--force', type=float, default=0.0, help='normal force, N; 0: the default of the motion')
-    parser.add_argument('--distance', type=float, default=0.15, help='length of the slide, m (default: %(default)g)')
+    for option, (_, unit, meaning, usual) in PLATE_NUMBERS.items():
+        shown = f'{meaning}, {unit}; default: that of the reference, or {usual:g}'
+        parser.add_argument(f'--{option}', type=float, help=shown)
     parser.add_argument(
         '--today', nargs='+', metavar='BAG', help='bags of today with a labelled slide of each surface; needs --trained'
     )
@@ -300,23 +311,28 @@ def _check(options: argparse.Namespace) -> int:
         print(adapt_to_today(options.model, options.trained or (), options.today or ())[1])
         return 0
     load_model(options.model)  # what is missing is said before the robot moves
-    if not options.store:
-        read_reference(options.model)
+    stored = {} if options.store else read_reference_slide(options.model)
+    request = None if options.bag else plate_request(options, stored)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(options.bag) if options.bag else Path(folder) / 'plate'
-        if not options.bag:
-            request = ExplorationRequest(
-                'linear_slide',
-                speed_m_s=options.speed,
-                force_n=options.force,
-                distance_m=options.distance,
-                surface=PLATE,
-            )
+        if request:
             slide_over_plate(bag, request, options.namespace)
         slide = SlideDataset.from_bags([bag])[-1]
-    as_trained, sentence = check_finger(options.model, slide, store=options.store, correct=options.correct)
+    as_trained, sentence = check_finger(
+        options.model, slide, store=options.store, correct=options.correct, request=request
+    )
     print(sentence)
     return 0 if as_trained or options.correct else 1
+
+
+def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> ExplorationRequest:
+    """Return the slide over the plate: an option goes before what is stored with the reference."""
+    numbers: dict[str, Any] = {field: stored.get(field, usual) for field, _, _, usual in PLATE_NUMBERS.values()}
+    given = {option: getattr(options, option) for option in PLATE_NUMBERS}
+    if given['direction'] is not None:
+        given['direction'] = math.radians(given['direction'])
+    numbers |= {PLATE_NUMBERS[option][0]: value for option, value in given.items() if value is not None}
+    return ExplorationRequest('linear_slide', surface=PLATE, **numbers)
 
 
 def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str) -> None:
