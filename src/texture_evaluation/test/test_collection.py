@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from texture_evaluation.collection import (
     PlacePlan,
     collect,
     evaluate_places,
+    force_range,
     next_bag,
 )
 from texture_features.examples import LabelledFeatures, SlideConditions
@@ -49,8 +51,48 @@ def test_a_patch_that_is_too_small_and_a_nameless_surface_are_refused():
         PlacePlan(' ', PARAMS, PATCH)
     with pytest.raises(InvalidParameter, match="'places' is 9; it must not be above 'most_places', 3"):
         CollectionParams(places=9, most_places=3)
+    with pytest.raises(InvalidParameter, match="'force_low_n' is 3; it must not be above 'force_high_n', 2"):
+        CollectionParams(force_low_n=3.0, force_high_n=2.0)
     with pytest.raises(InvalidParameter, match=r'lasts 0\.20 s at .*; 0\.6 s are needed'):
         CollectionParams(distance_m=0.01)
+
+
+ANY, UR5E = (0.1, 6.0), (3.0, 8.0)
+
+
+@pytest.mark.parametrize(
+    ('asked', 'allowed_n', 'expected_n'),
+    [
+        ((0.0, 0.0), ANY, (1.0, 2.0)),
+        ((0.0, 0.0), UR5E, (3.0, 6.0)),
+        ((0.0, 0.0), (0.1, 0.8), (0.4, 0.8)),
+        ((0.0, 0.0), (1.5, 2.0), (1.5, 2.0)),
+        ((3.5, 6.5), UR5E, (3.5, 6.5)),
+        ((5.0, 0.0), UR5E, (5.0, 8.0)),
+        ((0.0, 5.0), UR5E, (3.0, 5.0)),
+        ((0.0, 0.5), ANY, (0.25, 0.5)),
+        ((4.0, 4.0), UR5E, (4.0, 4.0)),
+    ],
+)
+def test_forces_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that_the_explorer_allows(
+    asked, allowed_n, expected_n
+):
+    params = replace(PARAMS, force_low_n=asked[0], force_high_n=asked[1], seed=1)
+    assert force_range(params, allowed_n) == pytest.approx(expected_n)
+    plan = PlacePlan('oak', params, PATCH, allowed_n)
+    forces_n = [plan.next().force_n for _ in range(9)]
+    assert allowed_n[0] <= min(forces_n) and max(forces_n) <= allowed_n[1]
+    assert min(forces_n) == pytest.approx(expected_n[0])
+
+
+@pytest.mark.parametrize(
+    ('asked', 'named'),
+    [((1.0, 2.0), 'force_low_n'), ((0.0, 2.0), 'force_high_n'), ((9.0, 0.0), 'force_low_n'), ((4, 9), 'force_high_n')],
+)
+def test_a_range_of_force_that_the_explorer_does_not_allow_is_refused_in_one_sentence(asked, named):
+    params = replace(PARAMS, force_low_n=asked[0], force_high_n=asked[1])
+    with pytest.raises(InvalidParameter, match=rf"'{named}' is \d N; the explorer allows 3 to 8 N$"):
+        PlacePlan('oak', params, PATCH, UR5E)
 
 
 def features(shift_of_place, n_places=6):

@@ -33,8 +33,16 @@ class CollectionParams:
     distance_m: float = param(0.04, 'Length of each slide.', unit='m', low=0.002, high=1.0)
     speed_low_m_s: float = param(0.02, 'Lowest speed of the slides.', unit='m/s', low=0.002, high=1.0)
     speed_high_m_s: float = param(0.05, 'Highest speed of the slides.', unit='m/s', low=0.002, high=1.0)
-    force_low_n: float = param(1.0, 'Lowest normal force of the slides.', unit='N', low=0.1, high=50.0)
-    force_high_n: float = param(2.0, 'Highest normal force of the slides.', unit='N', low=0.1, high=50.0)
+    force_low_n: float = param(
+        0.0, 'Lowest normal force of the slides; 0: 1 N, or the nearest that fits.', unit='N', low=0.0, high=50.0
+    )
+    force_high_n: float = param(
+        0.0,
+        'Highest normal force of the slides; 0: twice the lowest, or the nearest that the explorer allows.',
+        unit='N',
+        low=0.0,
+        high=50.0,
+    )
     bound: float = param(
         0.6, 'Fraction of new places right that must be shown, as a lower 90 % bound.', low=0.0, high=0.99
     )
@@ -46,7 +54,7 @@ class CollectionParams:
             ('speed_low_m_s', 'speed_high_m_s'),
             ('force_low_n', 'force_high_n'),
         ):
-            if getattr(self, low) > getattr(self, high):
+            if getattr(self, low) > getattr(self, high) > 0:  # 0 is chosen later
                 raise InvalidParameter(
                     f"'{low}' is {getattr(self, low):g}; it must not be above '{high}', {getattr(self, high):g}"
                 )
@@ -68,6 +76,34 @@ class Patch:
     y_high_m: float
 
 
+USUAL_FORCE_N = 1.0  # the lowest; the highest is so many times as much:
+FORCE_SPAN = 2.0
+UNLIMITED = (0.0, math.inf)
+
+
+def force_range(params: CollectionParams, allowed_n: tuple[float, float]) -> tuple[float, float]:
+    """Return lowest and highest force of the slides; what was not asked for is fitted into what the explorer allows.
+
+    Raises
+    ------
+    InvalidParameter
+        If a force was asked for that is not allowed.
+
+    Examples
+    --------
+    >>> force_range(CollectionParams(), (0.1, 6.0)), force_range(CollectionParams(), (3.0, 8.0))
+    ((1.0, 2.0), (3.0, 6.0))
+    """
+    least_n, most_n = allowed_n
+    for name in ('force_low_n', 'force_high_n'):
+        asked_n = getattr(params, name)
+        if asked_n and not least_n <= asked_n <= most_n:
+            raise InvalidParameter(f"'{name}' is {asked_n:g} N; the explorer allows {least_n:g} to {most_n:g} N")
+    wanted_n = min(USUAL_FORCE_N, (params.force_high_n or most_n) / FORCE_SPAN)
+    low_n = params.force_low_n or max(wanted_n, least_n)
+    return low_n, params.force_high_n or min(FORCE_SPAN * low_n, most_n)
+
+
 # --------------------
 # Which place, direction, speed and force comes next.
 
@@ -84,6 +120,8 @@ class PlacePlan:
     ------
     InvalidData
         If no slide of this length lies on the patch.
+    InvalidParameter
+        If a force is asked for that is not allowed.
 
     Examples
     --------
@@ -93,10 +131,17 @@ class PlacePlan:
     (True, True)
     """
 
-    def __init__(self, surface: str, params: CollectionParams, patch: Patch) -> None:
+    def __init__(
+        self,
+        surface: str,
+        params: CollectionParams,
+        patch: Patch,
+        allowed_forces_n: tuple[float, float] = UNLIMITED,
+    ) -> None:
         self._surface, self._params, self._patch = checked_label(surface), params, patch
         if not self._surface:
             raise InvalidData('no surface was named; give the label of what is collected')
+        self._forces_n = force_range(params, allowed_forces_n)
         self._rng = np.random.default_rng(params.seed)
         self._middles: list[Array] = []
         if not self._candidates(CANDIDATES):
@@ -119,7 +164,7 @@ class PlacePlan:
         return ExplorationRequest(
             'linear_slide',
             speed_m_s=_between(params.speed_low_m_s, params.speed_high_m_s, (number * GOLDEN) % 1.0),
-            force_n=_between(params.force_low_n, params.force_high_n, (number * PLASTIC) % 1.0),
+            force_n=_between(*self._forces_n, (number * PLASTIC) % 1.0),
             distance_m=params.distance_m,
             direction_rad=direction_rad,
             surface=self._surface,

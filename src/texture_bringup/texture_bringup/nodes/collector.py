@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -51,13 +52,16 @@ RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
+FORCES = ('min_force_n', 'max_force_n')
 Tell = Callable[[str, int], None]
 
 
 def collect_surface(
     operator: Operator, surface: str, folder: Path, params: CollectionParams, tell: Tell, *, namespace: str = ''
-) -> tuple[CollectionEnd, Path]:
+) -> tuple[CollectionEnd, Path | None]:
     """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
+
+    A bag is removed if the explorer has refused every touch; then None is returned instead.
 
     Parameters
     ----------
@@ -78,27 +82,38 @@ def collect_surface(
     ------
     InvalidData
         If no surface is taught, no slide lies on the patch, or the recorder does not begin.
+    InvalidParameter
+        If a force is asked for that the explorer does not allow.
     """
-    low_x, high_x, low_y, high_y = operator.parameters('explorer', PATCH)
+    low_x, high_x, low_y, high_y, *forces_n = operator.parameters('explorer', (*PATCH, *FORCES))
     if not (low_x < high_x and low_y < high_y):
         raise InvalidData(
             'no surface is taught: touch the corners of the surface by `texture touch-surface`, or give the explorer '
             f'{", ".join(PATCH)}'
         )
-    plan = PlacePlan(surface, params, Patch(low_x, high_x, low_y, high_y))
+    plan = PlacePlan(surface, params, Patch(low_x, high_x, low_y, high_y), (forces_n[0], forces_n[1]))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
+    touched = False
     with recorder(operator, bag, namespace) as check:
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
+            nonlocal touched
             check()
+            before, touched = touched, True  # until the answer says that it was refused
             try:
                 explored = operator.explore(request)
             except (MotionRefused, MotionAborted) as error:
                 return error.error, str(error)
+            touched = before or bool(explored.exploration_id)
             return explored.error, explored.message
 
-        return collect(plan, params, explore, partial(_evaluate_bag, bag, surface), tell), bag
+        end = collect(plan, params, explore, partial(_evaluate_bag, bag, surface), tell)
+    # Where the recorder has ended, what lies there may be another's.
+    if touched or end.error is CollectionError.NOT_RECORDED:
+        return end, bag
+    shutil.rmtree(bag, ignore_errors=True)
+    return replace(end, message=f'{end.message}; no touch was made, so no bag is kept'), None
 
 
 def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
@@ -211,7 +226,7 @@ class Collector(Node):
         except KeyboardInterrupt as error:
             result.error_code, result.message = CollectionError.CANCELLED, str(error)
         else:
-            result.error_code, result.message, result.bag = end.error, end.message, str(bag)
+            result.error_code, result.message, result.bag = end.error, end.message, str(bag or '')
             result.slides, result.places, result.right = end.slides, end.accuracy.places, end.accuracy.right
         finally:
             self._busy.release()

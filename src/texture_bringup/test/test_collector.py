@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a collection asks of the explorer, and which bag it leaves, without a robot."""
+
+from contextlib import contextmanager
+
+import pytest
+
+from texture_bringup.nodes import collector
+from texture_bringup.operator import ExplorationResult
+from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter
+from texture_core.types import RoughnessEstimate, TextureEstimate
+from texture_evaluation.collection import CollectionParams
+
+pytestmark = pytest.mark.ros
+EXPLORER = {
+    'patch_x_low_m': -0.05, 'patch_x_high_m': 0.05, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05,
+    'min_force_n': 3.0, 'max_force_n': 8.0,
+}  # fmt: skip
+REFUSED, ABORTED = (ExplorationError.INVALID_REQUEST, ''), (ExplorationError.FORCE_LIMIT, 'id')
+
+
+class Explorer:
+    """Ends each touch as it is told."""
+
+    def __init__(self, *ends):
+        self._ends, self.requests = list(ends), []
+
+    def parameters(self, node, names):
+        assert node == 'explorer'
+        return [EXPLORER[name] for name in names]
+
+    def explore(self, request):
+        self.requests.append(request)
+        end = self._ends.pop(0)
+        if isinstance(end, BaseException):
+            raise end
+        return ExplorationResult(end[0], 'it failed', end[1], TextureEstimate(0, ''), RoughnessEstimate(0, ''))
+
+
+@pytest.fixture
+def collected(monkeypatch, tmp_path):
+    """Collect with an explorer, by a recorder that makes a bag, and may end."""
+
+    def collected(explorer, recorder_ends=False, **params):
+        @contextmanager
+        def recorder(_operator, bag, _namespace):
+            def check():
+                if recorder_ends:
+                    raise InvalidData('the recorder ended: no space')
+
+            bag.mkdir()
+            (bag / 'cork.mcap').touch()
+            yield check
+
+        monkeypatch.setattr(collector, 'recorder', recorder)
+        asked = CollectionParams(**params)
+        return collector.collect_surface(explorer, 'cork', tmp_path, asked, lambda _text, _slides: None)
+
+    return collected
+
+
+def test_the_forces_are_those_that_the_explorer_allows(collected, tmp_path):
+    explorer = Explorer(REFUSED, REFUSED, REFUSED)
+    collected(explorer)
+    assert all(3.0 <= one.force_n <= 6.0 for one in explorer.requests)
+    with pytest.raises(InvalidParameter, match="'force_low_n' is 1 N; the explorer allows 3 to 8 N"):
+        collected(Explorer(), force_low_n=1.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ('ends', 'error', 'kept'),
+    [
+        ((REFUSED, REFUSED, REFUSED), CollectionError.MOTION_FAILED, False),
+        ((REFUSED, ABORTED, REFUSED), CollectionError.MOTION_FAILED, True),  # the abort was recorded
+        ((REFUSED, KeyboardInterrupt('lifted')), CollectionError.CANCELLED, True),  # in the middle of a touch
+        (None, CollectionError.NOT_RECORDED, True),  # the recorder has ended, and the bag may be another's
+    ],
+)
+def test_a_bag_without_any_touch_is_removed_and_the_sentence_says_so(collected, tmp_path, ends, error, kept):
+    (tmp_path / 'cork').mkdir()  # of yesterday
+    end, bag = collected(Explorer(*(ends or ())), recorder_ends=ends is None)
+    assert (end.error, end.slides) == (error, 0)
+    assert bag == (tmp_path / 'cork-2' if kept else None)
+    assert sorted(one.name for one in tmp_path.iterdir()) == (['cork', 'cork-2'] if kept else ['cork'])
+    assert end.message.endswith('; no touch was made, so no bag is kept') != kept
