@@ -250,6 +250,14 @@ def every_recipe() -> dict[str, str]:
     return {path.stem: path.parent.name for path in sorted(files, key=lambda path: path.stem)}
 
 
+def known_rows() -> set[str]:
+    """Return the names of all rows that can be computed here, and of those that are stored."""
+    stored = _expected('') if STORED.exists() else {}
+    sources = {name: source for name, source in SOURCES.items() if available(source)}
+    of_recipes = {f'{recipe} on {name}' for name, source in sources.items() for recipe in _recipes(source)}
+    return {*stored, *filter(arm_available, ARMS), *of_recipes}
+
+
 def _recipes(source: Source) -> list[str]:
     return [name for name in every_recipe() if any(fnmatch(name, wanted) for wanted in source.recipes)]
 
@@ -533,6 +541,13 @@ def main() -> int:
     parser.add_argument('--only', default='', metavar='WORD', help='only rows whose name contains it')
     parser.add_argument('--strict', action='store_true', help='on the machine that stored them: no looser recipes')
     options = parser.parse_args()
+    if not any(options.only in name for name in known_rows()):
+        print(
+            f"golden: no row that can be computed here has '{options.only}' in its name; "
+            "write a part of one, such as 'default on oriented', and add a new recipe to SOURCES",
+            file=sys.stderr,
+        )
+        return 2
     if options.check:
         lines = check(options.only, options.strict)
         print('\n'.join(lines) or 'the golden set agrees')

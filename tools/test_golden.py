@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import golden
 import pytest
@@ -50,3 +51,17 @@ def test_a_number_that_differs_beyond_rounding_is_named() -> None:
         '/features/0/1: stored 2.0, found 2.001',
         '/final/label: stored cork, found felt',
     ]
+
+
+@pytest.mark.parametrize('use', ['--check', '--write'])
+def test_a_word_that_no_row_has_is_refused_in_one_sentence(
+    use: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, 'argv', ['golden.py', use, '--only', 'defualt'])
+    before = golden.STORED.read_bytes()
+    assert golden.main() == 2
+    said = capsys.readouterr()
+    assert said.out == ''
+    assert said.err.startswith("golden: no row that can be computed here has 'defualt' in its name")
+    assert said.err.count('\n') == 1
+    assert golden.STORED.read_bytes() == before
