@@ -96,6 +96,7 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('cross-validate stratified:1 fast glass', 'write stratified:FOLDS (2 or more)'),
         ('cross-validate leave-one-out:speed fast glass leather', "all are of one group, '0.05'"),
         ('export card fast.npz -o x.md', 'it is not text; give MODEL.json'),
+        ('export card fast.json -o all.json', "'all.json' exists already; name another file or remove it"),
         ('scene twelve_textures glass -o /proc/x.png', "'/proc/x.png' cannot be used"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),

@@ -101,6 +101,8 @@ def _configure_export(parser: argparse.ArgumentParser) -> None:
 def _export(options: argparse.Namespace) -> int:
     """Write slides as others read them, or the card of a model."""
     if options.kind == 'card':
+        if Path(options.out).exists():
+            raise InvalidParameter(f"'{options.out}' exists already; name another file or remove it")
         card = ''.join(model_card(source, options.license) for source in options.sources[:1])
         with writing(options.out):
             Path(options.out).write_text(card, encoding='utf-8')
