@@ -424,7 +424,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'commands': (
         'Commands',
         'Each is called as `texture NAME`, and has `--help`. It ends with 0 for success, 2 if an argument is wrong or '
-        'something is missing, and 1 for a bad outcome.',
+        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C broke it off.',
         commands,
     ),
     'parameters': (

@@ -1629,7 +1629,7 @@ def _files(
 
 
 def _paths(source: Path, depth: int) -> list[Path]:
-    """Return the files at a depth below a folder, in the order of their names with numbers counted as such."""
+    """Return the files at a depth below a folder, in the order of their names as texts: 10 comes before 2."""
     if not source.exists():
         raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
     if source.is_file() or is_bag(source):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The process that talks to a UR controller 500 times a second, its stream of commands and its watchdog."""
+"""The process that talks to a UR controller at `rate_hz`, its stream of commands and its watchdog."""
 
 from __future__ import annotations
 
