@@ -217,7 +217,7 @@ def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tm
             importer(source, tmp_path / 'out', slides='500')
         with pytest.raises(InvalidData, match='give the folder'):
             importer(tmp_path, tmp_path / 'out')
-        with pytest.raises(InvalidData, match='no file of this data set'):
+        with pytest.raises(InvalidData, match='not a file of this data set'):
             importer(broken, tmp_path / 'out')
         with pytest.raises(InvalidData, match='channels are'):
             importer(source, tmp_path / 'out', channels='some')
