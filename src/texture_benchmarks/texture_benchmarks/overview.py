@@ -400,8 +400,9 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
             axes.plot([cost, cost], edges, linewidth=1.0, alpha=0.35, **style)
             axes.plot([cost, cell['latency_us']['p99']], [wrong, wrong], linewidth=1.0, alpha=0.6, **style)
             axes.plot(cost, wrong, MARKS[channels], markersize=7, **style)
-        for kind, style in STYLES.items():
-            axes.plot([], [], 'o', markersize=7, label=kind, **style)
+        drawn = {cell['kind'] for _, _, cell in cells}
+        for kind in (kind for kind in STYLES if kind in drawn):
+            axes.plot([], [], 'o', markersize=7, label=kind, **STYLES[kind])
         for channels, mark in MARKS.items():
             axes.plot([], [], mark, color='white', markeredgecolor='black', markersize=7, label=channels)
         axes.plot([], [], '-', color='grey', label='to the right: 99 of 100 windows; up and down: 95 % interval')
