@@ -92,7 +92,7 @@ def request_of(params, surface, folder):
     return filled(msg.CollectionRequest(), {**asdict(params), 'surface': surface, 'folder': str(folder / 'bags')})
 
 
-def test_a_collection_that_is_cancelled_keeps_its_slides_and_an_untaught_patch_is_named(collector, operator, folder):
+def test_a_cancelled_collection_keeps_its_slides_and_a_missing_patch_is_named(collector, operator, folder):
     request = request_of(replace(QUICK, places=3, most_places=9, bound=0.9), 'suede', folder)
     client, slides = ActionClient(collector.peer, action.Collect, 'collect'), []
     collector.until(client.server_is_ready)

@@ -409,11 +409,12 @@ class Supervisor:
         while self._signals_sent < len(STOP) and STOP[self._signals_sent][0] <= since_s:
             number = STOP[self._signals_sent][1]
             self._signals_sent += 1
-            if self._running:
-                self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in self._running)}')
+            if not self._running:
+                continue
+            self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in self._running)}')
             for process in self._running:
                 process.send(number)
-            if number is signal.SIGKILL and self._running:
+            if number is signal.SIGKILL:
                 self._failed = True
                 self._say('[launch] nodes were killed that did not end; see whether the finger still presses')
 

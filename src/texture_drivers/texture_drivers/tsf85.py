@@ -88,7 +88,6 @@ LAYOUTS: Mapping[str, Tsf85Layout] = {
     'tsf85_3x4': Tsf85Layout(3, 4, 25.0),
 }
 TSF85 = LAYOUTS['tsf85']
-STATIC_RATE_HZ = TSF85.static_rate_hz
 STATIC_CHANNELS = TSF85.static_channels
 TAXELS = len(STATIC_CHANNELS)
 
