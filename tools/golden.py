@@ -405,7 +405,7 @@ class Recording:
     def in_real_time(self, arm: Any, request: ExplorationRequest) -> dict[str, Any]:
         """Explore against the clock; return the phases, and the kinds of what was sent in the order they began."""
         # How well the arm follows is no matter here, and depends on how busy the machine is.
-        touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.3, peak_speed_share=3.0, peak_force_share=3.0)
+        touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.3, peak_speed_fraction=3.0, peak_force_fraction=3.0)
         explorer = Explorer(arm, touch, SafetyLimits(state_timeout_s=1.0), self.note)
         try:
             explorer.connect()

@@ -117,7 +117,7 @@ def test_force_speed_and_circle_are_kept_and_the_limit_is_foretold(tmp_path: Pat
     assert max(row['overshoot'] for row in late) <= targets['overshoot']
     for name, by_lag in numbers['hazards'].items():
         for row in (row for rows in by_lag.values() for row in rows.values()):
-            if not name.startswith(('soft layer', 'step up')):  # a peak above `peak_force_share` is no success
+            if not name.startswith(('soft layer', 'step up')):  # a peak above `peak_force_fraction` is no success
                 assert row['success'] == name.startswith('none'), (name, row)
             assert row['peak_n'] < 6.0, (name, row)
     assert numbers['border_error'] <= targets['border_error']

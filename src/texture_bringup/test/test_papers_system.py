@@ -55,8 +55,8 @@ PATIENT = {'estimate_timeout_s': 20.0, 'state_timeout_s': 1.5}
 ARMS = {
     'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
     # On a busy machine a late command is caught up with, which looks fast.
-    'rails': {'peak_speed_share': 5.0},
-    'hand': {'peak_speed_share': 5.0},
+    'rails': {'peak_speed_fraction': 5.0},
+    'hand': {'peak_speed_fraction': 5.0},
     'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
 }
 # Either surface may be named: clusters of so few slides need not be the surfaces, and the kernel of the RBF machines,

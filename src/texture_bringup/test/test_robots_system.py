@@ -50,8 +50,8 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, two_surfaces, 
     # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
     patient = {
         'state_timeout_s': 1.5,
-        'peak_speed_share': 5.0,
-        'mean_speed_share': 1.0,
+        'peak_speed_fraction': 5.0,
+        'mean_speed_fraction': 1.0,
         'estimate_timeout_s': 10.0,
         'signal_timeout_s': 3.0,
         **PATIENCE.get(robot, {}),

@@ -126,7 +126,7 @@ class Tare:
 
 
 def saturated(
-    samples: NDArray[np.float32], lowest: Array, highest: Array, least_share: float = 0.01
+    samples: NDArray[np.float32], lowest: Array, highest: Array, least_fraction: float = 0.01
 ) -> NDArray[np.bool_]:
     """Return which channels stand at an end of their range in more than a share of the samples.
 
@@ -136,7 +136,7 @@ def saturated(
         Samples of the last while.
     lowest, highest
         Ends of the range, of all channels or of each.
-    least_share
+    least_fraction
         Single samples at an end are a hard touch, and no fault.
 
     Returns
@@ -144,7 +144,7 @@ def saturated(
     (n_channels,) bool
     """
     at_end = (samples <= lowest) | (samples >= highest)
-    return at_end.mean(axis=0) > least_share
+    return at_end.mean(axis=0) > least_fraction
 
 
 # --------------------

@@ -77,7 +77,7 @@ def test_no_state_without_contact_guarantees_anything_and_no_window_is_cut_from_
 
 
 def test_a_rough_surface_that_the_finger_bounces_over_is_slid_on(make_logged_table):
-    table = make_logged_table(touch=TouchParams(peak_force_share=3.0))  # it comes down hard after each bounce
+    table = make_logged_table(touch=TouchParams(peak_force_fraction=3.0))  # it comes down hard after each bounce
     go_on, slid = table.pace, []
 
     def pace():

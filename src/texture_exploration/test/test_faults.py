@@ -35,7 +35,7 @@ UR = UrControllerParams(ip='127.0.0.56', start_height_m=HEIGHT_M, force_offset_n
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.04)
 RUB = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, force_n=1.0, duration_s=1.5)
 # The emulated robots make up for up to 0.1 s that a busy machine lost: seen over 30 ms, up to 4.3 times as fast.
-TOUCH = TouchParams(approach_speed_m_s=0.02, speed_tolerance=0.3, force_tolerance=0.2, peak_speed_share=3.4)
+TOUCH = TouchParams(approach_speed_m_s=0.02, speed_tolerance=0.3, force_tolerance=0.2, peak_speed_fraction=3.4)
 
 
 @contextmanager
@@ -183,7 +183,7 @@ from texture_exploration.stages import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])
-touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_share=3.4)
+touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_fraction=3.4)
 limits = SafetyLimits(state_timeout_s=1.0)
 explorer = Explorer(ARMS[name](ARMS[name].Params(**parameters)), touch, limits, lambda state: None)
 explorer.connect()

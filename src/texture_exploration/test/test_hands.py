@@ -451,7 +451,7 @@ def rub(arm):
     explorer = Explorer(
         arm,
         # The emulated bus makes up for up to 0.1 s that a busy machine lost: seen over 30 ms, up to 4.3 times as fast.
-        TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_share=3.4),
+        TouchParams(speed_tolerance=0.3, force_tolerance=0.2, peak_speed_fraction=3.4),
         SafetyLimits(state_timeout_s=1.0),
         note,
     )

@@ -73,7 +73,7 @@ def test_an_overload_lifts_the_finger_and_is_a_fault_until_cleared(rails, arm):
 def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):
     states = []
     # Emulated rails make up for up to 0.1 s that a busy machine lost: seen over 30 ms, up to 4.3 times as fast.
-    explorer = Explorer(arm, TouchParams(peak_speed_share=3.4), SafetyLimits(state_timeout_s=1.0), states.append)
+    explorer = Explorer(arm, TouchParams(peak_speed_fraction=3.4), SafetyLimits(state_timeout_s=1.0), states.append)
     explorer.connect()
     request = ExplorationRequest('linear_slide', speed_m_s=0.0255, force_n=1.5, distance_m=0.02)
     exploration = explorer.begin('one', request)

@@ -36,7 +36,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 # Patient with a busy machine where that is not what is tried.
 PATIENT = RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5, accept_no_timeout=True)
-TOUCH = TouchParams(peak_speed_share=3.4)  # it makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast
+TOUCH = TouchParams(peak_speed_fraction=3.4)  # it makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever

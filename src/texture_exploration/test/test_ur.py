@@ -202,7 +202,7 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, 
     phases = []
     explorer = Explorer(
         UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0)),
-        TouchParams(peak_speed_share=3.4),  # emulated, it makes up for up to 0.1 s; the speed is measured below
+        TouchParams(peak_speed_fraction=3.4),  # emulated, it makes up for up to 0.1 s; the speed is measured below
         SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
     )

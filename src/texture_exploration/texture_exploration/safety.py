@@ -139,7 +139,7 @@ class SafetyLimits:
         low=0.02,
         high=5.0,
     )
-    force_drift_share: float = param(
+    force_drift_fraction: float = param(
         0.3,
         'Largest change of the force in free air over an exploration, as a fraction of the wanted '
         'force; more aborts it.',
@@ -577,7 +577,7 @@ class ForceWatch:
         if not self._before or not after:
             return ''
         before_n, after_n = self._free_air_n, statistics.median(after)
-        if abs(after_n - before_n) <= self._limits.force_drift_share * self._wanted_n:
+        if abs(after_n - before_n) <= self._limits.force_drift_fraction * self._wanted_n:
             return ''
         return (
             f'the force in free air was {before_n:.2f} N before the slide and {after_n:.2f} N after it: the sensor '

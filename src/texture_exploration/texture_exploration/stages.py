@@ -206,10 +206,10 @@ class TouchParams:
         low=0.001,
         high=0.5,
     )
-    unheard_force_share: float = param(
+    unheard_force_fraction: float = param(
         1.5,
         'Highest force of the approach, as a fraction of the wanted one, on an arm that only its watchdog stops; '
-        'a smaller share lowers the approach speed.',
+        'a smaller fraction lowers the approach speed.',
         low=0.2,
         high=10.0,
     )
@@ -260,9 +260,9 @@ class TouchParams:
         low=0.0,
         high=0.1,
     )
-    lost_force_share: float = param(
+    lost_force_fraction: float = param(
         0.25,
-        'Fraction of the wanted force below which contact counts as lost during a slide; a larger share aborts sooner.',
+        'Fraction of the wanted force below which contact counts as lost during a slide; a larger fraction aborts sooner.',
         low=0.05,
         high=0.9,
     )
@@ -276,7 +276,7 @@ class TouchParams:
     seek_lost_contact: bool = param(
         False, 'Stops where contact was lost, comes down again and goes on, up to 3 times; false aborts.'
     )
-    stall_speed_share: float = param(
+    stall_speed_fraction: float = param(
         0.25,
         'Fraction of the commanded way below which a sliding finger counts as stalled; a larger fraction aborts '
         'sooner.',
@@ -291,26 +291,26 @@ class TouchParams:
         low=0.05,
         high=5.0,
     )
-    mean_force_share: float = param(
+    mean_force_fraction: float = param(
         0.3,
         'Largest relative error of the mean measured force with which a slide succeeds.',
         low=0.05,
         high=1.0,
     )
-    peak_force_share: float = param(
+    peak_force_fraction: float = param(
         0.5,
         'By which fraction of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
-        'it are not steady. A larger share bears a rougher surface.',
+        'it are not steady. A larger fraction bears a rougher surface.',
         low=0.05,
         high=20.0,
     )
-    mean_speed_share: float = param(
+    mean_speed_fraction: float = param(
         0.2,
         'Largest relative error of the mean speed with which a slide succeeds.',
         low=0.02,
         high=5.0,
     )
-    peak_speed_share: float = param(
+    peak_speed_fraction: float = param(
         0.5,
         'By which fraction of the wanted speed the finger may be faster for 50 ms in a slide that succeeds; states '
         'beyond it are not steady.',
@@ -346,7 +346,7 @@ class TouchParams:
         """Return how fast the finger may come down to press with a force.
 
         An arm that loses its commands just as it reacts to the contact goes on for the time of its watchdog. Until then
-        the force stays below `unheard_force_share` of the wanted one on a contact of `approach_stiffness_n_m`.
+        the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`.
 
         Parameters
         ----------
@@ -356,7 +356,7 @@ class TouchParams:
             See `texture_exploration.arms.arm.ArmState`.
         """
         heard_m_s = IMPACT * force_n / (self.approach_stiffness_n_m * REACTION_S)
-        allowed_n = max(self.unheard_force_share * force_n, HARMLESS_N)
+        allowed_n = max(self.unheard_force_fraction * force_n, HARMLESS_N)
         unheard_m_s = allowed_n / (self.approach_stiffness_n_m * (watchdog_s + REACTION_S)) if watchdog_s else math.inf
         return min(self.approach_speed_m_s, heard_m_s, unheard_m_s)
 
@@ -399,7 +399,7 @@ class ContactLost(MotionAborted):
 class ContactWatch:
     """Decide from the measured force whether the finger touches, and for how long it has not.
 
-    A force below `lost_force_share` of the wanted one counts as no contact. Gaps up to `lost_contact_s` are bounces,
+    A force below `lost_force_fraction` of the wanted one counts as no contact. Gaps up to `lost_contact_s` are bounces,
     which a rough surface causes; a longer one is a lost surface. Time is that of the arm's states, so a pause of this
     machine is no loss.
 
@@ -413,7 +413,7 @@ class ContactWatch:
 
     def __init__(self, force_n: float, touch: TouchParams) -> None:
         self._force_n = force_n
-        self._least_n = touch.lost_force_share * force_n
+        self._least_n = touch.lost_force_fraction * force_n
         self._longest_s = touch.lost_contact_s
         self._lost_ns: int | None = None
         self._force_now_n = force_n
@@ -499,7 +499,7 @@ class StallWatch:
         Raises
         ------
         MotionAborted
-            If the finger has moved by less than `stall_speed_share` of the commanded way.
+            If the finger has moved by less than `stall_speed_fraction` of the commanded way.
         """
         x, y, _ = arm.position
         if not self._ways or arm.time_ns - self._ways[-1][0] > LONGEST_STEP_NS:
@@ -526,7 +526,7 @@ class StallWatch:
             self._ways.popleft()
         commanded_m, made_m = (now - then for now, then in zip(self._ways[-1][1:], self._ways[0][1:], strict=True))
         # Written so that NaN is a stall.
-        if made_m >= self._touch.stall_speed_share * commanded_m:
+        if made_m >= self._touch.stall_speed_fraction * commanded_m:
             return
         raise MotionAborted(
             f'the finger stalled: in {self._touch.stall_s * 1e3:.0f} ms it moved by {made_m * 1e3:.2f} of '
@@ -552,7 +552,7 @@ class SlideWatch:
         self._speed_m_s, self._force_n = speed_m_s, force_n
         self._touch = touch
         # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
-        self._mean_force_share = max(touch.mean_force_share, 2 * touch.force_tolerance)
+        self._mean_force_fraction = max(touch.mean_force_fraction, 2 * touch.force_tolerance)
         self._recent: deque[ArmState] = deque()  # over PEAK_NS of constant speed
         self._forces: deque[float] = deque(maxlen=FORCES)
         self._chunk: ArmState | None = None  # where the present piece of the mean speed began
@@ -610,25 +610,25 @@ class SlideWatch:
         """Largest normal force, speed and tangential force for a moment."""
         touch = self._touch
         return (
-            (1 + touch.peak_force_share) * self._force_n,
-            (1 + touch.peak_speed_share) * self._speed_m_s,
+            (1 + touch.peak_force_fraction) * self._force_n,
+            (1 + touch.peak_speed_fraction) * self._speed_m_s,
             touch.peak_friction * self._force_n,
         )
 
     def _differences(self) -> Iterator[str]:
         touch, asked_n, asked_m_s = self._touch, self._force_n, self._speed_m_s
         mean_n = self._force_sum_n / max(1, self._states)
-        if not abs(mean_n - asked_n) <= self._mean_force_share * asked_n:  # so NaN is none
+        if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
             yield (
-                f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_share:.0%} off the '
-                f"{asked_n:g} N that were asked for ('mean_force_share'); slide more slowly, or check the force "
+                f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
+                f"{asked_n:g} N that were asked for ('mean_force_fraction'); slide more slowly, or check the force "
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
-        if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_share * asked_m_s:
+        if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
             yield (
-                f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_share:.0%} off the '
-                f"{asked_m_s:g} m/s that were asked for ('mean_speed_share'); see what scales the speed of the arm"
+                f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off the '
+                f"{asked_m_s:g} m/s that were asked for ('mean_speed_fraction'); see what scales the speed of the arm"
             )
         mean_n = self._tangential_sum_n / max(1, self._tangential_states)
         if mean_n > touch.mean_friction * asked_n:
@@ -637,8 +637,8 @@ class SlideWatch:
                 f"allowed with {asked_n:g} N asked for ('mean_friction'); see whether the finger catches on something"
             )
         measured = (
-            ('force', 'N', f'{asked_n:g} N', 'peak_force_share'),
-            ('speed', 'm/s', f'{asked_m_s:g} m/s', 'peak_speed_share'),
+            ('force', 'N', f'{asked_n:g} N', 'peak_force_fraction'),
+            ('speed', 'm/s', f'{asked_m_s:g} m/s', 'peak_speed_fraction'),
             ('force along the surface', 'N', f'a force of {asked_n:g} N', 'peak_friction'),
         )
         for (what, unit, asked, parameter), peak, most in zip(measured, self._peaks, self._most, strict=True):

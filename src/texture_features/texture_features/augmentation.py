@@ -70,7 +70,7 @@ class Augmentation:
         low=0.0,
         high=10.0,
     )
-    clean_share: float = param(
+    clean_fraction: float = param(
         0.43, 'Fraction of the drawn examples that are of the undisturbed slides.', low=0.0, high=1.0
     )
     disturbed_copies: int = param(

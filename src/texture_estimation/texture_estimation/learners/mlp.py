@@ -96,7 +96,7 @@ class AugmentedBatches:
     --------
     >>> inputs = np.ones((4, 2), dtype=np.float32)
     >>> none = np.zeros(0, dtype=np.intp)
-    >>> changes = Augmentation(gain_probability=0.0, slide_jitter=0.0, clean_share=1.0)
+    >>> changes = Augmentation(gain_probability=0.0, slide_jitter=0.0, clean_fraction=1.0)
     >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
     >>> augmented = AugmentedExamples(inputs[:0], none, none, none, zeros[0], zeros, slides, changes)
     >>> rng = np.random.default_rng(0)
@@ -132,7 +132,7 @@ class AugmentedBatches:
     def _draw_block(self, count: int) -> list[tuple[Inputs, Codes]]:
         """Return several batches, whose random numbers and rows cost half as much together."""
         params, total = self._augmented.augmentation, BLOCK * count
-        n_clean = round(count * params.clean_share) if len(self._augmented.rows) else count
+        n_clean = round(count * params.clean_fraction) if len(self._augmented.rows) else count
         block = np.empty((BLOCK, count, len(self._mean)), dtype=np.float32)
         codes = np.empty((BLOCK, count), dtype=np.intp)
         clean, copies = self._clean.take(BLOCK * n_clean), self._copies.take(total - BLOCK * n_clean)
