@@ -17,19 +17,19 @@ from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.model import load_model
-from texture_estimation.numerics import is_tied
+from texture_estimation.numerics import is_tied, log_softmax
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
 from texture_papers.hu import SvmMaxWins, principal_components
 from texture_papers.jamali import NaiveBayes, bins_of
 from texture_papers.kaboli import (
-    CrammerSingerClassifier,
     EmMixture,
-    OnlineLinearClassifier,
     PassiveAggressive,
     SvmLinear,
+    move_each_plane,
+    move_true_and_rival,
 )
-from texture_papers.roberge import AnnPairs, Network, PairVotes, SvmPairs, fit_network
+from texture_papers.roberge import AnnPairs, Network, SvmPairs, fit_network, pairs_won
 
 # What the papers add: the shared checks hold for it, too.
 PAPERS = (
@@ -188,8 +188,10 @@ def test_linear_machines_decide_every_window_as_scikit_learn(task):
 
 def test_max_wins_on_principal_components_decides_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
-    predict, answers = evaluated(SvmMaxWins(variance=0.9, gamma=1.0, c=3.0), *task)
-    project = lambda values: (values - examples.values.mean(axis=0)) @ predict.components  # noqa: E731
+    learner = SvmMaxWins(variance=0.9, gamma=1.0, c=3.0)
+    _, answers = evaluated(learner, *task)
+    components = learner.fit(examples.values, codes, codes).parameters['components']
+    project = lambda values: (values - examples.values.mean(axis=0)) @ components  # noqa: E731
     svc = SVC(C=3.0, gamma='scale', break_ties=True).fit(project(examples.values), codes)
     np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(project(fresh)))
 
@@ -210,11 +212,10 @@ def test_the_mixture_finds_the_clusters_of_scikit_learn(task):
 
 
 def test_votes_are_counted_and_a_tie_of_three_is_undecided():
-    votes = PairVotes(3)
-    first_wins = np.array([[True, True, True], [True, False, True], [False, True, False]])
-    assert votes.won(first_wins).tolist() == [[2, 1, 0], [1, 1, 1], [1, 1, 1]]
-    assert is_tied(votes.won(first_wins)).tolist() == [False, True, True]
-    assert votes.won_clearly(np.array([3.0, -1.0, 1.0])).argmax() == 0
+    decisions = np.array([[1, 1, 1], [1, -1, 1], [-1, 1, -1]])
+    assert pairs_won(decisions).tolist() == [[2, 1, 0], [1, 1, 1], [1, 1, 1]]
+    assert is_tied(pairs_won(decisions)).tolist() == [False, True, True]
+    assert pairs_won(np.array([3.0, -1.0, 1.0]), 'nearest').argmax() == 0
 
 
 @pytest.mark.parametrize('transfer', ['sigmoid', 'linear'])
@@ -247,11 +248,11 @@ def test_a_network_with_noise_stops_before_it_learns_the_noise():
 
 
 def test_an_example_that_is_far_enough_moves_no_plane_and_another_just_so_far_as_needed():
-    online = OnlineLinearClassifier(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]))
-    online.update(np.array([2.0, 0.0]), 0)
-    assert online.planes.tolist() == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
-    online.update(np.array([0.0, 1.0]), 0)
-    np.testing.assert_allclose(online.planes @ [0.0, 1.0, 1.0], [1.0, -1.0])
+    planes = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    move_each_plane(planes, np.array([2.0, 0.0]), 0, 1.0)
+    assert planes.tolist() == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
+    move_each_plane(planes, np.array([0.0, 1.0]), 0, 1.0)
+    np.testing.assert_allclose(planes @ [0.0, 1.0, 1.0], [1.0, -1.0])
 
 
 @pytest.mark.parametrize('c', [0.01, 1.0])
@@ -264,8 +265,10 @@ def test_multi_class_planes_move_as_little_as_the_example_demands(c):
         scores = planes @ extended
         rival = max(set(range(3)) - {code}, key=lambda label: scores[label])
 
-        def cost(unknown, planes=planes):
-            return 0.5 * np.square(unknown[:-1] - planes.ravel()).sum() + c * unknown[-1]
+        before = planes.ravel().copy()
+
+        def cost(unknown, before=before):
+            return 0.5 * np.square(unknown[:-1] - before).sum() + c * unknown[-1]
 
         def margin(unknown, code=code, rival=rival, extended=extended):
             weights = unknown[:-1].reshape(3, 4)
@@ -278,9 +281,8 @@ def test_multi_class_planes_move_as_little_as_the_example_demands(c):
             constraints=[{'type': 'ineq', 'fun': margin}, {'type': 'ineq', 'fun': lambda unknown: unknown[-1]}],
             options={'ftol': 1e-12, 'maxiter': 200},
         )
-        online = CrammerSingerClassifier(planes.copy(), c)
-        online.update(values, code)
-        np.testing.assert_allclose(online.planes, least.x[:-1].reshape(3, 4), atol=1e-4)
+        move_true_and_rival(planes, values, code, c)
+        np.testing.assert_allclose(planes, least.x[:-1].reshape(3, 4), atol=1e-4)
 
 
 def test_more_passes_go_on_where_the_last_one_ended_and_fit_the_examples_better(make_examples):
@@ -289,12 +291,12 @@ def test_more_passes_go_on_where_the_last_one_ended_and_fit_the_examples_better(
     one, ten, fifty = (
         PassiveAggressive(passes=passes).fit(examples.values, codes, groups).parameters for passes in (1, 10, 50)
     )
-    online = OnlineLinearClassifier(np.zeros_like(one['planes']))
+    planes = np.zeros_like(one['planes'])
     standard = (examples.values - one['mean']) / one['scale']
     order = np.argsort([np.sum(codes[:row] == codes[row]) for row in range(len(codes))], kind='stable')
     for row in [*order] * 10:
-        online.update(standard[row], int(codes[row]))
-    np.testing.assert_allclose(ten['planes'], online.planes, atol=1e-9)
+        move_each_plane(planes, standard[row], int(codes[row]), 1.0)
+    np.testing.assert_allclose(ten['planes'], planes, atol=1e-9)
     right = [
         np.mean(PassiveAggressive.predictor(each)(examples.values).argmax(axis=1) == codes) for each in (one, fifty)
     ]
@@ -345,10 +347,12 @@ def test_one_added_slide_moves_the_planes_themselves_and_is_taken_back(make_exam
         for row in values:
             online.observe(FeatureVector(0, f'{number}', 0.5, 0.25, model.names, row, feature_set=model.feature_set))
         online.add('wood', f'{number}')
-    planes = CrammerSingerClassifier(np.vstack((model.parameters['planes'], np.zeros(7))))
-    for row in rows:
-        planes.update((row - model.parameters['mean']) / model.parameters['scale'], 3)
-    np.testing.assert_allclose(online.model.predictor.planes, planes.planes, atol=1e-12)
+    planes = np.vstack((model.parameters['planes'], np.zeros(7)))
+    standard = (rows - model.parameters['mean']) / model.parameters['scale']
+    for row in standard:
+        move_true_and_rival(planes, row, 3, 1.0)
+    expected = log_softmax(np.column_stack((standard, np.ones(len(standard)))) @ planes.T)
+    np.testing.assert_allclose(online.model.predictor(rows), expected, atol=1e-12)
     assert np.mean(np.array(online.model.decide(rows)) == 'wood') > 0.9
     estimate = EvidenceAccumulator(online.model)
     vector = FeatureVector(0, 'new', 0.5, 0.25, model.names, rows[0], feature_set=model.feature_set)

@@ -35,15 +35,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from texture_core.config import find, param
+from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.svm import RbfMachines
-from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch
 from texture_features.spectra import long_densities
-from texture_papers.roberge import PairVotes
+from texture_papers.roberge import PairsPredictor
 
 SCALES: Mapping[str, Callable[[Array, float], Array]] = {
     'log': lambda density, floor: np.log(density + floor),
@@ -97,7 +96,7 @@ class Spectrum:
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(density + floor), the density, or its square root."""
         density = long_densities(windows.rows, windows.rate_hz, self.points)
-        return find(SCALES, self.scale, 'scale of the spectrum')(density, self.floor)
+        return SCALES[self.scale](density, self.floor)
 
 
 TINY = 1e-12
@@ -118,8 +117,8 @@ class SvmMaxWins:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = SvmMaxWins().fit(values, codes, groups)
     >>> predictor = SvmMaxWins.predictor(fitted.parameters)
-    >>> isinstance(predictor, PcaSvmPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     variance: float = param(
@@ -168,10 +167,10 @@ class SvmMaxWins:
         return Fitted(parameters, None, f'not calibrated: pairs won; {count} principal components')
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> PcaSvmPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
-        machines = RbfMachines(**parameters['machines'])
-        return PcaSvmPredictor(parameters['mean'], parameters['components'], machines, PairVotes(machines.n_labels))
+        mean, components, machines = parameters['mean'], parameters['components'], RbfMachines(**parameters['machines'])
+        return PairsPredictor(lambda X: machines((X - mean) @ components), 'nearest')
 
     def _components(self, values: Array) -> tuple[Array, Array]:
         """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components).
@@ -199,28 +198,6 @@ class SvmMaxWins:
             components[block * size : (block + 1) * size, column : column + part.shape[1]] = own
             column += part.shape[1]
         return mean, components
-
-
-@dataclass(frozen=True, eq=False)
-class PcaSvmPredictor:
-    """Machines of all pairs on principal components.
-
-    Parameters
-    ----------
-    mean : (n_features,)
-    components : (n_features, n_components)
-    machines, votes
-        What decides between pairs, and counts them.
-    """
-
-    mean: Array
-    components: Array
-    machines: RbfMachines
-    votes: PairVotes
-
-    def __call__(self, X: Array) -> Array:
-        """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.won_clearly(self.machines((X - self.mean) @ self.components)))
 
 
 def principal_components(centred: Array, share: float) -> Array:

@@ -39,12 +39,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import find, param
+from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.learner import (
     UNCALIBRATED,
     Codes,
     Fitted,
+    Predictor,
     assign_folds,
     held_out_scores,
     standardisation,
@@ -204,7 +205,7 @@ class MeanAmplitude:
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean, or the logarithm of its absolute value."""
-        rows = find(AVERAGED, self.of, 'reading of the amplitude')(windows)
+        rows = AVERAGED[self.of](windows)
         amplitudes: Array = np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]
         return np.log(np.abs(amplitudes) + self.floor) if self.logarithm else amplitudes
 
@@ -366,8 +367,8 @@ class NaiveBayes:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = NaiveBayes().fit(values, codes, groups)
     >>> predictor = NaiveBayes.predictor(fitted.parameters)
-    >>> isinstance(predictor, SklearnPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     smoothing: float = param(
@@ -396,10 +397,17 @@ class NaiveBayes:
         return Fitted(parameters, held_out, f'not calibrated; growth from {split[1]}')
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> SklearnPredictor | HistogramNaiveBayesPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        made = HistogramNaiveBayesPredictor if 'edges' in parameters else SklearnPredictor.of_packed
-        return made(**parameters)
+        if 'edges' not in parameters:
+            return SklearnPredictor.of_packed(**parameters)
+        edges, log_shares, log_priors = (parameters[name] for name in ('edges', 'log_shares', 'log_priors'))
+
+        def predict(X: Array) -> Array:
+            shares = log_shares[np.arange(len(edges)), bins_of(X, edges)]
+            return log_softmax(np.add.reduce(shares, axis=-2) + log_priors)
+
+        return predict
 
     def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
         return self._counted(X, y, n_labels) if self.bins else self._normal(X, y, n_labels)
@@ -424,35 +432,6 @@ class NaiveBayes:
         bayes.var_ += self.smoothing  # of variance 1; of constant features, too, where scikit-learn would add nothing
         stored = packed(bayes, 'GaussianNB')
         return {'packed': stored, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'floor': 0.0}
-
-
-@dataclass(frozen=True, eq=False)
-class HistogramNaiveBayesPredictor:
-    """How often each feature lies between which edges.
-
-    Parameters
-    ----------
-    edges : (n_features, n_bins - 1)
-        Ascending.
-    log_shares : (n_features, n_bins, n_labels)
-    log_priors : (n_labels,)
-
-    Examples
-    --------
-    >>> edges, shares = np.array([[0.5]]), np.array([[[0.9, 0.2], [0.1, 0.8]]])  # below and above ½, for two labels
-    >>> predictor = HistogramNaiveBayesPredictor(edges, np.log(shares), np.log([0.5, 0.5]))
-    >>> np.exp(predictor(np.array([0.3]))).round(2).tolist()  # 0.9 : 0.2
-    [0.82, 0.18]
-    """
-
-    edges: Array
-    log_shares: Array
-    log_priors: Array
-
-    def __call__(self, X: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        shares = self.log_shares[np.arange(len(self.edges)), bins_of(X, self.edges)]
-        return log_softmax(np.add.reduce(shares, axis=-2) + self.log_priors)
 
 
 def bins_of(values: Array, edges: Array) -> Codes:

@@ -44,21 +44,21 @@ random movements
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.config import find, param
+from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, standardisation
+from texture_estimation.learners.learner import Codes, Fitted, Predictor, standardisation
 from texture_estimation.learners.sklearn_learner import packed, unpacked
 from texture_estimation.numerics import log_softmax
 from texture_features.feature import WindowBatch, centred, power
 from texture_features.features.temporal import Hjorth
-from texture_papers.roberge import PairVotes
+from texture_papers.roberge import PairsPredictor
 
 
 @dataclass(frozen=True)
@@ -227,8 +227,8 @@ class SvmLinear:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = SvmLinear(repeats=1).fit(values, codes, groups)
     >>> predictor = SvmLinear.predictor(fitted.parameters)
-    >>> isinstance(predictor, LinearPairsPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     folds: int = param(5, 'Number of cross-validation folds; more folds take longer to train.', low=2, high=50)
@@ -257,9 +257,11 @@ class SvmLinear:
         return Fitted(parameters, None, note)
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> LinearPairsPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
-        return LinearPairsPredictor(**parameters)
+        mean, intercepts = parameters['mean'], parameters['intercepts']
+        weights = (parameters['weights'] / parameters['scale']).T.copy()
+        return PairsPredictor(lambda X: (X - mean) @ weights + intercepts, 'nearest')
 
     def _choose(self, standard: Array, y: Codes, groups: Codes) -> float:
         """Return the penalty that does best on what is held out; the middle one if nothing can be."""
@@ -274,47 +276,6 @@ class SvmLinear:
             sum(int((_svc(standard[a], y[a], c).predict(standard[b]) == y[b]).sum()) for a, b in splits) for c in tried
         ]
         return float(tried[int(np.argmax(right))])
-
-
-@dataclass(frozen=True, eq=False)
-class LinearPairsPredictor:
-    """Linear decisions between all pairs.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    weights : (n_pairs, n_features)
-    intercepts : (n_pairs,)
-    """
-
-    mean: Array
-    scale: Array
-    weights: Array
-    intercepts: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, '_weights', (self.weights / self.scale).T.copy())
-        n_pairs = len(self.intercepts)
-        object.__setattr__(self, '_votes', PairVotes.of_pairs(n_pairs))
-
-    def __call__(self, X: Array) -> Array:
-        """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self._votes.won_clearly(self.decisions(X)))  # type: ignore[attr-defined]
-
-    def decisions(self, X: Array) -> Array:
-        """Return the decision value of each pair, (..., n_pairs); positive for its first label.
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_pairs)
-            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
-        """
-        return (X - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
 
 
 def _svc(standard: Array, y: Codes, c: float) -> Any:
@@ -380,8 +341,8 @@ class PassiveAggressive:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = PassiveAggressive().fit(values, codes, groups)
     >>> predictor = PassiveAggressive.predictor(fitted.parameters)
-    >>> isinstance(predictor, LinearPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
@@ -404,13 +365,11 @@ class PassiveAggressive:
         order = _in_rounds(y, self.rounds)
         # Only what was seen may be known: the scale, too, is that of the training examples.
         mean, scale = standardisation(X[order])
-        classifier = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')
-        online = classifier(np.zeros((int(y.max()) + 1, X.shape[1] + 1)), self.c)
+        planes = np.zeros((int(y.max()) + 1, X.shape[1] + 1))
         for row in np.tile(order, self.passes):
-            online.update((X[row] - mean) / scale, int(y[row]))
-        return Fitted(
-            {'mean': mean, 'scale': scale, 'planes': online.planes}, None, 'not calibrated: distances from the planes'
-        )
+            self._update(planes, (X[row] - mean) / scale, int(y[row]))
+        parameters = {'mean': mean, 'scale': scale, 'planes': planes}
+        return Fitted(parameters, None, 'not calibrated: distances from the planes')
 
     def partial_fit(self, parameters: Mapping[str, Any], X: Array, code: int) -> Mapping[str, Any]:
         """Return the parameters after one more slide of a label, whose windows each move the planes once.
@@ -431,138 +390,84 @@ class PassiveAggressive:
         """
         known = np.asarray(parameters['planes'])
         planes = np.vstack((known, np.zeros((max(0, code + 1 - len(known)), known.shape[1]))))
-        online = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')(planes, self.c)
         for standard in (X - parameters['mean']) / parameters['scale']:
-            online.update(standard, code)
-        return {**parameters, 'planes': online.planes}
+            self._update(planes, standard, code)
+        return {**parameters, 'planes': planes}
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> LinearPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        return LinearPredictor(**parameters)
+        mean, planes = parameters['mean'], parameters['planes']
+        weights, bias = (planes[:, :-1] / parameters['scale']).T.copy(), planes[:, -1].copy()
+        return lambda X: log_softmax((X - mean) @ weights + bias)
+
+    def _update(self, planes: Array, standard: Array, code: int) -> None:
+        UPDATES[self.multiclass](planes, standard, code, self.c)
 
 
-@dataclass
-class OnlineLinearClassifier:
-    """Planes that learn example by example.
+def move_each_plane(planes: Array, standard: Array, code: int, c: float) -> None:
+    """Move the plane of each label by itself as far as one example demands.
 
     Parameters
     ----------
     planes : (n_labels, n_features + 1)
-        Weights, and the bias last.
+        Weights, and the bias last; changed in place.
+    standard : (n_features,)
+        Standardised features of the example.
+    code
+        Number of its label.
     c
         How far one example may move a plane.
 
+    Source: Crammer et al. 2006, section 4.
+
     Examples
     --------
-    >>> online = OnlineLinearClassifier(np.zeros((2, 2)))
-    >>> online.update(np.array([1.0]), code=0)
-    >>> online.planes.tolist()  # both planes are now at a distance of 1 from it
+    >>> planes = np.zeros((2, 2))
+    >>> move_each_plane(planes, np.array([1.0]), code=0, c=1.0)
+    >>> planes.tolist()  # both planes are now at a distance of 1 from it
     [[0.5, 0.5], [-0.5, -0.5]]
     """
-
-    planes: Array
-    c: float = 1.0
-
-    def update(self, standard: Array, code: int) -> None:
-        """Learn from one example, (n_features,), of label number `code`.
-
-        Parameters
-        ----------
-        standard : (n_features,)
-            Standardised features.
-        code
-            Number of the true label.
-        """
-        extended = np.append(standard, 1.0)
-        side = np.full(len(self.planes), -1.0)
-        side[code] = 1.0
-        loss = np.maximum(0.0, 1.0 - side * (self.planes @ extended))
-        step = np.minimum(self.c, loss / (extended @ extended))
-        self.planes += (step * side)[:, None] * extended
+    extended = np.append(standard, 1.0)
+    side = np.full(len(planes), -1.0)
+    side[code] = 1.0
+    loss = np.maximum(0.0, 1.0 - side * (planes @ extended))
+    step = np.minimum(c, loss / (extended @ extended))
+    planes += (step * side)[:, None] * extended
 
 
-@dataclass
-class CrammerSingerClassifier:
-    """Planes that learn together: the true label is to score higher by 1 than every other.
+def move_true_and_rival(planes: Array, standard: Array, code: int, c: float) -> None:
+    """Move the planes of the true label and of its strongest rival until the true one scores higher by 1.
 
-    Parameters
-    ----------
-    planes : (n_labels, n_features + 1)
-        Weights, and the bias last.
-    c
-        How far one example may move a plane.
+    Of all planes for which that holds the nearest are taken: tau = min(c, loss / (2 |x|²)) is added to the one and
+    subtracted from the other, times x. The parameters are those of `move_each_plane`.
+
+    Source: Crammer et al. 2006, section 8.
 
     Examples
     --------
-    >>> online = CrammerSingerClassifier(np.zeros((2, 2)))
-    >>> online.update(np.array([1.0]), code=0)
-    >>> (online.planes @ [1.0, 1.0]).tolist()  # the true label scores higher by 1
+    >>> planes = np.zeros((2, 2))
+    >>> move_true_and_rival(planes, np.array([1.0]), code=0, c=1.0)
+    >>> (planes @ [1.0, 1.0]).tolist()  # the true label scores higher by 1
     [0.5, -0.5]
     """
-
-    planes: Array
-    c: float = 1.0
-
-    def update(self, standard: Array, code: int) -> None:
-        """Learn from one example, (n_features,), of label number `code`.
-
-        Of all planes for which the true label scores higher by 1 than the rival that scored highest, the nearest are
-        taken: tau = min(c, loss / (2 |x|²)) is added to the one and subtracted from the other, times x.
-
-        Source: Crammer et al. 2006, section 8.
-
-        Parameters
-        ----------
-        standard : (n_features,)
-            Standardised features.
-        code
-            Number of the true label.
-        """
-        if len(self.planes) < 2:
-            return
-        extended = np.append(standard, 1.0)
-        scores = self.planes @ extended
-        rivals = scores.copy()
-        rivals[code] = -np.inf
-        rival = int(rivals.argmax())
-        loss = max(0.0, 1.0 - float(scores[code] - scores[rival]))
-        step = min(self.c, loss / (2.0 * float(extended @ extended))) * extended
-        self.planes[code] += step
-        self.planes[rival] -= step
+    if len(planes) < 2:
+        return
+    extended = np.append(standard, 1.0)
+    scores = planes @ extended
+    rivals = scores.copy()
+    rivals[code] = -np.inf
+    rival = int(rivals.argmax())
+    loss = max(0.0, 1.0 - float(scores[code] - scores[rival]))
+    step = min(c, loss / (2.0 * float(extended @ extended))) * extended
+    planes[code] += step
+    planes[rival] -= step
 
 
-UPDATES: Mapping[str, type[OnlineLinearClassifier] | type[CrammerSingerClassifier]] = {
-    'one_vs_rest': OnlineLinearClassifier,
-    'crammer_singer': CrammerSingerClassifier,
+UPDATES: Mapping[str, Callable[[Array, Array, int, float], None]] = {
+    'one_vs_rest': move_each_plane,
+    'crammer_singer': move_true_and_rival,
 }
-
-
-@dataclass(frozen=True, eq=False)
-class LinearPredictor:
-    """Signed distances from planes.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    planes : (n_labels, n_features + 1)
-        Weights, and the bias last.
-    """
-
-    mean: Array
-    scale: Array
-    planes: Array
-
-    def __post_init__(self) -> None:
-        weights = self.planes[:, :-1] / self.scale
-        object.__setattr__(self, '_weights', weights.T.copy())
-        object.__setattr__(self, '_bias', self.planes[:, -1].copy())
-
-    def __call__(self, X: Array) -> Array:
-        """Return log softmax of the distances, (..., n_labels) of (..., n_features)."""
-        scores: Array = (X - self.mean) @ self._weights + self._bias  # type: ignore[attr-defined]
-        return log_softmax(scores)
 
 
 def _in_rounds(y: Codes, rounds: int) -> Codes:
@@ -594,8 +499,8 @@ class EmMixture:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = EmMixture().fit(values, codes, groups)
     >>> predictor = EmMixture.predictor(fitted.parameters)
-    >>> isinstance(predictor, MixturePredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     clusters_per_label: int = param(
@@ -644,32 +549,15 @@ class EmMixture:
         return Fitted(parameters, None, 'not calibrated: probabilities of clusters found without labels')
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> MixturePredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        values = dict(parameters)
-        return MixturePredictor(unpacked(values.pop('packed')), **values)
+        mixture, mean, scale, names = (
+            unpacked(parameters['packed']),
+            *(parameters[name] for name in ('mean', 'scale', 'names')),
+        )
 
+        def predict(X: Array) -> Array:
+            shares = mixture.predict_proba(np.atleast_2d((X - mean) / scale))
+            return log_softmax(np.log(shares @ names + LEAST)).reshape(*X.shape[:-1], -1)
 
-@dataclass(frozen=True, eq=False)
-class MixturePredictor:
-    """A mixture of normal distributions, each with the name of a label.
-
-    Parameters
-    ----------
-    mixture
-        Fitted `GaussianMixture`.
-    mean, scale : (n_features,)
-        Of the standardisation.
-    names : (n_clusters, n_labels)
-        1 for the label of the cluster, else 0.
-    """
-
-    mixture: Any
-    mean: Array
-    scale: Array
-    names: Array
-
-    def __call__(self, X: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        shares = self.mixture.predict_proba(np.atleast_2d((X - self.mean) / self.scale))
-        return log_softmax(np.log(shares @ self.names + LEAST)).reshape(*X.shape[:-1], -1)
+        return predict

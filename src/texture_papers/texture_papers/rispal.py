@@ -29,7 +29,7 @@ search
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -42,12 +42,19 @@ from texture_estimation.learners.learner import Codes, standardisation
 from texture_estimation.roughness import REGRESSOR_GRADES as GRADES
 from texture_estimation.roughness import ROUGH, SMOOTH
 from texture_papers.roberge import (
-    LINEAR,
-    SIGMOID,
     TRANSFERS,
     Network,
+    Networks,
     fit_network,
 )
+
+# From features (..., n_features) to grades and their standard deviations, (...) each.
+Grader = Callable[[Array], tuple[Array, Array]]
+
+
+def _without_std(grades: Array) -> tuple[Array, Array]:
+    """Return grades and their standard deviations, which the paper's regressors do not know."""
+    return grades, np.zeros_like(grades)
 
 
 def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
@@ -90,49 +97,10 @@ def grade_membership(grades: Array) -> NDArray[np.bool_]:
 HELD_OUT = 7
 
 
-@dataclass(frozen=True, eq=False)
-class RegressionNetworks:
-    """Hidden layers with one linear output each, over the same standardised features.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-    hidden : (n_networks · n_hidden, n_features)
-    hidden_bias : (n_networks · n_hidden,)
-    out : (n_networks, n_hidden)
-    out_bias : (n_networks,)
-    linear
-        Whether the hidden layers are linear, not sigmoid.
-
-    Examples
-    --------
-    >>> zero, one = np.zeros(1), np.ones(1)
-    >>> networks = RegressionNetworks(zero, one, one[None], zero, one[None], zero)
-    >>> networks(np.array([[0.5]])).round(3).tolist()  # tanh(0.5)
-    [[0.462]]
-    """
-
-    mean: Array
-    scale: Array
-    hidden: Array
-    hidden_bias: Array
-    out: Array
-    out_bias: Array
-    linear: bool = False
-
-    def __call__(self, X: Array) -> Array:
-        """Return the outputs, (..., n_networks) of (..., n_features)."""
-        active = TRANSFERS[LINEAR if self.linear else SIGMOID](
-            (X - self.mean) / self.scale @ self.hidden.T + self.hidden_bias
-        )
-        by_network = active.reshape(*active.shape[:-1], *self.out.shape)
-        return (by_network * self.out).sum(axis=-1) + self.out_bias
-
-
 def fit_networks(
     values: Array, targets: Sequence[Array], groups: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
 ) -> Mapping[str, Any]:
-    """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features).
+    """Return the fields of `Networks`, one network for each target, (n,), of values (n, n_features).
 
     Parameters
     ----------
@@ -149,7 +117,7 @@ def fit_networks(
     seed
         Seed of the first weights and of what is held out.
     transfer
-        Name of the transfer function of the output.
+        Name of the transfer function of the hidden layer.
 
     Returns
     -------
@@ -164,15 +132,7 @@ def fit_networks(
         fit_network(Network.random(hidden, values.shape[1], rng, transfer), standard, target, held, iterations)
         for target in targets
     ]
-    return {
-        'mean': mean,
-        'scale': scale,
-        'hidden': np.concatenate([network.hidden for network in fitted]),
-        'hidden_bias': np.concatenate([network.hidden_bias for network in fitted]),
-        'out': np.stack([network.out for network in fitted]),
-        'out_bias': np.array([network.out_bias for network in fitted]),
-        'linear': transfer == LINEAR,
-    }
+    return asdict(Networks.joined(fitted, mean, scale))
 
 
 def _held_out(textures: Codes) -> Any:
@@ -198,8 +158,8 @@ class Ann1:
     >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
     >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
     >>> predictor = Ann1.predictor(Ann1().fit(values, grades, textures))
-    >>> isinstance(predictor, NetworkRegressorPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    (True, True)
+    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    True
     """
 
     hidden: int = param(
@@ -221,21 +181,10 @@ class Ann1:
         return fit_networks(X, [y], groups, **asdict(self))
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> NetworkRegressorPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Grader:
         """Return the predictor made from the stored parameters."""
-        return NetworkRegressorPredictor(RegressionNetworks(**parameters))
-
-
-@dataclass(frozen=True, eq=False)
-class NetworkRegressorPredictor:
-    """The grade is the output, within 1 and 5."""
-
-    networks: RegressionNetworks
-
-    def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and standard deviation, the latter not known."""
-        grade = np.clip(self.networks(X)[..., 0], SMOOTH, ROUGH)
-        return grade, np.zeros_like(grade)
+        networks = Networks(**parameters)
+        return lambda X: _without_std(np.clip(networks(X)[..., 0], SMOOTH, ROUGH))
 
 
 VOTE_THRESHOLD = 0.5  # the networks are trained 0 and 1, and their output is rounded
@@ -253,8 +202,8 @@ class Ann5:
     >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
     >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
     >>> predictor = Ann5.predictor(Ann5().fit(values, grades, textures))
-    >>> isinstance(predictor, VotingNetworksPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    (True, True)
+    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    True
     """
 
     hidden: int = param(
@@ -277,21 +226,13 @@ class Ann5:
         return fit_networks(X, list(targets), groups, **asdict(self))
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> VotingNetworksPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Grader:
         """Return the predictor made from the stored parameters."""
-        return VotingNetworksPredictor(RegressionNetworks(**parameters))
+        networks = Networks(**parameters)
+        return lambda X: _without_std(mean_of_votes(networks(X) >= VOTE_THRESHOLD))
 
 
-@dataclass(frozen=True, eq=False)
-class VotingNetworksPredictor:
-    """The mean of the grades whose network fires."""
-
-    networks: RegressionNetworks
-
-    def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and standard deviation, the latter not known."""
-        grade = mean_of_votes(self.networks(X) >= VOTE_THRESHOLD)
-        return grade, np.zeros_like(grade)
+STORED = ('mean', 'scale', 'vectors', 'weights', 'offsets', 'gamma')  # of `Svm5`: the support vectors of all grades
 
 
 @dataclass(frozen=True)
@@ -306,8 +247,8 @@ class Svm5:
     >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
     >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
     >>> predictor = Svm5.predictor(Svm5().fit(values, grades, textures))
-    >>> isinstance(predictor, VotingSvmsPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    (True, True)
+    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    True
     """
 
     c: float = param(
@@ -340,47 +281,18 @@ class Svm5:
                 weights[svc.support_, number] = svc.dual_coef_[0]
                 offsets[number] = svc.intercept_[0]
         used = weights.any(axis=1)
-        return {
-            'mean': mean,
-            'scale': scale,
-            'vectors': standard[used],
-            'weights': weights[used],
-            'offsets': offsets,
-            'gamma': self.kernel_scale**-2.0,
-        }
+        stored = mean, scale, standard[used], weights[used], offsets, self.kernel_scale**-2.0
+        return dict(zip(STORED, stored, strict=True))
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> VotingSvmsPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Grader:
         """Return the predictor made from the stored parameters."""
-        return VotingSvmsPredictor(**parameters)
+        mean, scale, vectors, weights, offsets, gamma = (parameters[name] for name in STORED)
 
+        def grade(X: Array) -> tuple[Array, Array]:
+            standard = (X - mean) / scale
+            squares = (standard**2).sum(axis=-1)[..., None] + (vectors**2).sum(axis=1)
+            distances = squares - 2.0 * standard @ vectors.T
+            return _without_std(mean_of_votes(np.exp(-gamma * distances) @ weights + offsets > 0.0))
 
-@dataclass(frozen=True, eq=False)
-class VotingSvmsPredictor:
-    """The mean of the grades whose machine fires.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-    vectors : (n_vectors, n_features)
-        Support vectors of all machines.
-    weights : (n_vectors, 5)
-    offsets : (5,)
-    gamma
-        Of the kernel exp(-gamma d²).
-    """
-
-    mean: Array
-    scale: Array
-    vectors: Array
-    weights: Array
-    offsets: Array
-    gamma: float
-
-    def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and standard deviation, the latter not known."""
-        standard = (X - self.mean) / self.scale
-        squares = (standard**2).sum(axis=-1)[..., None] + (self.vectors**2).sum(axis=1)
-        distances = squares - 2.0 * standard @ self.vectors.T
-        grade = mean_of_votes(np.exp(-self.gamma * distances) @ self.weights + self.offsets > 0.0)
-        return grade, np.zeros_like(grade)
+        return grade

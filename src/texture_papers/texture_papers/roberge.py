@@ -23,7 +23,7 @@ machine
     Here: `SvmPairs` with the RBF kernel.
 decision
     Paper: Most pairs; a tie is unclassified (III.C).
-    Here: The same: `PairVotes`.
+    Here: The same: `pairs_won`.
 vote
     Paper: Five parts of one scan of 500 ms, at least three equal (III.C, IV.B.1).
     Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a decision of its own.
@@ -49,6 +49,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from itertools import combinations
 from typing import Any, ClassVar
 
@@ -211,93 +212,62 @@ def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array
 TIES = ('unclassified', 'nearest')
 
 
-@dataclass(frozen=True)
-class PairVotes:
-    """Counts what each label wins, in the pairs (0, 1), (0, 2), …, (1, 2), ….
+@cache
+def _pairs(n_pairs: int) -> tuple[Array, Array]:
+    """Return what a won pair adds to each label instead of a lost one, (n_pairs, n_labels), and what lost ones add."""
+    first, second = np.triu_indices(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0), k=1)
+    labels = np.eye(second[-1] + 1)
+    return labels[first] - labels[second], labels[second].sum(axis=0)
+
+
+def pairs_won(decisions: Array | NDArray[np.float32], ties: str = TIES[0]) -> Array:
+    """Return how many pairs each label wins, of decisions in the pairs (0, 1), (0, 2), …, (1, 2), ….
+
+    Whole numbers without rounding: labels that tie are equal to the last bit, which means unclassified.
 
     Parameters
     ----------
-    n_labels
-        At least 2.
+    decisions : (..., n_pairs)
+        Positive for the first label of a pair.
+    ties
+        'unclassified' leaves ties; 'nearest' adds less than half a pair for clearer decisions, as scikit-learn's SVC
+        does with `break_ties`.
+
+    Returns
+    -------
+    (..., n_labels)
 
     Examples
     --------
-    >>> votes = PairVotes(3)  # pairs (0, 1), (0, 2), (1, 2)
-    >>> votes.won(np.array([True, True, False])).tolist()
+    >>> pairs_won(np.array([0.5, 2.0, -1.0])).tolist()  # of three labels
     [2.0, 0.0, 1.0]
     """
+    swing, lost = _pairs(decisions.shape[-1])
+    won: Array = (decisions > 0) @ swing + lost
+    if ties == 'nearest':
+        clearness = decisions @ swing
+        won = won + clearness / (3.0 * (np.abs(clearness) + 1.0))
+    return won
 
-    n_labels: int
 
-    @classmethod
-    def of_pairs(cls, n_pairs: int) -> PairVotes:
-        """Return what counts the votes of so many pairs, which are those of all labels.
+@dataclass(frozen=True, eq=False)
+class PairsPredictor:
+    """Log softmax of the number of pairs won, (..., n_labels) of (..., n_features).
 
-        Examples
-        --------
-        >>> PairVotes.of_pairs(6).n_labels
-        4
-        """
-        return cls(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0))
+    Parameters
+    ----------
+    decisions
+        Takes (..., n_features), returns the decision of each pair, (..., n_pairs), positive for its first label.
+    ties
+        One of TIES.
+    """
 
-    def __post_init__(self) -> None:
-        pairs = np.array(list(combinations(range(self.n_labels), 2)))
-        first = np.eye(self.n_labels)[pairs[:, 0]]
-        second = np.eye(self.n_labels)[pairs[:, 1]]
-        object.__setattr__(self, '_second_wins_all', second.sum(axis=0))
-        object.__setattr__(self, '_swing', first - second)
+    decisions: Callable[[Array], Array]
+    ties: str
 
-    def won(self, first_wins: NDArray[np.bool_]) -> Array:
-        """Return how many pairs each label wins, (..., n_labels), of who wins each pair, (..., n_pairs).
-
-        Whole numbers without rounding: labels that tie are equal to the last bit, which means unclassified.
-
-        Parameters
-        ----------
-        first_wins : (..., n_pairs) bool
-            Whether the first label of each pair wins.
-
-        Returns
-        -------
-        (..., n_labels)
-            Whole numbers, 0 to n_labels - 1.
-        """
-        return first_wins @ self._swing + self._second_wins_all  # type: ignore[attr-defined]
-
-    def counted(self, decisions: Array | NDArray[np.float32], ties: str) -> Array:
-        """Return the pairs won, (..., n_labels), of decisions, (..., n_pairs); `ties` is one of TIES.
-
-        Parameters
-        ----------
-        decisions : (..., n_pairs)
-            Positive for the first label of a pair.
-        ties
-            'unclassified' leaves ties, 'nearest' breaks them by the clearer decisions.
-
-        Returns
-        -------
-        (..., n_labels)
-            Number of pairs won.
-        """
-        return self.won_clearly(decisions) if ties == 'nearest' else self.won(decisions > 0)
-
-    def won_clearly(self, decisions: Array | NDArray[np.float32]) -> Array:
-        """Return the pairs won, and less than half a pair more for the clearer decisions, which breaks ties.
-
-        Parameters
-        ----------
-        decisions : (..., n_pairs)
-            Positive for the first label of the pair.
-
-        Returns
-        -------
-        (..., n_labels)
-            Number of pairs won, and less than 0.5 more.
-
-        Source: scikit-learn's SVC with break_ties and decision_function_shape 'ovr'.
-        """
-        clearness = decisions @ self._swing  # type: ignore[attr-defined]
-        return self.won(decisions > 0) + clearness / (3.0 * (np.abs(clearness) + 1.0))
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the pairs won."""
+        return log_softmax(pairs_won(self.decisions(X), self.ties))
 
 
 # As MATLAB's trainlm: damping at the start, its steps and its end, and failures on what is held out.
@@ -524,6 +494,56 @@ def _error(network: Network, values: Array, targets: Array) -> float:
     return float(residual @ residual) / len(residual)
 
 
+@dataclass(frozen=True, eq=False)
+class Networks:
+    """Networks with one hidden layer and one linear output each, over the same standardised features.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    hidden : (n_networks, n_hidden, n_features)
+    hidden_bias, out : (n_networks, n_hidden)
+    out_bias : (n_networks,)
+    transfer
+        One of TRANSFERS.
+
+    Examples
+    --------
+    >>> zero, one = np.zeros(1), np.ones(1)
+    >>> Networks(zero, one, one[None, None], zero[None], one[None], zero)(np.array([[0.5]])).round(3)  # tanh(0.5)
+    array([[0.462]])
+    """
+
+    mean: Array
+    scale: Array
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: Array
+    transfer: str = SIGMOID
+
+    def __post_init__(self) -> None:
+        weights = self.hidden.reshape(-1, len(self.mean)) / self.scale
+        object.__setattr__(self, '_weights', weights.T.copy())
+
+    @classmethod
+    def joined(cls, networks: Sequence[Network], mean: Array, scale: Array) -> Networks:
+        """Return networks, all of the same shape, that were trained on standardised features."""
+        hidden, bias, out = (
+            np.stack([getattr(one, name) for one in networks]) for name in ('hidden', 'hidden_bias', 'out')
+        )
+        return cls(mean, scale, hidden, bias, out, np.array([one.out_bias for one in networks]), networks[0].transfer)
+
+    def __call__(self, X: Array) -> Array:
+        """Return the outputs, (..., n_networks) of (..., n_features)."""
+        active = (X - self.mean) @ self._weights  # type: ignore[attr-defined]
+        active += self.hidden_bias.reshape(-1)
+        layers = TRANSFERS[self.transfer](active).reshape(*X.shape[:-1], *self.out.shape)
+        outputs: Array = np.add.reduce(layers * self.out, axis=-1)
+        return outputs + self.out_bias
+
+
 NOTE = 'not calibrated: the pairs won are counted'
 
 
@@ -542,8 +562,8 @@ class SvmPairs:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = SvmPairs().fit(values, codes, groups)
     >>> predictor = SvmPairs.predictor(fitted.parameters)
-    >>> isinstance(predictor, SvmPairsPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     box_constraint: float = param(
@@ -573,27 +593,9 @@ class SvmPairs:
         return Fitted({'machines': asdict(machines), 'ties': self.ties}, None, NOTE)
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> SvmPairsPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
-        machines = RbfMachines(**parameters['machines'])
-        return SvmPairsPredictor(machines, PairVotes(machines.n_labels), str(parameters['ties']))
-
-
-@dataclass(frozen=True, eq=False)
-class SvmPairsPredictor:
-    """The machines of all pairs, evaluated together."""
-
-    machines: RbfMachines
-    votes: PairVotes
-    ties: str
-
-    def __call__(self, X: Array) -> Array:
-        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.counted(self.decisions(X), self.ties))
-
-    def decisions(self, X: Array) -> Array:
-        """Return the decision of each pair, (..., n_pairs); positive for its first label."""
-        return self.machines(X)
+        return PairsPredictor(RbfMachines(**parameters['machines']), str(parameters['ties']))
 
 
 ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair
@@ -616,8 +618,8 @@ class AnnPairs:
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
     >>> fitted = AnnPairs().fit(values, codes, groups)
     >>> predictor = AnnPairs.predictor(fitted.parameters)
-    >>> isinstance(predictor, PairNetworksPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
     """
 
     hidden: int = param(
@@ -647,80 +649,13 @@ class AnnPairs:
             start = Network.random(self.hidden, X.shape[1], rng)
             targets = (y[rows] == first).astype(np.float64)
             networks.append(fit_network(start, standard[rows], targets, held[rows], self.iterations))
-        parameters = {
-            'mean': mean,
-            'scale': scale,
-            'hidden': np.stack([network.hidden for network in networks]),
-            'hidden_bias': np.stack([network.hidden_bias for network in networks]),
-            'out': np.stack([network.out for network in networks]),
-            'out_bias': np.array([network.out_bias for network in networks]),
-            'ties': self.ties,
-        }
-        return Fitted(parameters, None, NOTE)
+        return Fitted({'networks': asdict(Networks.joined(networks, mean, scale)), 'ties': self.ties}, None, NOTE)
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> PairNetworksPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
-        return PairNetworksPredictor(**parameters)
-
-
-@dataclass(frozen=True, eq=False)
-class PairNetworksPredictor:
-    """The networks of all pairs, evaluated together.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    hidden : (n_pairs, n_hidden, n_features)
-    hidden_bias, out : (n_pairs, n_hidden)
-    out_bias : (n_pairs,)
-    ties
-        One of TIES.
-    """
-
-    mean: Array
-    scale: Array
-    hidden: Array
-    hidden_bias: Array
-    out: Array
-    out_bias: Array
-    ties: str
-
-    def __post_init__(self) -> None:
-        n_pairs = len(self.out_bias)
-        weights = self.hidden.reshape(-1, len(self.mean)) / self.scale
-        object.__setattr__(self, '_weights', weights.T.copy())
-        object.__setattr__(self, '_votes', PairVotes.of_pairs(n_pairs))
-
-    def __call__(self, X: Array) -> Array:
-        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
-        votes: PairVotes = self._votes  # type: ignore[attr-defined]
-        return log_softmax(votes.counted(self.decisions(X), self.ties))
-
-    def decisions(self, X: Array) -> Array:
-        """Return the output of each network less what is rounded up, (..., n_pairs); positive for its first label."""
-        return self.outputs(X) - ROUNDED_UP
-
-    def outputs(self, values: Array) -> Array:
-        """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second.
-
-        Parameters
-        ----------
-        values : (..., n_features)
-
-        Returns
-        -------
-        (..., n_pairs)
-            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
-        """
-        active = (values - self.mean) @ self._weights  # type: ignore[attr-defined]
-        active += self.hidden_bias.reshape(-1)
-        np.tanh(active, out=active)
-        layers = active.reshape(*values.shape[:-1], *self.out.shape)
-        layers *= self.out
-        outputs: Array = np.add.reduce(layers, axis=-1)
-        return outputs + self.out_bias
+        networks = Networks(**parameters['networks'])
+        return PairsPredictor(lambda X: networks(X) - ROUNDED_UP, str(parameters['ties']))
 
 
 def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
@@ -732,46 +667,6 @@ def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
         number = slides if slides.max() + 1 >= HELD_OUT else np.arange(len(rows))
         held[rows] = number % HELD_OUT == HELD_OUT - 1
     return held
-
-
-@dataclass(frozen=True, eq=False)
-class TunedPairsPredictor:
-    """The machines and networks of all pairs, each on features of its own.
-
-    Parameters
-    ----------
-    members
-        Of each pair its number, the features that it sees, and what decides it.
-    votes
-        Counts the pairs won.
-    ties
-        One of TIES.
-    """
-
-    members: tuple[tuple[int, Codes, SvmPairsPredictor | PairNetworksPredictor], ...]
-    votes: PairVotes
-    ties: str
-
-    def __call__(self, X: Array) -> Array:
-        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.counted(self.decisions(X), self.ties))
-
-    def decisions(self, X: Array) -> Array:
-        """Return the decision of each pair, (..., n_pairs); positive for its first label.
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_pairs)
-            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
-        """
-        decisions = np.empty((*X.shape[:-1], len(self.members)))
-        for number, columns, predictor in self.members:
-            decisions[..., number] = predictor.decisions(X[..., columns])[..., 0]
-        return decisions
 
 
 TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have variables of their own'
@@ -984,16 +879,21 @@ class TunedPairs:
         return Fitted(parameters, None, TUNED_NOTE.format(n_tuned, len(pairs)))
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> TunedPairsPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
         n_pairs, members = int(parameters['n_pairs']), parameters['members']
         if sorted(int(one['number']) for one in members) != list(range(n_pairs)):
             raise ModelMismatch(f'its {n_pairs} pairs are decided by {len(members)} learners, or some not once')
-        fitted = tuple(
-            (int(one['number']), one['columns'], OF_PAIRS[one['learner']].predictor(one['parameters']))
-            for one in members
-        )
-        return TunedPairsPredictor(fitted, PairVotes.of_pairs(n_pairs), str(parameters['ties']))
+        # Sorted by their pairs, each with the features that it sees.
+        fitted = [
+            (one['columns'], OF_PAIRS[one['learner']].predictor(one['parameters']))
+            for one in sorted(members, key=lambda one: int(one['number']))
+        ]
+
+        def decisions(X: Array) -> Array:
+            return np.stack([predictor.decisions(X[..., columns])[..., 0] for columns, predictor in fitted], axis=-1)
+
+        return PairsPredictor(decisions, str(parameters['ties']))
 
     def _columns(self, pair: TunedPair) -> Codes:
         """Return the numbers of the features that a pair sees."""
