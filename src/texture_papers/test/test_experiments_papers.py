@@ -69,7 +69,7 @@ def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(
     assert path.is_file()
     assert 'simulated' in result.data
     assert all(matplotlib.image.imread(chart).std() > 0 for chart in result.charts)
-    text = '\n'.join(result.lines)
+    text = '\n'.join(result.lines())
     for task in protocol.tasks:
         for method in task.methods:
             figures = result.numbers['tasks'][task.name][method.name]
@@ -234,7 +234,7 @@ def numbers(seed: int, test: float, gain: float, **finding: Any) -> dict:
         'seed': seed,
         'digests': NOW,
         'tasks': {'task': {'one': {'test': [test, 0.0, 1.0]}}},
-        'findings': [{'claim': 'it gains', 'interval': [gain, gain, gain], 'verdict': 'holds', **finding}],
+        'findings': [{'claim': 'it gains', 'here': '', 'interval': [gain, gain, gain], 'verdict': 'holds', **finding}],
     }
 
 
@@ -277,7 +277,7 @@ def test_a_seed_is_run_again_only_if_a_digest_has_changed(tmp_path: Path) -> Non
     assert seen == [(3, 0), (4, 2), (5, 2)]
     assert over_seeds(run, 'mine', Experiment(tmp_path, seed=3), 3, NOW).numbers == first.numbers
     assert len(seen) == 3
-    assert 'over 3 seeds' in '\n'.join(first.lines)
+    assert 'over 3 seeds' in '\n'.join(first.lines())
     over_seeds(run, 'mine', Experiment(tmp_path, seed=3), 3, {'task, one': 'changed'})
     assert len(seen) == 6
 

@@ -116,11 +116,6 @@ def run_components(experiment: Experiment) -> ExperimentResult:
             'components': counts,
             'findings': [finding_as_json(finding) for finding in component_findings(counts)],
         },
-        lines=tuple(
-            f'{scale}, along {direction}: {", ".join(f"{name} {count}" for name, count in linens.items())}'
-            for scale, directions in counts.items()
-            for direction, linens in directions.items()
-        ),
     )
 
 

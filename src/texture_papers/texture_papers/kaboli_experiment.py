@@ -297,9 +297,6 @@ def run_online(experiment: Experiment) -> ExperimentResult:
             'update_us': round(1e6 * float(np.median(taken_s)), 1),
             'findings': [],
         },
-        lines=tuple(
-            f'{kind}: {name}: {100 * one["test"][0]:.1f} %' for kind, of in tasks.items() for name, one in of.items()
-        ),
     )
 
 

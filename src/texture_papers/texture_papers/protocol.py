@@ -70,10 +70,6 @@ class Interval:
             return True
         return False if self.high < 0.0 else None
 
-    def times(self, factor: float) -> Interval:
-        """Return the figure in another unit."""
-        return Interval(self.value * factor, self.low * factor, self.high * factor)
-
     def less(self, border: float) -> Interval:
         """Return how much the figure is above a border."""
         return Interval(self.value - border, self.low - border, self.high - border)
@@ -557,7 +553,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class ExperimentResult:
-    """The numbers of one experiment; `lines` are the table for people, the paper's figures beside ours."""
+    """The numbers of one experiment, and what was measured on what."""
 
     name: str
     measured: str
@@ -565,7 +561,29 @@ class ExperimentResult:
     split: str
     numbers: Mapping[str, Any]
     charts: tuple[Path, ...] = ()
-    lines: tuple[str, ...] = ()
+
+    def lines(self) -> Iterator[str]:
+        """Yield our figures beside the paper's, and the findings, for people: means over seeds where there are some."""
+        seeds = self.numbers.get('seeds', [self.numbers['seed']])
+        yield f'over {len(seeds)} seeds: mean, and its interval of 95 %' if seeds[1:] else f'seed {seeds[0]}'
+        for task, methods in self.numbers.get('tasks', {}).items():
+            for method, figures in methods.items():
+                value, low, high = (100 * part for part in figures.get('over_seeds', figures['test']))
+                paper = figures.get('paper', {}).get('test')
+                told = '' if paper is None else f'; paper {100 * paper:.1f} %'
+                yield f'  {task}, {method}: {value:.1f} % ({low:.1f} to {high:.1f}){told}'
+        for name, parts in self.numbers.get('regressors', {}).items():
+            for part, figures in parts.items():
+                paper = self.numbers.get('paper', {}).get(name, {}).get(part)
+                told = '' if paper is None else f'; paper {paper:.2f}'
+                error = figures.get('over_seeds', [figures['error'] or math.nan])[0]
+                yield f'  {name}, {part} textures: error {error:.2f} grades{told}'
+        for name, facts in self.numbers.get('tuning', {}).items():
+            yield f'  searched {name}: {facts["individuals_tried"]} individuals, {facts["seconds"]:.0f} s'
+        for finding in self.numbers['findings']:
+            value, low, high = finding.get('over_seeds', finding['interval'])
+            yield f'  {finding["verdict"]:14} {finding["claim"]}: {value:+.3f} ({low:+.3f} to {high:+.3f})'
+            yield f'  {"":14} here {finding["here"]}'
 
     def write(self, out: Path) -> Path:
         """Write the JSON and return its path."""
@@ -1236,8 +1254,7 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests:
     first = _first(run, name, experiment, digests)
     further = replace(experiment, splits=SEED_SPLITS)
     others = [_kept(run, name, replace(further, seed=experiment.seed + number), digests) for number in range(1, count)]
-    numbers = with_seeds(first.numbers, others)
-    return replace(first, numbers=numbers, lines=(*first.lines, *seed_lines(numbers)))
+    return replace(first, numbers=with_seeds(first.numbers, others))
 
 
 def _first(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> ExperimentResult:
@@ -1313,31 +1330,9 @@ def mean_over_seeds(values: Sequence[float]) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
-def seed_lines(numbers: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the means over seeds as a table for people."""
-    yield f'over {len(numbers["seeds"])} seeds: mean, and its interval of 95 %'
-    for name, values in _over_seeds(numbers.get('tasks', {})):
-        mean, low, high = (100 * value for value in values)
-        yield f'  {name}: {mean:.1f} % ({low:.1f} to {high:.1f})'
-    for name, (mean, low, high) in _over_seeds(numbers.get('regressors', {})):
-        yield f'  {name}: {mean:.2f} ({low:.2f} to {high:.2f}) grades'
-    for finding in numbers['findings']:
-        if 'over_seeds' in finding:
-            mean, low, high = finding['over_seeds']
-            yield f'  {finding["verdict"]:14} {finding["claim"]}: {mean:+.3f} ({low:+.3f} to {high:+.3f})'
-
-
 def _add(figures: dict[str, Any], found: Sequence[float], *, share: bool = False) -> None:
     """Add values and interval of the seeds, which is cut where no share can lie."""
     if len(found) > 1:
         figures['by_seed'] = list(found)
         interval = mean_over_seeds(found).as_json()
         figures['over_seeds'] = [min(max(value, 0.0), 1.0) for value in interval] if share else interval
-
-
-def _over_seeds(groups: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Sequence[float]]]:
-    """Yield the name, and mean and interval over seeds, of each member of each group that has them."""
-    for group, members in groups.items():
-        for member, figures in members.items():
-            if 'over_seeds' in figures:
-                yield f'{group}, {member}', figures['over_seeds']

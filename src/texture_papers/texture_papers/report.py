@@ -26,9 +26,7 @@ from texture_papers.protocol import (
     MethodResult,
     MethodResults,
     PaperProtocol,
-    RecognitionTask,
     Table,
-    TunedRecipes,
     apart,
     digest_of_row,
     mean,
@@ -377,7 +375,13 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
             for task in protocol.tasks
         },
         'findings': [finding_as_json(finding) for finding in checked],
-        'tuning': {f'{recipe}, {task}': one.figures() for (task, recipe), one in tuned.items()},
+        'tuning': {
+            f'{recipe}, {task}': {
+                **one.figures(),
+                'recipe': one.write(experiment.out / f'{recipe}{TUNED}-{task.replace(" ", "-")}.yaml').name,
+            }
+            for (task, recipe), one in tuned.items()
+        },
     }
     return ExperimentResult(
         name=name,
@@ -389,7 +393,6 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
         split=f'{protocol.split}{SEARCHED if tuned else ""}',
         numbers=numbers,
         charts=charts_of(protocol, numbers, name, experiment.out),
-        lines=(*_lines(protocol, found, checked), *_tuning_lines(tuned, experiment.out)),
     )
 
 
@@ -543,68 +546,6 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
 
 def _interval(figures: Mapping[str, Any]) -> Interval:
     return Interval(*figures.get('over_seeds', figures['test']))
-
-
-def _lines(protocol: PaperProtocol, found: MethodResults, checked: Sequence[Finding]) -> Iterator[str]:
-    yield (
-        f'{"%":38}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
-        f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'
-    )
-    for task in protocol.tasks:
-        yield f'{task.name}:'
-        for method in task.methods:
-            yield _row(method, found[task.name, method.name])
-    anchor = protocol.anchor
-    where = f'{anchor.task} of {anchor.experiment}' if anchor.experiment else anchor.task
-    yield (
-        f'anchor, no finding: {anchor.setting}, set so that {anchor.method} ({where}) recognises '
-        f'{100 * anchor.test:.1f} % ({anchor.source}){f"; {anchor.shortfall}" if anchor.shortfall else ""}'
-    )
-    yield 'findings of the paper:'
-    for finding in checked:
-        interval = finding.interval.times(100.0)
-        yield f'  {VERDICTS[finding.holds]:14} {finding.claim}'
-        reported = f'{interval.value:+.1f} points ({interval.low:+.1f} to {interval.high:+.1f})'
-        yield f'  {"":14} here {finding.here}; decided by {reported}'
-    for task in protocol.tasks:
-        for method in task.methods:
-            if method.confusion is not None:
-                yield from _confusion_lines(task, method, found[task.name, method.name])
-
-
-def _tuning_lines(tuned: TunedRecipes, out: Path) -> Iterator[str]:
-    """Write the recipes that were searched for, and tell where they are and what they took."""
-    for (task, recipe), one in tuned.items():
-        path = one.write(out / f'{recipe}{TUNED}-{task.replace(" ", "-")}.yaml')
-        facts = one.figures()
-        yield (
-            f'searched: {path}: training {100 * facts["learning"]:.1f} %, test {100 * facts["test"]:.1f} % within the '
-            f'search; {facts["individuals_tried"]} individuals on {facts["scans"]} slides in {facts["seconds"]:.0f} s'
-        )
-
-
-def _row(method: Method, outcome: MethodResult) -> str:
-    paper = method.paper
-    return (
-        f'  {method.name:36}{_share(paper.learning):>16}{_share(paper.test):>7}{_share(paper.unclassified):>14}   '
-        f'{_share(outcome.learning):>20}{_plain(outcome):>22}{_share(outcome.unclassified):>14}'
-    )
-
-
-def _plain(outcome: MethodResult) -> str:
-    return percent(outcome.test).replace(' %', '')
-
-
-def _share(value: float | None) -> str:
-    return '–' if value is None else f'{100 * value:.1f}'
-
-
-def _confusion_lines(task: RecognitionTask, method: Method, outcome: MethodResult) -> Iterator[str]:
-    yield f'{method.name}, {task.name}: % of each surface taken for each, paper | simulated (last: none)'
-    width = max(map(len, outcome.surfaces))
-    for name, theirs, ours in zip(outcome.surfaces, shares_of(method.confusion), outcome.confusion, strict=True):
-        left, right = (' '.join(f'{100 * value:3.0f}' for value in row) for row in (theirs, ours))
-        yield f'  {name:{width}}  {left}  | {right}'
 
 
 def shares_of(table: Table | None) -> AnyArray:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -19,15 +18,13 @@ from texture_estimation.roughness import (
     NORMAL_90,
     TEST,
     TRAIN,
-    Grades,
-    RoughnessAccumulator,
     RoughnessModel,
     RoughnessRecipe,
     load_roughness_recipe,
     read_grades,
     train_grades,
 )
-from texture_estimation.search import RecipeSpace, RoughnessTask, SearchParams
+from texture_estimation.search import RecipeSpace, RoughnessTask
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.examples import LabelledFeatures
 from texture_features.feature_set import FeatureSet
@@ -42,7 +39,6 @@ from texture_papers.protocol import (
     Mask,
     RecognitionTask,
     SlideArrays,
-    TunedRecipe,
     Visits,
     digest_of_row,
     mean,
@@ -139,13 +135,16 @@ class SimulatedTextures:
         What is touched.
     seed
         Of where, and of all effects.
+    quick
+        Whether fewer scans and splits will do.
     """
 
-    def __init__(self, scene: Scene, seed: int) -> None:
-        self._scene = scene
-        self._seed = seed
-        self._rate_hz = find(SENSORS, scene.sensor, 'sensor model').fast.rate_hz
-        self._channels = find(SENSORS, scene.sensor, 'sensor model').fast.channels
+    def __init__(self, scene: Scene, seed: int, *, quick: bool = False) -> None:
+        self.seed, self.quick = seed, quick
+        self.grades = read_grades(GRADES)
+        self.textures = tuple(self.grades.grades)  # in the order of the table
+        self.scans, self.other_scans, self.splits = QUICK_COUNTS if quick else COUNTS
+        self._scene, self._fast = scene, find(SENSORS, scene.sensor, 'sensor model').fast
         self._scans: dict[tuple[str, float, float, int], Array] = {}
 
     def extract(
@@ -195,19 +194,19 @@ class SimulatedTextures:
             One for each slide.
         """
         for number, samples in enumerate(self._measured(texture, count, speed_m_s, force_n)):
-            window = Window(samples, self._rate_hz, self._channels, 0, speed_m_s, force_n)
+            window = Window(samples, self._fast.rate_hz, self._fast.channels, 0, speed_m_s, force_n)
             yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, speed_m_s, force_n, texture)
 
     def _measured(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Array:
         key = texture, speed_m_s, force_n, count
         if key not in self._scans:
             place = list(self._scene.surfaces).index(texture)
-            rng = np.random.default_rng([self._seed, place, round(1e4 * speed_m_s), round(1e3 * force_n), count])
+            rng = np.random.default_rng([self.seed, place, round(1e4 * speed_m_s), round(1e3 * force_n), count])
             samples = simulate_slides(self._scene, texture, count, SimulatedSlide(speed_m_s, force_n, SCAN_S), rng)
-            self._scans[key] = samples[:, : round(USED_S * self._rate_hz)].astype(np.float64)
+            self._scans[key] = samples[:, : round(USED_S * self._fast.rate_hz)].astype(np.float64)
         return self._scans[key]
 
-    def scans(self, textures: Sequence[str], count: int, speed_m_s: float, force_n: float) -> SlideArrays:
+    def slides(self, textures: Sequence[str], count: int, speed_m_s: float, force_n: float) -> SlideArrays:
         """Return the same scans as plain arrays, for a search.
 
         Parameters
@@ -227,26 +226,8 @@ class SimulatedTextures:
         """
         samples = np.concatenate([self._measured(texture, count, speed_m_s, force_n) for texture in textures])
         same = np.ones(len(samples))
-        streams = {'signal': ArrayStream(samples, self._rate_hz)}
+        streams = {'signal': ArrayStream(samples, self._fast.rate_hz)}
         return SlideArrays(streams, np.repeat(np.array(textures), count), speed_m_s * same, force_n * same)
-
-
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """What all parts of the experiment share."""
-
-    simulated: SimulatedTextures
-    grades: Grades
-    scans: int
-    other_scans: int
-    splits: int
-    seed: int
-    quick: bool
-
-    @property
-    def textures(self) -> tuple[str, ...]:
-        """All textures, in the order of the table."""
-        return tuple(self.grades.grades)
 
     def examples(
         self, recipe: RoughnessRecipe, textures: Sequence[str], speed_m_s: float = SPEED_M_S, force_n: float = FORCE_N
@@ -270,7 +251,7 @@ class Setup:
         """
         trained = (speed_m_s, force_n) == (SPEED_M_S, FORCE_N)
         count = self.scans if trained else self.other_scans
-        return self.simulated.extract(recipe.feature_set, textures, count, speed_m_s, force_n)
+        return self.extract(recipe.feature_set, textures, count, speed_m_s, force_n)
 
     def ask(self, model: RoughnessModel, examples: LabelledFeatures) -> Answers:
         """Return what a model says of each window."""
@@ -284,44 +265,6 @@ class Setup:
         return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
 
 
-TARGET_S = 15 * 60.0
-
-
-class TunedRegressor(TunedRecipe):
-    """A recipe of a regressor that was searched for, and what it took."""
-
-    def figures(self) -> dict[str, Any]:
-        """Return what the search took, and the errors of the best; its score falls by a quarter for each grade off."""
-        figures = super().figures()
-        errors = {f'{name}_error': 4.0 * (1.0 - figures.pop(name)) for name in ('learning', 'test')}
-        return {**figures, **errors}
-
-
-def tune_regressor(recipe: RoughnessRecipe, scans: SlideArrays, grades: Grades, params: SearchParams) -> TunedRegressor:
-    """Return the best recipe of the search space that is named like this one.
-
-    As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
-
-    Parameters
-    ----------
-    recipe
-        Recipe whose search space is searched.
-    scans
-        Slides that the search may use.
-    grades
-        Grade of each texture.
-    params
-        Size and seed of the search.
-
-    Returns
-    -------
-    TunedRegressor
-    """
-    found = tune(RecipeSpace.load(recipe.name, recipe), scans, RoughnessTask(grades), params)
-    return TunedRegressor(found.found, found.seconds, found.cpu_seconds, found.scans)
-
-
-WARM_UP = 200  # windows before the time is taken
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
 
 
@@ -405,85 +348,10 @@ def _grade_bars(axes: Any, table: ByTexture, place: Mapping[str, int], kind: str
                   zorder=3)  # fmt: skip
 
 
-PARTS = (('seen', 'training'), ('unseen', 'unseen'))
-
-
-def table_lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
-    """Yield the tables: errors, other conditions, textures one by one."""
-    yield from _error_lines(numbers)
-    others = numbers['other_conditions_unseen']
-    for condition in others['ours']:
-        row = [f'{name} {number(figures[condition]["error"])}' for name, figures in others.items()]
-        yield f'  unseen textures at {condition}: {", ".join(row)}'
-    splits = numbers['ours_other_splits']
-    yield (
-        f'  ours over {splits["splits"]} random choices of the training textures: error {splits["error"]:.2f}, '
-        f'90 % intervals hold in {100 * splits["coverage_90"]:.0f} %'
-    )
-    skids = numbers['skids']
-    yield (
-        f'  with {skids["per_s"]:g} skids a second {100 * skids["with"]["refused"]:.0f} % of the windows are refused '
-        f'(without, {100 * skids["without"]["refused"]:.1f} %): error of all {number(skids["with"]["error_of_all"])}, '
-        f'of those graded {number(skids["with"]["error_of_the_others"])}'
-    )
-    latency = numbers['window_to_grade_us']
-    yield f'  from window to grade: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile'
-    yield from _texture_lines(numbers, grades)
-
-
-def _error_lines(numbers: Mapping[str, Any]) -> Iterator[str]:
-    yield 'mean absolute error (standard deviation within a texture), in grades:'
-    yield (
-        f'  {"":14}{"paper: training":>16}{"unseen":>14}'
-        f'{"here: training":>18}{"unseen":>14}{"no grade":>10}{"left out":>10}'
-        '   90 % intervals hold: unseen, left out'
-    )
-    for name, parts in numbers['regressors'].items():
-        paper = numbers['paper'].get(name, {})
-        unseen, left = parts['unseen'], parts['left_out']
-        said = [pair(paper.get(part), paper.get(f'std_{part}')) for part, _ in PARTS]
-        found = [pair(parts[part]['error'], parts[part]['std']) for part, _ in PARTS]
-        yield (
-            f'  {name:14}{said[0]:>16}{said[1]:>14}{found[0]:>18}{found[1]:>14}'
-            f'{100 * unseen["without_grade"]:8.0f} %{number(left["error"]):>10}'
-            f'   {number(unseen["coverage_90"])}, {number(left["coverage_90"])}'
-        )
-    middle = numbers['always_the_middle']
-    yield f'  always 3{"":36}{middle["seen"]:11.2f}{middle["unseen"]:14.2f}{"":17}{middle["left_out"]:10.2f}'
-    yield f'  one person against the others, in another study: {numbers["one_person"]}'
-    errors = {name: parts['unseen']['error_of_the_mean'] for name, parts in numbers['regressors'].items()}
-    reported = ', '.join(f'{name} {number(error)}' for name, error in errors.items())
-    for finding in numbers['findings']:
-        value, low, high = finding['interval']
-        yield f'  {finding["verdict"]:14} {finding["claim"]}'
-        yield f'  {"":14} here {finding["here"]}; decided by {value:+.2f} ({low:+.2f} to {high:+.2f})'
-    yield f'  standard error of the unseen mean, ten textures being ten opinions: {reported}'
-
-
-def _texture_lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
-    tables = {**numbers['by_texture'], 'left out': numbers['ours_left_out_by_texture']}
-    width = max(map(len, grades.grades))
-    yield f'  {"texture":{width}}{"people":>8}' + ''.join(f'{name:>13}' for name in tables)
-    for texture, grade in grades.grades.items():
-        unseen = grades.splits.get(texture) == TEST
-        row = ''.join(f'{pair(table[texture]["mean"], table[texture]["std"]):>13}' for table in tables.values())
-        yield f'  {texture:{width}}{grade:8g}{row}{"   unseen" if unseen else ""}'
-
-
-def pair(mean: float | None, std: float | None) -> str:
-    """Return 'mean (std)'."""
-    return f'{number(mean)} ({number(std)})' if mean is not None else '–'
-
-
-def number(value: float | None) -> str:
-    """Return two digits after the point; a dash for what is not known."""
-    return '–' if value is None or math.isnan(value) else f'{value:.2f}'
-
-
 SCENE, GRADES = 'roughness', 'ets_roughness'
-SCANS, QUICK_SCANS = 200, 12
-OTHER_SCANS, QUICK_OTHER_SCANS = 50, 4
-SPLITS, QUICK_SPLITS = 20, 2
+SCANS = 200
+# Scans of each texture, those at other speeds and forces, and random choices of the training textures.
+COUNTS, QUICK_COUNTS = (SCANS, 50, 20), (12, 4, 2)
 QUICK_STEP = 8  # between the textures that the paper's regressors have left out
 OURS = 'roughness'
 RECIPES = {
@@ -500,30 +368,29 @@ COLUMNS = ('seen', 'unseen', 'std_seen', 'std_unseen')
 ONE_PERSON = 0.82  # grades from the mean of the others: 81 materials, 11 people, another study (ViPer)
 SPEEDS_M_S, FORCES_N = (0.10, 0.15, 0.20), (1.0, 2.5, 5.0)
 SKIDS_PER_S = 3.0
-TIMED, QUICK_TIMED = 2000, 50
 NOMINAL = np.array([0.5, 0.6, 0.7, 0.8, 0.9, 0.95])
 TARGETS = {
     'ours_unseen': 0.80,
     'ours_left_out': 0.80,
     'ours_other_speeds': 0.9,
     'coverage_90': [0.85, 0.95],
-    'window_to_grade_us': 200.0,
-    'tuning_s': TARGET_S,
 }
 
 
 def run(experiment: Experiment) -> ExperimentResult:
     """Learn the paper's 15 textures, grade its 10 others; leave each of the 25 out; go faster and slower."""
-    setup = _setup(experiment)
+    simulated = SimulatedTextures(load_scene(SCENE), experiment.seed, quick=experiment.quick)
     recipes = {name: load_roughness_recipe(recipe) for name, recipe in RECIPES.items()}
-    train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
+    train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
     if experiment.tune:
-        return _after_search(setup, {name: recipes[name] for name in PAPER}, experiment)
+        return _after_search(simulated, {name: recipes[name] for name in PAPER}, experiment)
     if experiment.splits:
-        return _table_2(setup, {name: recipe for name, recipe in recipes.items() if recipe.name != OURS})
-    models = {name: train_grades(one, setup.examples(one, train), setup.grades, name) for name, one in recipes.items()}
+        return _table_2(simulated, {name: recipe for name, recipe in recipes.items() if recipe.name != OURS})
+    models = {
+        name: train_grades(one, simulated.examples(one, train), simulated.grades, name) for name, one in recipes.items()
+    }
     answers = {
-        name: {**setup.ask_both(models[name], recipe), 'left_out': _leave_one_out(setup, recipe)}
+        name: {**simulated.ask_both(models[name], recipe), 'left_out': _leave_one_out(simulated, recipe)}
         for name, recipe in recipes.items()
     }
     numbers: dict[str, Any] = {
@@ -536,11 +403,10 @@ def run(experiment: Experiment) -> ExperimentResult:
         'regressors': {name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()},
         'calibration': {name: asdict(model.calibration) for name, model in models.items()},
         'other_conditions_unseen': {
-            name: _other_conditions(setup, models[name], recipe, test) for name, recipe in recipes.items()
+            name: _other_conditions(simulated, models[name], recipe, test) for name, recipe in recipes.items()
         },
-        'skids': _skids(setup, models['ours'], test),
-        'ours_other_splits': _other_splits(setup, recipes['ours']),
-        'window_to_grade_us': _latency(setup, models['ours'], test[0], QUICK_TIMED if experiment.quick else TIMED),
+        'skids': _skids(simulated, models['ours'], test),
+        'ours_other_splits': _other_splits(simulated, recipes['ours']),
         'findings': [finding_as_json(finding) for finding in findings(answers)],
         'by_texture': {name: _by_texture(parts) for name, parts in answers.items()},
         'ours_left_out_by_texture': answers['ours']['left_out'].by_texture(),
@@ -552,30 +418,31 @@ def run(experiment: Experiment) -> ExperimentResult:
             'windows to which a regressor gives no grade are counted apart'
         ),
         data=(
-            f'simulated: {len(setup.textures)} surfaces whose shape is guessed from the descriptions in the paper, '
-            f"{setup.scans} scans each; grades: the paper's Table I, by people on the real textures"
+            f'simulated: {len(simulated.textures)} surfaces whose shape is guessed from the descriptions in the paper, '
+            f"{simulated.scans} scans each; grades: the paper's Table I, by people on the real textures"
         ),
         split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
         numbers=numbers,
-        charts=_charts(setup, answers, numbers['ours_other_splits'], experiment),
-        lines=tuple(table_lines(numbers, setup.grades)),
+        charts=_charts(simulated, answers, numbers['ours_other_splits'], experiment),
     )
 
 
-def _table_2(setup: Setup, recipes: Mapping[str, RoughnessRecipe]) -> ExperimentResult:
+def _table_2(simulated: SimulatedTextures, recipes: Mapping[str, RoughnessRecipe]) -> ExperimentResult:
     """Return the errors of the paper's heads alone, on the textures trained and on the others, and the findings."""
-    train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
+    train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
     answers = {}
     for name, recipe in recipes.items():
-        quick = _quickly(recipe, setup)
-        answers[name] = setup.ask_both(train_grades(quick, setup.examples(quick, train), setup.grades, name), recipe)
+        quick = _quickly(recipe, simulated)
+        answers[name] = simulated.ask_both(
+            train_grades(quick, simulated.examples(quick, train), simulated.grades, name), recipe
+        )
     return ExperimentResult(
         name='roughness',
         measured='mean absolute error in grades of single windows, by the heads of the paper',
-        data=f'simulated: {len(setup.textures)} surfaces, {setup.scans} scans each',
+        data=f'simulated: {len(simulated.textures)} surfaces, {simulated.scans} scans each',
         split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
         numbers={
-            'seed': setup.seed,
+            'seed': simulated.seed,
             'digests': digests(),
             'regressors': {
                 name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
@@ -624,99 +491,99 @@ def _by_texture(parts: Mapping[str, Answers]) -> dict[str, dict[str, float]]:
     return {**parts['seen'].by_texture(), **parts['unseen'].by_texture()}
 
 
-def _setup(experiment: Experiment) -> Setup:
-    many = not experiment.quick
-    return Setup(
-        SimulatedTextures(load_scene(SCENE), experiment.seed),
-        read_grades(GRADES),
-        SCANS if many else QUICK_SCANS,
-        OTHER_SCANS if many else QUICK_OTHER_SCANS,
-        SPLITS if many else QUICK_SPLITS,
-        experiment.seed,
-        experiment.quick,
-    )
-
-
 SEARCHED_SCANS = 40  # of each texture, of the 200, for a search
 
 
-def _after_search(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment) -> ExperimentResult:
+def _after_search(
+    simulated: SimulatedTextures, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment
+) -> ExperimentResult:
     """Search the variables of the paper's regressors on its 15 textures, then grade the ten unseen ones.
 
     The recipes that were found are written next to the result.
     """
-    train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
-    params = replace(experiment.search or (QUICK if setup.quick else FULL), seed=setup.seed)
-    scans = setup.simulated.scans(train, min(SEARCHED_SCANS, setup.scans), SPEED_M_S, FORCE_N)
-    tuned = {name: tune_regressor(recipe, scans, setup.grades, params) for name, recipe in recipes.items()}
+    train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
+    params = replace(experiment.search or (QUICK if simulated.quick else FULL), seed=simulated.seed)
+    scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans), SPEED_M_S, FORCE_N)
+    # As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
+    tuned = {
+        name: tune(RecipeSpace.load(recipe.name, recipe), scans, RoughnessTask(simulated.grades), params)
+        for name, recipe in recipes.items()
+    }
     answers = {}
     for name, one in tuned.items():
         one.write(experiment.out / f'{RECIPES[name]}-tuned.yaml')
-        model = train_grades(_quickly(one.recipe, setup), setup.examples(one.recipe, train), setup.grades, name)
-        answers[name] = setup.ask_both(model, one.recipe)
+        model = train_grades(
+            _quickly(one.recipe, simulated), simulated.examples(one.recipe, train), simulated.grades, name
+        )
+        answers[name] = simulated.ask_both(model, one.recipe)
     size = f'{params.population} individuals, {params.generations} generations, {params.search_halves} halves'
     own = digests()
     return ExperimentResult(
         name='roughness-tuned',
         measured=f'mean absolute error in grades after a search of {size}, {len(scans.labels)} scans',
-        data=f'simulated: {len(setup.textures)} surfaces, {setup.scans} scans each',
+        data=f'simulated: {len(simulated.textures)} surfaces, {simulated.scans} scans each',
         split=f"by texture, the paper's: {len(train)} for training and search, {len(test)} for test",
         numbers={
-            'seed': setup.seed,
+            'seed': simulated.seed,
             'digests': {name: own[name] for name in recipes},
             'regressors': {
                 name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
             },
-            'tuning': {name: one.figures() for name, one in tuned.items()},
+            'tuning': {name: _with_errors(one.figures()) for name, one in tuned.items()},
             'findings': [finding_as_json(finding) for finding in findings(answers, after_search=True)],
         },
-        lines=tuple(
-            f'{name}: trained {number(parts["seen"].figures()["error"])}, '
-            f'unseen {number(parts["unseen"].figures()["error"])} grades'
-            for name, parts in answers.items()
-        ),
     )
 
 
-def _leave_one_out(setup: Setup, recipe: RoughnessRecipe) -> Answers:
+def _with_errors(figures: dict[str, Any]) -> dict[str, Any]:
+    """Return the figures of a search with errors instead of scores, which fall by a quarter for each grade off."""
+    errors = {f'{name}_error': 4.0 * (1.0 - figures.pop(name)) for name in ('learning', 'test')}
+    return {**figures, **errors}
+
+
+def _leave_one_out(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> Answers:
     """Return the grades of each texture by a model of all others; a quick run skips some of the paper's."""
-    examples = _thinned(setup.examples(recipe, setup.textures), setup.other_scans)
+    examples = _thinned(simulated.examples(recipe, simulated.textures), simulated.other_scans)
     parts = []
-    for texture in setup.textures[:: QUICK_STEP if setup.quick and recipe.name != OURS else 1]:
+    for texture in simulated.textures[:: QUICK_STEP if simulated.quick and recipe.name != OURS else 1]:
         held = examples.labels == texture
-        model = train_grades(_quickly(recipe, setup), _rows(examples, ~held), setup.grades)
-        parts.append(setup.ask(model, _rows(examples, held)))
+        model = train_grades(_quickly(recipe, simulated), _rows(examples, ~held), simulated.grades)
+        parts.append(simulated.ask(model, _rows(examples, held)))
     return Answers.joined(parts)
 
 
-def _quickly(recipe: RoughnessRecipe, setup: Setup) -> RoughnessRecipe:
+def _quickly(recipe: RoughnessRecipe, simulated: SimulatedTextures) -> RoughnessRecipe:
     """Return a recipe with a coarse calibration if it is the paper's, which has none, or in a hurry: it takes time."""
-    if recipe.name == OURS and not setup.quick:
+    if recipe.name == OURS and not simulated.quick:
         return recipe
     return replace(recipe, training=replace(recipe.training, folds=2))
 
 
 def _other_conditions(
-    setup: Setup, model: RoughnessModel, recipe: RoughnessRecipe, textures: Sequence[str]
+    simulated: SimulatedTextures, model: RoughnessModel, recipe: RoughnessRecipe, textures: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
     """Return the figures of unseen textures at speeds and forces, none but one of each trained."""
     conditions = [(speed, FORCE_N) for speed in SPEEDS_M_S] + [(SPEED_M_S, force) for force in FORCES_N]
     return {
-        f'{speed:.2f} m/s, {force:g} N': setup.ask(model, setup.examples(recipe, textures, speed, force)).figures()
+        f'{speed:.2f} m/s, {force:g} N': simulated.ask(
+            model, simulated.examples(recipe, textures, speed, force)
+        ).figures()
         for speed, force in dict.fromkeys(conditions)
     }
 
 
-def _skids(setup: Setup, model: RoughnessModel, textures: Sequence[str]) -> dict[str, Any]:
+def _skids(simulated: SimulatedTextures, model: RoughnessModel, textures: Sequence[str]) -> dict[str, Any]:
     """Return how many windows are refused, with skids and without, and what the grades contribute that are left."""
     scene = load_scene(SCENE)
-    skidding = SimulatedTextures(replace(scene, effects={**scene.effects, 'skids': Skids(SKIDS_PER_S)}), setup.seed)
+    skids = replace(scene, effects={**scene.effects, 'skids': Skids(SKIDS_PER_S)})
     said: dict[str, Any] = {'per_s': SKIDS_PER_S}
-    for name, simulated in (('with', skidding), ('without', setup.simulated)):
-        one = replace(setup, simulated=simulated)
+    for name, one in (
+        ('with', SimulatedTextures(skids, simulated.seed, quick=simulated.quick)),
+        ('without', simulated),
+    ):
         answers = one.ask(model, one.examples(model.recipe, textures, SPEED_M_S, FORCE_N))
         vectors = model.recipe.feature_set.extract_many(
-            event for texture in textures for event in simulated.events(texture, setup.scans, SPEED_M_S, FORCE_N)
+            event for texture in textures for event in one.events(texture, one.scans, SPEED_M_S, FORCE_N)
         )
         refused = np.array([bool(model.checks.refusal(vector)) for vector in vectors])
         errors = np.abs(answers.grades - answers.true)
@@ -728,37 +595,31 @@ def _skids(setup: Setup, model: RoughnessModel, textures: Sequence[str]) -> dict
     return said
 
 
-def _other_splits(setup: Setup, recipe: RoughnessRecipe) -> dict[str, Any]:
+def _other_splits(simulated: SimulatedTextures, recipe: RoughnessRecipe) -> dict[str, Any]:
     """Return errors, and how often intervals hold, on unseen textures, over random choices of the training textures.
 
     With ten textures a share of 90 % rests on one of them; many choices say whether the intervals are honest.
     """
-    rng = np.random.default_rng(setup.seed)
-    examples = _thinned(setup.examples(recipe, setup.textures), setup.other_scans)
-    n_train = len(setup.grades.used_for(TRAIN))
+    rng = np.random.default_rng(simulated.seed)
+    examples = _thinned(simulated.examples(recipe, simulated.textures), simulated.other_scans)
+    n_train = len(simulated.grades.used_for(TRAIN))
     found, errors, shares = [], [], []
-    for _ in range(setup.splits):
-        trained_on = rng.permutation(setup.textures)[:n_train]
+    for _ in range(simulated.splits):
+        trained_on = rng.permutation(simulated.textures)[:n_train]
         known = np.isin(examples.labels, trained_on)
-        said = setup.ask(train_grades(recipe, _rows(examples, known), setup.grades), _rows(examples, ~known))
+        said = simulated.ask(train_grades(recipe, _rows(examples, known), simulated.grades), _rows(examples, ~known))
         miss = np.abs(said.grades - said.true)
         found.append([float((miss <= norm.ppf(0.5 + share / 2.0) * said.stds).mean()) for share in NOMINAL])
         errors.append(float(miss.mean()))
         shares.append(said.figures()['coverage_90'])
     return {
-        'splits': setup.splits,
+        'splits': simulated.splits,
         'error': float(np.mean(errors)),
         'nominal': NOMINAL.tolist(),
         'covered': np.mean(found, axis=0).tolist(),
         'coverage_90': float(np.mean(shares)),
         'coverage_90_std': float(np.std(shares)),
     }
-
-
-def _latency(setup: Setup, model: RoughnessModel, texture: str, count: int) -> dict[str, float]:
-    windows = list(setup.simulated.events(texture, setup.other_scans, SPEED_M_S, FORCE_N))
-    median, p99 = np.percentile(_times_us(model, windows, count), (50, 99))
-    return {'median': float(median), 'p99': float(p99)}
 
 
 def _rows(examples: LabelledFeatures, rows: Any) -> LabelledFeatures:
@@ -772,7 +633,10 @@ def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
 
 
 def _charts(
-    setup: Setup, answers: Mapping[str, Mapping[str, Answers]], splits: Mapping[str, Any], experiment: Experiment
+    simulated: SimulatedTextures,
+    answers: Mapping[str, Mapping[str, Answers]],
+    splits: Mapping[str, Any],
+    experiment: Experiment,
 ) -> tuple[Any, ...]:
     panels = {
         f'{name}: training and unseen textures': {
@@ -782,21 +646,11 @@ def _charts(
         for name in ('ANN5', 'ours')
     }
     panels['ours: each texture left out in turn'] = {'unseen': answers['ours']['left_out'].by_texture()}
-    where = f'simulated, {len(setup.textures)} textures'
+    where = f'simulated, {len(simulated.textures)} textures'
     return (
-        grades_chart(panels, setup.textures, f'Roughness as people grade it, and as it is estimated ({where})',
+        grades_chart(panels, simulated.textures, f'Roughness as people grade it, and as it is estimated ({where})',
                      experiment.out / 'roughness_grades.png'),
         coverage_chart(np.array(splits['nominal']), np.array(splits['covered']),
                        f'Do the intervals hold on unseen textures?\n{splits["splits"]} random choices ({where})',
                        experiment.out / 'roughness_coverage.png'),
     )  # fmt: skip
-
-
-def _times_us(model: RoughnessModel, windows: Sequence[CutWindow], count: int) -> Array:
-    """Return the time of the core from the samples of one window to its grade, (count,) µs."""
-    evidence, taken_us = RoughnessAccumulator(model), []
-    for number in range(WARM_UP + count):
-        began = time.thread_time()
-        evidence.update(model.recipe.feature_set.extract(windows[number % len(windows)]))
-        taken_us.append(1e6 * (time.thread_time() - began))
-    return np.array(taken_us[WARM_UP:])

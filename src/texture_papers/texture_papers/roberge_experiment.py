@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -320,7 +319,6 @@ def run_friction(experiment: Experiment) -> ExperimentResult:
             'tasks': {FRICTION_TASK: {name: figures_of(Method(name), outcome) for name, outcome in found.items()}},
             'findings': [finding_as_json(finding) for finding in checked],
         },
-        lines=tuple(_friction_lines(found)),
     )
 
 
@@ -363,7 +361,3 @@ def measured_friction(scene: Scene, slides: Slides, error_n: float, rng: np.rand
 
 def _with(name: str, error_n: float) -> str:
     return f'{name}, with friction, errors of {error_n:g} N'
-
-
-def _friction_lines(found: Mapping[str, MethodResult]) -> list[str]:
-    return [f'{name:52}{100 * outcome.test.value:6.1f} % of the tested slides' for name, outcome in found.items()]

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
         print('REDUCED: fewer slides, not comparable with a published figure')
     print(f'{result.name}: {result.measured}')
     print(f'data: {result.data}; split: {result.split}')
-    for line in result.lines:
+    for line in result.lines():
         print(line)
     for file in (path, *result.charts):
         print(f'  {file}')
