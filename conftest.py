@@ -91,7 +91,7 @@ def gaussian_examples(
     features: int = 6,
 ) -> Any:
     """Return windows around a centre for each label, with something in common within each slide."""
-    from texture_features.examples import LabelledFeatures  # noqa: PLC0415  # tests of drivers and tools need none
+    from texture_features.feature_set import LabelledFeatures  # noqa: PLC0415  # tests of drivers and tools need none
 
     rng = np.random.default_rng(seed)
     centres = 2.0 * np.random.default_rng(99).normal(size=(len(labels), features))

@@ -28,7 +28,7 @@ from texture_core.cli import Command
 from texture_core.config import markdown_table
 from texture_core.types import DEVICES
 from texture_drivers.catalogue import SENSORS
-from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.recipe import LEARNERS
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.motions import MOTIONS
 from texture_features.feature_set import FEATURES

@@ -32,7 +32,7 @@ from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.explorer import Exploration
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import TouchParams
-from texture_features.feature import WindowBatch
+from texture_features.windows import WindowBatch
 from texture_simulation.offline import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -12,7 +12,7 @@ from texture_benchmarks.scale import DrawnSize, FeatureSpread
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.ros

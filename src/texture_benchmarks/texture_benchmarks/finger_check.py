@@ -14,7 +14,7 @@ from texture_benchmarks.borders import DATES, DAY, BorderTrial, fingersense, for
 from texture_benchmarks.disturbances import ROWS, TRAINED, disturbed, simulate
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked
 from texture_benchmarks.trust import Outcome, evaluate_slides
-from texture_estimation.few_shot import adapted
+from texture_estimation.incremental import adapted
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train

@@ -22,7 +22,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import training_examples
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import SlideDataset
 
 

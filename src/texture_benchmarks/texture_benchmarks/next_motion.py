@@ -13,12 +13,11 @@ import numpy as np
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported
 from texture_core.config import find
 from texture_core.types import AnyArray, Array, SlideMotion, Window
+from texture_estimation.learners.learner import log_softmax
 from texture_estimation.next_motion import NextTouchModel
-from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import load_recipe
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow
+from texture_features.windows import CutWindow, WindowBatch
 from texture_recordings.dataset import SlideDataset, SlideSamples
 from texture_simulation.offline import simulate_slides
 from texture_simulation.path import SimulatedSlide

@@ -27,7 +27,7 @@ from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.cross_validation import interval
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import SlideDataset
 
 # Word for word, or with what is named; half of a slide is shorter than the 3 s of Hu et al.

@@ -25,14 +25,14 @@ from texture_benchmarks.study import (
 )
 from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.learners.learner import group_means
 from texture_estimation.model import TextureModel
-from texture_estimation.numerics import group_means
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search import single_blas_thread
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
-from texture_features.augmentation import KINDS, NOISE, AugmentedFeatures, FeatureCopies
-from texture_features.examples import LabelledFeatures
+from texture_features.augmentation import KINDS, NOISE
+from texture_features.feature_set import AugmentedFeatures, FeatureCopies, LabelledFeatures
 from texture_recordings.dataset import SlideDataset
 
 GAIN_RESPONSES = {'log_bands': 2.0, 'log_power': 2.0, 'log_amplitude': 1.0}  # per natural logarithm of the gain

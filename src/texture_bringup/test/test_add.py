@@ -14,7 +14,7 @@ from texture_core.types import FeatureVector
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 DEADLINE_S = 60.0

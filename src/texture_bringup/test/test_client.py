@@ -22,7 +22,7 @@ from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
 from texture_exploration.nodes.explorer import ExplorerNode
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

@@ -19,7 +19,7 @@ from texture_core.config import find_file
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
 from texture_exploration.presets import load_preset
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_simulation.devices.ur import (
     ControllerProcess,
     UrControllerParams,

@@ -41,8 +41,7 @@ from texture_estimation.roughness import (
 )
 from texture_estimation.training import train
 from texture_exploration.presets import load_preset
-from texture_features.examples import LabelledFeatures
-from texture_features.feature_set import FeatureSet
+from texture_features.feature_set import FeatureSet, LabelledFeatures
 from texture_features.nodes.feature_extractor import FeatureExtractor
 
 DOMAIN = 87

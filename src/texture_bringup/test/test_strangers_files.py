@@ -30,8 +30,7 @@ from texture_core.errors import TextureError
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_drivers.daq import load_daq
 from texture_drivers.file import load_recording
-from texture_estimation.model import load_model
-from texture_estimation.model_files import AddedSlide, write_added_slide
+from texture_estimation.model import AddedSlide, load_model, write_added_slide
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import (
     Grades,
@@ -45,8 +44,7 @@ from texture_estimation.training import train
 from texture_evaluation.panel import read_ratings
 from texture_exploration.arms.hand import load_profile
 from texture_exploration.presets import load_preset
-from texture_features.examples import LabelledFeatures
-from texture_features.feature_set import FeatureSet
+from texture_features.feature_set import FeatureSet, LabelledFeatures
 from texture_recordings.bags import TYPES, BagWriter, decode, encode
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import import_biotac20

@@ -28,7 +28,7 @@ from texture_estimation.decisions import (
     slide_scores,
     space_means,
 )
-from texture_estimation.numerics import log_softmax
+from texture_estimation.learners.learner import log_softmax
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
 

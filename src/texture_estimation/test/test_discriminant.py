@@ -13,7 +13,7 @@ from texture_estimation.evidence_rules import SoftVote, running_means
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant, linear_discriminant
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import held_out_parts, in_places, train
-from texture_features.examples import LabelledFeatures, SlideConditions
+from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 RELEASED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 CONTENT = {

@@ -4,7 +4,7 @@ import math
 import pytest
 
 from texture_estimation.decisions import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
-from texture_features.examples import SignalLevel, SlideConditions
+from texture_features.feature_set import SignalLevel, SlideConditions
 
 
 def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85', directions_rad=(0.0,)):

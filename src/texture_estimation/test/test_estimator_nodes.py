@@ -20,7 +20,7 @@ from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
 from texture_estimation.recipe import Recipe
 from texture_estimation.roughness import Grades, RoughnessAccumulator, RoughnessRecipe, train_grades
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 
 pytestmark = pytest.mark.ros
 GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')

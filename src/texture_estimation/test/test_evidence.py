@@ -8,10 +8,11 @@ from texture_core.types import FeatureVector
 from texture_estimation.decisions import Domain, ErrorBound
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.evidence_rules import EVIDENCE_RULES, GroupedEvidence, MajorityVote, SoftVote, running_means
-from texture_estimation.numerics import is_tied, log_softmax
-from texture_estimation.recipe import fingerprint_difference, load_recipe
+from texture_estimation.learners.learner import is_tied, log_softmax
+from texture_estimation.recipe import load_recipe
 from texture_estimation.search import decided_by_slide
 from texture_estimation.training import train
+from texture_features.feature_set import fingerprint_difference
 
 
 def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_estimation.few_shot import adapted
+from texture_estimation.incremental import adapted
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures, SlideConditions
+from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 CLASSES = {'cork': (0.0, 0.0), 'felt': (4.0, 0.0), 'oak': (0.0, 4.0)}
 LEARNER = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}

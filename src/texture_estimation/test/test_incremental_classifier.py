@@ -10,7 +10,7 @@ from texture_core.types import FeatureVector
 from texture_estimation.decisions import Domain, ErrorBound
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.model import load_model
-from texture_features.examples import SlideConditions
+from texture_features.feature_set import SlideConditions
 
 
 @pytest.fixture

@@ -7,11 +7,11 @@ from sklearn.neural_network import MLPClassifier
 
 from texture_estimation.learners import mlp
 from texture_estimation.learners.discriminant import linear_discriminant
+from texture_estimation.learners.learner import log_loss, log_softmax
 from texture_estimation.learners.mlp import Mlp, MlpTraining
-from texture_estimation.numerics import log_loss, log_softmax
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 
 
 def test_slopes_are_the_derivatives_of_the_cross_entropy():

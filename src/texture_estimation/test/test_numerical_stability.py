@@ -10,11 +10,10 @@ from scipy.signal import lfilter
 from texture_core.config import folder
 from texture_core.types import Window
 from texture_estimation.decisions import FEATURES, NOVELTY_WINDOWS, ClassDistance, NoveltyDetector
-from texture_estimation.learners.catalogue import LEARNERS
-from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.recipe import LEARNERS, Recipe, load_recipe
 from texture_estimation.roughness import REGRESSORS, ROUGH, SMOOTH
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_features.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))

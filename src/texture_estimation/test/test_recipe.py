@@ -11,8 +11,8 @@ from texture_core.errors import InvalidParameter, TextureError
 from texture_core.types import Array
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import InputFeatures
+from texture_features.windows import WindowBatch
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}

@@ -21,7 +21,7 @@ from texture_estimation.roughness import (
     train_grades,
 )
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 
 FINGERPRINT = 'abcd1234 signal=1000Hz*1'
 NAMES = ('signal/signal_energy/f', 'signal/arc_length/f', 'signal/peak_to_median_power/f', 'signal/log_variance/f')

@@ -9,8 +9,8 @@ from texture_core.types import FeatureVector
 from texture_estimation.learners.learner import assign_folds
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
-from texture_features.augmentation import Augmentation, AugmentedFeatures, FeatureCopies
-from texture_features.examples import LabelledFeatures
+from texture_features.augmentation import Augmentation
+from texture_features.feature_set import AugmentedFeatures, FeatureCopies, LabelledFeatures
 
 RECIPE = load_recipe('default')
 RECIPE_OF_PAIRS = load_recipe('any-speed')

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from texture_core.errors import InvalidData
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes
-from texture_estimation.numerics import shrunk_covariance
-from texture_features.examples import RunningConditions, SlideConditions
+from texture_estimation.learners.learner import Codes, shrunk_covariance
+from texture_features.feature_set import RunningConditions, SlideConditions
 from texture_features.windows import Interval
 
 Mask = NDArray[np.bool_]

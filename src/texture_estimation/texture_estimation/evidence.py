@@ -11,10 +11,9 @@ from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, Tex
 from texture_estimation.decisions import ErrorBound, SlideNovelty
 from texture_estimation.evidence_rules import GroupedEvidence
 from texture_estimation.gaussians import SlideMoments
+from texture_estimation.learners.learner import is_tied
 from texture_estimation.model import TextureModel
-from texture_estimation.numerics import is_tied
-from texture_estimation.recipe import fingerprint_difference
-from texture_features.examples import RunningConditions
+from texture_features.feature_set import RunningConditions, fingerprint_difference
 from texture_features.windows import WindowParams
 
 # --------------------
@@ -94,7 +93,7 @@ class EvidenceAccumulator:
     --------
     >>> from texture_estimation.training import train
     >>> from texture_estimation.recipe import Recipe
-    >>> from texture_features.examples import LabelledFeatures
+    >>> from texture_features.feature_set import LabelledFeatures
     >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
     >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
     >>> labels = np.repeat(['cork', 'felt'], 20)

@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.numerics import log_softmax, softmax
+from texture_estimation.learners.learner import log_softmax
 
 # A label without a single vote keeps so much, so that its logarithm is finite.
 MIN_SHARE = 1e-6
@@ -125,7 +125,10 @@ class SoftVote(EvidenceRule):
 
     def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
         """Return softmax(n^tempering_exponent · mean log p)."""
-        return softmax(mean_evidence * effective_windows**tempering_exponent)
+        scores = mean_evidence * effective_windows**tempering_exponent
+        shares: Array = np.exp(scores - np.maximum.reduce(scores, axis=-1, keepdims=True))
+        shares /= np.add.reduce(shares, axis=-1, keepdims=True)
+        return shares
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texture_core.types import Array
 from texture_estimation.decisions import window_count
-from texture_estimation.learners.learner import Codes
-from texture_estimation.numerics import group_means, log_softmax, shrunk_covariance
+from texture_estimation.learners.learner import Codes, group_means, log_softmax, shrunk_covariance
 
 # --------------------
 # Gaussian classes with one covariance, to which classes of a few samples can be added.
@@ -409,71 +407,3 @@ class SlideMoments:
         before = values - self.mean
         self.mean = self.mean + before / self._count
         self.variance = self.variance + (before * (values - self.mean) - self.variance) / self._count
-
-
-# --------------------
-# Training examples that a model keeps for incremental training.
-
-# Windows of a texture that are kept; more cost time and memory, and hardly help.
-MAX_EXAMPLES = 400
-
-
-@dataclass(frozen=True, eq=False)
-class TrainingExamples:
-    """Some of the windows that a model was trained on.
-
-    Parameters
-    ----------
-    values : (n, n_features) float32
-    codes, slides : (n,)
-        Number of the label, 0…, and of the slide of each.
-
-    Examples
-    --------
-    >>> examples = TrainingExamples.of(np.arange(4.0)[:, None], np.array([0, 0, 1, 1]), np.arange(4))
-    >>> examples.codes.tolist()
-    [0, 0, 1, 1]
-    """
-
-    values: NDArray[np.float32]
-    codes: Codes
-    slides: Codes
-
-    @classmethod
-    def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
-        """Return what contributes keeping: of each label at most so many that more would hardly help.
-
-        Parameters
-        ----------
-        values : (n, n_features)
-            Features of windows.
-        codes, slides : (n,)
-            Number of the label and of the slide of each.
-
-        Returns
-        -------
-        TrainingExamples
-            At most MAX_EXAMPLES of each label.
-        """
-        own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
-        kept = np.concatenate([rows[spread(len(rows))] for rows in own])
-        return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
-
-    def check(self, n_features: int, n_labels: int) -> None:
-        """Raise ValueError unless they are examples of so many features and labels.
-
-        Raises
-        ------
-        ValueError
-            If shapes or labels do not fit, or a value is not finite.
-        """
-        n = len(self.codes)
-        if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
-            raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
-        if not n or self.codes.min() < 0 or self.codes.max() >= n_labels or not np.isfinite(self.values).all():
-            raise ValueError('examples have labels that the model has not, or values that are not finite')
-
-
-def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
-    """Return at most so many of the numbers 0 to count - 1, evenly spread."""
-    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))

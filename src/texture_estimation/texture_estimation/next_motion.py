@@ -14,8 +14,8 @@ import numpy as np
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.types import AnyArray, Array, FeatureVector, SlideMotion, group_similar
-from texture_estimation.numerics import group_means, log_loss, log_softmax
-from texture_estimation.recipe import fingerprint_difference
+from texture_estimation.learners.learner import group_means, log_loss, log_softmax
+from texture_features.feature_set import fingerprint_difference
 
 SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
 SAME_NATS = 1e-9  # informations that differ by less are the same

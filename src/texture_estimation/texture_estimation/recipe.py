@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,53 +12,26 @@ from texture_core.config import from_mapping, param, unknown_name
 from texture_core.errors import InvalidParameter
 from texture_estimation.decisions import FEATURES, NEVER, SCORES, DomainMargins
 from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
-from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant
 from texture_estimation.learners.learner import Learner, extras_of
+from texture_estimation.learners.mlp import Mlp, OnsetMlp
+from texture_estimation.learners.sklearn_learner import SklearnLearner
+from texture_estimation.learners.svm import SvmRbf
 from texture_features.augmentation import Augmentation
-from texture_features.correction import CORRECTED
 from texture_features.feature_set import FeatureSet, choose, entry_of, read_recipe
 from texture_features.windows import WindowParams
 
 # --------------------
-# Say in which part two fingerprints of feature sets differ.
+# The learners that a recipe can name, and the recipe.
 
-PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
-
-
-def fingerprint_difference(came: str, trained: str) -> str:
-    """Return what differs, in words; '' if nothing does.
-
-    Parameters
-    ----------
-    came, trained
-        Such as '3f9c12ab signal=2200Hz*1': of the feature vectors, and of the model.
-    """
-    if came == trained:
-        return ''
-    found, wanted = _inputs(came), _inputs(trained)
-    if found.keys() != wanted.keys():
-        return f'the inputs are {_listed(found)}, the model was trained on {_listed(wanted)}'
-    for topic, (rate, channels) in found.items():
-        trained_rate, trained_channels = wanted[topic]
-        if rate != trained_rate:
-            return f"the sampling rate of '{topic}' is {rate} Hz, the model was trained at {trained_rate} Hz"
-        if channels != trained_channels:
-            return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
-    if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
-        return (
-            'the correction of the finger is another; start the feature_extractor and the classifier again, both with '
-            "the model's card"
-        )
-    return "features or window length are others; start the feature_extractor with the model's card as its recipe"
-
-
-def _inputs(fingerprint: str) -> dict[str, tuple[str, str]]:
-    return {match['topic']: (match['rate'], match['channels']) for match in PART.finditer(fingerprint)}
-
-
-def _listed(inputs: dict[str, tuple[str, str]]) -> str:
-    return ', '.join(inputs) or 'none'
-
+LEARNERS: Mapping[str, type[Learner]] = {
+    'mlp': Mlp,  # one hidden layer, softmax, calibrated
+    'onset_mlp': OnsetMlp,  # and linear discriminant analysis of first windows
+    'discriminant': Discriminant,  # Fisher 1936, shrunk as Friedman 1989, calibrated
+    'force_discriminant': ForceDiscriminant,  # one for each range of forces
+    'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated
+    'sklearn': SklearnLearner,  # any classifier of scikit-learn
+}
 
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 AUGMENTATION = 'augmentation'  # section within `training`

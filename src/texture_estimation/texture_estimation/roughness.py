@@ -21,13 +21,11 @@ from scipy.stats import t as student
 from texture_core.config import MB, find_file, from_mapping, param, read_text, unknown_name
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import NANOSECONDS, Array, FeatureVector, RoughnessEstimate
-from texture_estimation import model_files
 from texture_estimation.evidence import no_window
 from texture_estimation.learners.learner import Codes, standardisation
-from texture_estimation.model_files import StoredModel, part_of
-from texture_estimation.recipe import TrainingParams, check_keys, fingerprint_difference
-from texture_features.examples import LabelledFeatures
-from texture_features.feature_set import FeatureSet, choose, read_recipe
+from texture_estimation.model import StoredModel, common_parts, model_stem, part_of, read_tree, usable
+from texture_estimation.recipe import TrainingParams, check_keys
+from texture_features.feature_set import FeatureSet, LabelledFeatures, choose, fingerprint_difference, read_recipe
 from texture_features.windows import WindowParams
 
 # --------------------
@@ -584,7 +582,7 @@ class RoughnessModel(StoredModel):
     >>> from texture_estimation.roughness import RoughnessRecipe
     >>> from texture_estimation.roughness import train_grades
     >>> from texture_estimation.roughness import Grades
-    >>> from texture_features.examples import LabelledFeatures
+    >>> from texture_features.feature_set import LabelledFeatures
     >>> inputs = {'signal': {'features': ['mean']}}
     >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
     >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
@@ -650,11 +648,11 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
     ModelMismatch
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
-    target = model_files.model_stem(path)
-    tree = model_files.read(path, of='regressor')
-    with model_files.usable(target):
+    target = model_stem(path)
+    tree = read_tree(path, of='regressor')
+    with usable(target):
         model = RoughnessModel(
-            **model_files.common_parts(tree),
+            **common_parts(tree),
             recipe=RoughnessRecipe.from_mapping(tree['recipe'], str(tree['recipe_name'])),
             calibration=part_of(Calibration, tree.get('calibration'), 'calibration'),
             limits=part_of(Mapping[str, float], tree.get('limits'), 'limits'),
@@ -693,7 +691,7 @@ class RoughnessAccumulator:
     >>> from texture_estimation.roughness import RoughnessRecipe
     >>> from texture_estimation.roughness import train_grades
     >>> from texture_estimation.roughness import Grades
-    >>> from texture_features.examples import LabelledFeatures
+    >>> from texture_features.feature_set import LabelledFeatures
     >>> inputs = {'signal': {'features': ['mean']}}
     >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
     >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)

@@ -38,14 +38,12 @@ from texture_core.config import (
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Array
 from texture_estimation.evidence_rules import EvidenceRule, MajorityVote, deciding_rows
-from texture_estimation.learners.learner import Codes
-from texture_estimation.model_files import replace_file
-from texture_estimation.numerics import log_softmax
+from texture_estimation.learners.learner import Codes, log_softmax
+from texture_estimation.model import replace_file
 from texture_estimation.recipe import Recipe, check_keys
 from texture_estimation.roughness import LEVEL, ROUGH, SMOOTH, STICK_SLIP, Grades, RoughnessRecipe
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow, WindowEvent, WindowParams
+from texture_features.windows import CutWindow, WindowBatch, WindowEvent, WindowParams
 
 Mask = NDArray[np.bool_]
 

@@ -34,7 +34,6 @@ from texture_estimation.decisions import (
     window_count,
 )
 from texture_estimation.evidence_rules import EvidenceRule, deciding_rows, running_means
-from texture_estimation.gaussians import TrainingExamples
 from texture_estimation.learners.discriminant import FORCE, ForceDiscriminant
 from texture_estimation.learners.learner import (
     Codes,
@@ -43,17 +42,19 @@ from texture_estimation.learners.learner import (
     Predictor,
     assign_folds,
     extras_of,
+    group_means,
     hidden_layer,
+    is_tied,
+    log_loss,
     of_examples,
     trust,
 )
 from texture_estimation.learners.mlp import AugmentedExamples
-from texture_estimation.model import TextureModel
+from texture_estimation.model import TextureModel, TrainingExamples
 from texture_estimation.next_motion import NextTouchModel
-from texture_estimation.numerics import group_means, is_tied, log_loss
 from texture_estimation.recipe import DecisionParams, Recipe
-from texture_features.augmentation import NOISE, FeatureCopies
-from texture_features.examples import LOAD, LabelledFeatures, SlideConditions
+from texture_features.augmentation import NOISE
+from texture_features.feature_set import LOAD, FeatureCopies, LabelledFeatures, SlideConditions
 from texture_features.features import temporal
 
 # --------------------

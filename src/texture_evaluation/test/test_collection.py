@@ -16,7 +16,7 @@ from texture_evaluation.collection import (
     force_range,
     next_bag,
 )
-from texture_features.examples import LabelledFeatures, SlideConditions
+from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 PATCH = Patch(-0.05, 0.05, 0.0, 0.06)
 PARAMS = CollectionParams(places=4, most_places=9, distance_m=0.02, speed_high_m_s=0.03)

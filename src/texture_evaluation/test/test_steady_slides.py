@@ -9,8 +9,8 @@ from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, lost_samples
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.train import training_examples
-from texture_features.feature import WindowBatch
 from texture_features.features.taxels import LogShares, SpatialBands
+from texture_features.windows import WindowBatch
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset, find_slides
 from texture_recordings.public_sets import IMPORTS, evenly

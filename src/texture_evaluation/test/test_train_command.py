@@ -11,8 +11,7 @@ from texture_core.config import refuse_inputs
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.types import TactileSignal
 from texture_estimation.decisions import ErrorBound
-from texture_estimation.model import TextureModel, load_model
-from texture_estimation.model_files import both_files
+from texture_estimation.model import TextureModel, both_files, load_model
 from texture_estimation.recipe import Recipe
 from texture_estimation.roughness import load_roughness_model
 from texture_estimation.training import train
@@ -20,8 +19,7 @@ from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.commands.train import summary
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
-from texture_features.examples import LabelledFeatures
-from texture_features.feature_set import read_recipe
+from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from texture_core.config import write_json
 from texture_core.errors import InvalidData
 from texture_core.types import Array, ExplorationRequest, Phase
-from texture_estimation.few_shot import DAY_SUFFIX, adapted
-from texture_estimation.model import load_model
-from texture_estimation.model_files import model_stem
+from texture_estimation.incremental import DAY_SUFFIX, adapted
+from texture_estimation.model import load_model, model_stem
 from texture_evaluation.train import training_examples
 from texture_features.correction import (
     CORRECTION,

@@ -15,7 +15,7 @@ from texture_core.config import param
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError
 from texture_core.types import Array, ExplorationRequest, checked_label
 from texture_estimation.learners.discriminant import linear_discriminant
-from texture_features.examples import LabelledFeatures, SlideConditions
+from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 # --------------------
 # What is asked for.

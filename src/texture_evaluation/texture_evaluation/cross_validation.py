@@ -28,7 +28,7 @@ from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
 from texture_evaluation.metrics import SlideResult, curve
 from texture_evaluation.train import training_examples
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import CONDITIONS, SlideDataset
 
 # --------------------

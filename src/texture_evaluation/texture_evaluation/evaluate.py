@@ -15,10 +15,10 @@ from texture_core.errors import ModelMismatch
 from texture_core.types import AnyArray, Array, FeatureVector, TextureEstimate
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import fingerprint_difference
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation import CrossValidation, PairedComparison
 from texture_evaluation.metrics import SlideResult
+from texture_features.feature_set import fingerprint_difference
 from texture_features.windows import WindowEvent
 from texture_recordings.dataset import LabelledSlide, SlideDataset, no_window
 

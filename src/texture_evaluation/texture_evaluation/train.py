@@ -13,7 +13,7 @@ from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe, with_channels
 from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, read_grades, train_grades
 from texture_estimation.training import train
-from texture_features.examples import LabelledFeatures
+from texture_features.feature_set import LabelledFeatures
 from texture_recordings.bags import find_bags
 from texture_recordings.dataset import SlideDataset
 

@@ -16,9 +16,8 @@ from texture_features.correction import (
     read_reference_slide,
     write_reference,
 )
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow
+from texture_features.windows import CutWindow, WindowBatch
 
 RATE_HZ = 2200.0
 

@@ -10,8 +10,7 @@ import pytest
 
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.types import FeatureVector, Window
-from texture_features.examples import RunningConditions, SlideConditions
-from texture_features.feature_set import FeatureSet
+from texture_features.feature_set import FeatureSet, RunningConditions, SlideConditions
 from texture_features.windows import CutWindow, SlideEnd
 
 RECIPE = {

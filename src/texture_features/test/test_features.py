@@ -6,12 +6,18 @@ from scipy import signal as scipy_signal
 from scipy.signal import lfilter
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES
-from texture_features.features.spectral import PacinianPower, PeakToMedianPower, SpectralExponent
+from texture_features.features.spectral import (
+    PacinianPower,
+    PeakToMedianPower,
+    SpectralExponent,
+    hann,
+    mean_over_segments,
+    segment_densities,
+)
 from texture_features.features.taxels import SpatialBandPower, SpatialVariation
 from texture_features.features.temporal import hjorth
-from texture_features.spectra import hann, mean_over_segments, segment_densities
+from texture_features.windows import WindowBatch
 
 RATE_HZ = 1000.0
 EVERY = pytest.mark.parametrize('name', FEATURES)

@@ -4,9 +4,9 @@ import pytest
 
 from texture_core.errors import InvalidParameter
 from texture_core.types import Window
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES, FeatureSet
-from texture_features.windows import CutWindow, Stretched, resample
+from texture_features.features.temporal import Stretched, resample
+from texture_features.windows import CutWindow, WindowBatch
 
 RATE_HZ = 1000.0
 RECIPE = {'inputs': {'signal': {'stretch_to_m_s': 0.1, 'features': [{'log_bands': {'bands': 16}}, 'hjorth', 'speed']}}}

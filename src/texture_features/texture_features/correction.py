@@ -16,7 +16,7 @@ import numpy as np
 from texture_core.config import load_json, write_json
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import Array
-from texture_features.feature import WindowBatch
+from texture_features.windows import WindowBatch
 
 # --------------------
 # What one slide over the reference plate shows of an input.

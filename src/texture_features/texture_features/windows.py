@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cut a signal into windows while the finger slides: buffers, axes, coverage, time stretch."""
+"""Windows of a signal while the finger slides, cut and in batches: buffers, axes, coverage, what a feature is."""
 
 from __future__ import annotations
 
@@ -10,19 +10,242 @@ import heapq
 import math
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from operator import itemgetter
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.config import param
-from texture_core.errors import InvalidParameter
-from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, Samples, TactileSignal, Window
-from texture_features.feature import Feature, WindowBatch
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import NANOSECONDS, Array, ExplorationState, Phase, Samples, TactileSignal, Window
+
+T = TypeVar('T')
+
+# --------------------
+# Windows in batches, and what a feature is: a stateless function of them, with named values.
+
+
+@dataclass(frozen=True, eq=False)
+class WindowBatch:
+    """One window, or many of one rate and length: the leading axes count the windows.
+
+    Parameters
+    ----------
+    samples : (..., n_samples, n_channels) float64
+        Finite.
+    rate_hz
+        Sampling rate, > 0.
+    speed_m_s, force_n : (...)
+        Mean speed and normal force in each window; NaN if unknown.
+    tangential_force_n : (...)
+        Mean force of the surface against the direction of travel; NaN if unknown.
+    elapsed_s : (...)
+        From the start of the slide to that of each window; infinite if unknown.
+    joined
+        The same stretches of time of other inputs, for features that join several; of the same leading axes.
+    channels
+        Name of each channel; () where nothing names them.
+
+    Examples
+    --------
+    >>> batch = WindowBatch(np.arange(6.0).reshape(3, 2), rate_hz=1000.0)
+    >>> batch.rows.tolist(), batch.centred_rows.tolist()
+    ([[0.0, 2.0, 4.0], [1.0, 3.0, 5.0]], [[-2.0, 0.0, 2.0], [-2.0, 0.0, 2.0]])
+    """
+
+    samples: Samples
+    rate_hz: float
+    speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
+    force_n: Array = field(default_factory=lambda: np.array(np.nan))
+    joined: tuple[WindowBatch, ...] = ()
+    channels: tuple[str, ...] = ()
+    elapsed_s: Array = field(default_factory=lambda: np.array(np.inf))
+    tangential_force_n: Array = field(default_factory=lambda: np.array(np.nan))
+    _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:
+            raise InvalidData(
+                f'windows to describe have samples of shape {self.samples.shape}; '
+                '(..., n_samples, n_channels) with at least one of each is needed'
+            )
+
+    @property
+    def rows(self) -> Array:
+        """The samples as (..., n_channels, n_samples), contiguous.
+
+        Sums along the last axis have the same rounding for one window as for many, and are fast.
+        """
+        return np.ascontiguousarray(self.samples.swapaxes(-1, -2))
+
+    @property
+    def centred_rows(self) -> Array:
+        """The rows less their mean."""
+        return self.shared('centred_rows', lambda: centred(self.rows))
+
+    @property
+    def moving_m_s(self) -> Array:
+        """The speed, (...); NaN where it is unknown or not above 0."""
+        return self.shared('moving_m_s', lambda: np.where(np.greater(self.speed_m_s, 0), self.speed_m_s, np.nan))
+
+    def without(self, omitted: str) -> list[int]:
+        """Return the numbers of the channels that are left when some are omitted.
+
+        Parameters
+        ----------
+        omitted
+            Names separated by spaces; one that no channel has is passed over.
+
+        Raises
+        ------
+        InvalidData
+            If some are to be omitted and the channels have no names, or none is left.
+        """
+        if not omitted:
+            return list(range(self.samples.shape[-1]))
+        if not self.channels:
+            raise InvalidData(
+                f"channels '{omitted}' are to be omitted, but the windows do not name their channels; give WindowBatch "
+                'its `channels`'
+            )
+        left = [number for number, name in enumerate(self.channels) if name not in omitted.split()]
+        if not left:
+            raise InvalidData(
+                f"all channels ({', '.join(self.channels)}) are omitted by '{omitted}'; leave one or more"
+            )
+        return left
+
+    def shared(self, key: Hashable, compute: Callable[[], T]) -> T:
+        """Return an intermediate result that several features need; it is computed once."""
+        if key not in self._memo:
+            self._memo[key] = compute()
+        return self._memo[key]
+
+
+class Feature(Protocol):
+    """Frozen parameters of a feature; called with windows it gives its values.
+
+    A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
+    and has `per_channel` False. One that can join several inputs, found in `windows.joined`, says so by a class
+    variable `joins` that is True; it has `per_channel` False. So has one of pairs of channels, which gives
+    (..., n_pairs, n_names) in the order of itertools.combinations and says so by a class variable `per_pair` that is
+    True.
+
+    Examples
+    --------
+    >>> class Range:  # the largest less the smallest sample of each channel
+    ...     per_channel, names = True, ('',)
+    ...
+    ...     def __call__(self, windows: WindowBatch) -> Array:
+    ...         return np.ptp(windows.rows, axis=-1)[..., None]
+    >>> Range()(WindowBatch(np.array([[1.0], [4.0]]), rate_hz=1000.0)).tolist()
+    [[3.0]]
+    """
+
+    @property
+    def per_channel(self) -> bool:
+        """Whether there are values for each channel."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each value of one channel; '' for the only value of a feature."""
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the values; finite for finite samples.
+
+        Parameters
+        ----------
+        windows
+            Windows of one input.
+
+        Returns
+        -------
+        (..., n_channels, n_values)
+            Of each channel, or (..., 1, n_values) where there are none for each channel.
+        """
+
+
+def floor_param(added: str = 'Power', unit: str = 'unit²', default: float = 1e-20) -> Any:
+    """Return the parameter `floor` of a feature that is a logarithm.
+
+    Parameters
+    ----------
+    added, unit
+        What it is added to, and the unit of that.
+    default
+        Far below any value of a sensor that works.
+    """
+    sentence = f'{added} added before the logarithm, so that silence gives a finite value, {unit}.'
+    return param(default, sentence, low=1e-300, high=1e300)
+
+
+def centred(rows: Array) -> Array:
+    """Return rows less their mean, (..., n_samples).
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (..., n_samples)
+        In the unit of the rows.
+    """
+    # A product with equal shares is the fastest mean, and has the same rounding for one row as for many.
+    return rows - (rows @ mean_weights(rows.shape[-1]))[..., None]
+
+
+@lru_cache(maxsize=64)
+def mean_weights(count: int) -> Array:
+    """Return 1 / count, `count` times: what a mean is a product with.
+
+    Returns
+    -------
+    (count,)
+        Read-only, because it is shared.
+    """
+    equal = np.full(count, 1.0 / count)
+    equal.flags.writeable = False
+    return equal
+
+
+def power(rows: Array) -> Array:
+    """Return the mean square of each row, (...).
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (...)
+        In the square of the unit of the rows; the mean is not removed.
+    """
+    # A product of vectors for each row: no array of squares, and the same rounding for one row as for many.
+    squares: Array = (rows[..., None, :] @ rows[..., :, None])[..., 0, 0]
+    return squares / rows.shape[-1]
+
+
+def first_difference(rows: Array) -> Array:
+    """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (..., max(1, n_samples - 1))
+        In the unit of the rows, per sample step.
+    """
+    if rows.shape[-1] == 1:
+        return np.zeros_like(rows)
+    return rows[..., 1:] - rows[..., :-1]
+
 
 # --------------------
 # Windows of slides along x and along y of one exploration, joined into one.
@@ -513,133 +736,6 @@ class RunningMean:
 
 def _steady_ns(steady_s: float) -> int:
     return round(min(steady_s, MAX_STEADY_S) * NANOSECONDS) if steady_s > 0 else 0
-
-
-# --------------------
-# Time stretch: what a signal would have been at another speed.
-
-# A finger that hardly moves tells nothing of another speed, and must not ask for endless samples.
-LARGEST_FACTOR = 10.0
-
-
-@dataclass(frozen=True)
-class Stretched:
-    """A feature of windows that are first brought to one speed; itself a feature.
-
-    A window of n samples at speed v becomes one of n · v / `to_m_s` samples at the same rate: the surface passes as it
-    would at that speed. What then lies above half the rate is left out, not folded back. The feature gets the
-    speed after stretching. A window whose speed is unknown or not above 0 stays as it is; no window becomes more than
-    ten times as long or as short.
-
-    Source: Roberge et al., "Textures recognition through tactile exploration", section III.D.4.
-
-    Examples
-    --------
-    >>> from texture_features.features.temporal import Speed
-    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(2048) / 1000.0)[:, None]  # at 0.1 m/s
-    >>> window = WindowBatch(tone, 1000.0, np.array(0.1))
-    >>> Stretched(Speed(), to_m_s=0.05)(window).item()  # after stretching
-    0.05
-    """
-
-    feature: Feature
-    to_m_s: float
-
-    @property
-    def per_channel(self) -> bool:
-        """As the feature says."""
-        return self.feature.per_channel
-
-    @property
-    def per_pair(self) -> bool:
-        """As the feature says."""
-        return getattr(self.feature, 'per_pair', False)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Those of the feature."""
-        return self.feature.names
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return the values of the feature."""
-        parts = list(self._parts(windows))
-        extracted = [self.feature(part) for _, part in parts]
-        values = np.empty((*windows.samples.shape[:-2], *extracted[0].shape[-2:]))
-        for (chosen, _), block in zip(parts, extracted, strict=True):
-            values[chosen] = block
-        return values
-
-    def _parts(self, windows: WindowBatch) -> Iterator[tuple[AnyArray, WindowBatch]]:
-        """Yield the windows in groups of one stretched length, each with where it comes from."""
-        known: dict[int, tuple[AnyArray, WindowBatch]] = windows.shared(
-            ('stretched', self.to_m_s), lambda: self._cut(windows)
-        )
-        yield from known.values()
-
-    def _cut(self, windows: WindowBatch) -> dict[int, tuple[AnyArray, WindowBatch]]:
-        leading = windows.samples.shape[:-2]
-        speed, force = (np.broadcast_to(values, leading) for values in (windows.speed_m_s, windows.force_n))
-        lengths = stretched_lengths(speed, windows.samples.shape[-2], self.to_m_s)
-        groups = {}
-        for length in np.unique(lengths).tolist():
-            chosen = lengths == length
-            factor = windows.samples.shape[-2] / length
-            samples = resample(windows.samples[chosen], length)
-            stretched = WindowBatch(
-                samples, windows.rate_hz, speed[chosen] * factor, force[chosen], channels=windows.channels
-            )
-            groups[length] = (chosen, stretched)
-        return groups
-
-
-def stretched_lengths(speed_m_s: Array, n_samples: int, to_m_s: float) -> AnyArray:
-    """Return how many samples windows have after stretching, (...).
-
-    Parameters
-    ----------
-    speed_m_s : (...)
-        Speed of each window; NaN if unknown.
-    n_samples
-        Samples of a window before stretching.
-    to_m_s
-        Speed to which windows are brought.
-
-    Returns
-    -------
-    (...)
-        Whole numbers, at least 1.
-    """
-    speed = np.asarray(speed_m_s, dtype=np.float64)
-    moving = speed > 0  # False for NaN
-    factor = np.clip(np.where(moving, speed, to_m_s) / to_m_s, 1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
-    lengths: AnyArray = np.maximum(1, np.rint(n_samples * factor)).astype(np.intp)
-    return np.where(n_samples > 1, lengths, 1)
-
-
-def resample(samples: Samples, length: int) -> Samples:
-    """Return the band-limited signal through the samples at `length` equal steps over the same time.
-
-    The line from the first to the last sample is taken out before the Fourier transform, which sees the signal as
-    periodic, and put back after it.
-
-    Parameters
-    ----------
-    samples : (..., n_samples, n_channels)
-
-    Returns
-    -------
-    (..., length, n_channels)
-    """
-    n_samples = samples.shape[-2]
-    if length == n_samples:
-        return samples
-    rows = np.ascontiguousarray(samples.swapaxes(-1, -2))
-    first = rows[..., :1]
-    rise = rows[..., -1:] - first
-    waves = np.fft.rfft(rows - first - rise * (np.arange(n_samples) / n_samples))
-    bins = min(n_samples, length) // 2 + 1
-    steps = np.fft.irfft(waves[..., :bins], length) * (length / n_samples)
-    return (steps + first + rise * (np.arange(length) / length)).swapaxes(-1, -2)
 
 
 # --------------------

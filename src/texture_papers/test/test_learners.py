@@ -15,10 +15,9 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental import IncrementalClassifier
-from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.learners.learner import is_tied, log_softmax
 from texture_estimation.model import load_model
-from texture_estimation.numerics import is_tied, log_softmax
-from texture_estimation.recipe import Recipe
+from texture_estimation.recipe import LEARNERS, Recipe
 from texture_estimation.training import train
 from texture_papers.hu import SvmMaxWins, principal_components
 from texture_papers.jamali import NaiveBayes, bins_of

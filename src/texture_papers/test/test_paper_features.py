@@ -7,11 +7,9 @@ from scipy import signal as scipy_signal
 from scipy import stats
 
 from texture_core.types import Window
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FEATURES, FeatureSet
-from texture_features.features.spectral import ShortTimeFourier
-from texture_features.spectra import hann, long_densities
-from texture_features.windows import CutWindow
+from texture_features.features.spectral import ShortTimeFourier, hann, long_densities
+from texture_features.windows import CutWindow, WindowBatch
 from texture_papers.hu import Spectrum
 from texture_papers.jamali import (
     DB4,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, ModelMismatch, UnknownName
+from texture_estimation.learners.learner import is_tied
 from texture_estimation.model import load_model
-from texture_estimation.numerics import is_tied
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation.optimise import joined_recipe

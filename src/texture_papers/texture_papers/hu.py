@@ -40,8 +40,8 @@ from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.svm import RbfMachines
-from texture_features.feature import WindowBatch
-from texture_features.spectra import long_densities
+from texture_features.features.spectral import long_densities
+from texture_features.windows import WindowBatch
 from texture_papers.roberge import PairsPredictor
 
 SCALES: Mapping[str, Callable[[Array, float], Array]] = {

@@ -48,12 +48,12 @@ from texture_estimation.learners.learner import (
     Predictor,
     assign_folds,
     held_out_scores,
+    log_softmax,
     standardisation,
 )
 from texture_estimation.learners.sklearn_learner import SklearnPredictor, packed
-from texture_estimation.numerics import log_softmax
-from texture_features.feature import WindowBatch
-from texture_features.spectra import amplitudes_of
+from texture_features.features.spectral import amplitudes_of
+from texture_features.windows import WindowBatch
 
 
 @dataclass(frozen=True)

@@ -53,11 +53,10 @@ from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, Predictor, standardisation
+from texture_estimation.learners.learner import Codes, Fitted, Predictor, log_softmax, standardisation
 from texture_estimation.learners.sklearn_learner import packed, unpacked
-from texture_estimation.numerics import log_softmax
-from texture_features.feature import WindowBatch, centred, power
 from texture_features.features.temporal import Hjorth
+from texture_features.windows import WindowBatch, centred, power
 from texture_papers.roberge import PairsPredictor
 
 

@@ -44,9 +44,9 @@ from texture_estimation.search import (
     space_for,
 )
 from texture_evaluation.workers import workers
-from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet, InputFeatures
-from texture_features.windows import SEPARATOR, Stretched, WindowParams, axis_along
+from texture_features.features.temporal import Stretched
+from texture_features.windows import SEPARATOR, WindowBatch, WindowParams, axis_along
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene

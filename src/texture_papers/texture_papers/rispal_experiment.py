@@ -26,8 +26,7 @@ from texture_estimation.roughness import (
 )
 from texture_estimation.search import RecipeSpace, RoughnessTask
 from texture_evaluation.charts import COLOURS, chart
-from texture_features.examples import LabelledFeatures
-from texture_features.feature_set import FeatureSet
+from texture_features.feature_set import FeatureSet, LabelledFeatures
 from texture_features.windows import CutWindow
 from texture_papers.protocol import (
     FULL,

@@ -59,13 +59,12 @@ from numpy.typing import NDArray
 from texture_core.config import param, safe_repr
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, Learner, standardisation
+from texture_estimation.learners.learner import Codes, Fitted, Learner, log_softmax, standardisation
 from texture_estimation.learners.svm import RbfMachines
-from texture_estimation.numerics import log_softmax
 from texture_estimation.recipe import check_keys
-from texture_features.feature import WindowBatch, first_difference, power
 from texture_features.feature_set import choose, entry_of
-from texture_features.spectra import amplitudes_of
+from texture_features.features.spectral import amplitudes_of
+from texture_features.windows import WindowBatch, first_difference, power
 
 
 @dataclass(frozen=True)

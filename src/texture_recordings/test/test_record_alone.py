@@ -104,7 +104,7 @@ def test_what_a_recorder_has_until_a_second_before_it_is_killed_is_read(tmp_path
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
 
 
-@pytest.mark.parametrize('module', ['texture_recordings.dataset', 'texture_features.spectra', 'scipy.signal'])
+@pytest.mark.parametrize('module', ['texture_recordings.dataset', 'texture_features.features.spectral', 'scipy.signal'])
 def test_what_is_absent_here_cannot_be_imported(module: str) -> None:
     done = subprocess.run([sys.executable, '-c', ALONE, module], check=False, capture_output=True, text=True)
     assert 'ModuleNotFoundError' in done.stderr

@@ -35,9 +35,8 @@ from texture_core.types import (
     Window,
     join_batches,
 )
-from texture_features.examples import LabelledFeatures
-from texture_features.feature import WindowBatch
-from texture_features.windows import CutWindow, WindowEvent, WindowParams, cut_recording
+from texture_features.feature_set import LabelledFeatures
+from texture_features.windows import CutWindow, WindowBatch, WindowEvent, WindowParams, cut_recording
 from texture_recordings.bags import find_bags, read_bag
 
 if TYPE_CHECKING:

@@ -12,8 +12,15 @@ from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import UNBOUND, Codes, Fitted, Predictor, column_of, fit_in_folds
-from texture_estimation.numerics import shrunk_covariance
+from texture_estimation.learners.learner import (
+    UNBOUND,
+    Codes,
+    Fitted,
+    Predictor,
+    column_of,
+    fit_in_folds,
+    shrunk_covariance,
+)
 
 # --------------------
 # Linear discriminant analysis with a shrunk covariance, as one linear layer.

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.discriminant import linear_discriminant
-from texture_estimation.learners.learner import UNBOUND, Codes, Fitted, column_of, fit_in_folds
-from texture_estimation.numerics import chunks
+from texture_estimation.learners.learner import UNBOUND, Codes, Fitted, chunks, column_of, fit_in_folds
 from texture_features.augmentation import Augmentation
 from texture_features.features.temporal import SLIDE_ONSET
 

@@ -22,10 +22,11 @@ from texture_estimation.learners.learner import (
     Codes,
     Fitted,
     assign_folds,
+    fit_temperature,
     held_out_scores,
+    log_softmax,
     standardisation,
 )
-from texture_estimation.numerics import fit_temperature, log_softmax
 
 # --------------------
 # Estimators of scikit-learn as bytes in a model file, by skops: read without running code.

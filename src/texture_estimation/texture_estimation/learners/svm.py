@@ -18,10 +18,12 @@ from texture_estimation.learners.learner import (
     Codes,
     Fitted,
     assign_folds,
+    fit_temperature,
+    group_means,
     held_out_scores,
+    log_softmax,
     standardisation,
 )
-from texture_estimation.numerics import fit_temperature, group_means, log_softmax
 
 # --------------------
 # From decisions between two labels each to calibrated probabilities of all labels.

@@ -10,7 +10,7 @@ from texture_msgs import msg
 
 from texture_core.config import param
 from texture_core.ros import run
-from texture_estimation.ros import EstimatorNode
+from texture_estimation.nodes.classifier import EstimatorNode
 from texture_estimation.roughness import NO_MODEL, RoughnessAccumulator, load_roughness_model
 
 

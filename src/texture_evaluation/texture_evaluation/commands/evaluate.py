@@ -13,8 +13,7 @@ from typing import Any
 from texture_core.cli import Command, add_channels, add_dask, add_seed, add_slides, core_count, task
 from texture_core.config import refuse_inputs, shipped, write_json
 from texture_core.errors import InvalidParameter
-from texture_estimation.model import load_model
-from texture_estimation.model_files import both_files
+from texture_estimation.model import both_files, load_model
 from texture_estimation.recipe import load_recipe, with_channels
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (

@@ -12,8 +12,14 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import InvalidParameter
 from texture_core.types import Array
-from texture_features.feature import WindowBatch, centred, first_difference, floor_param, power
-from texture_features.spectra import WelchPower, force_normalised, mean_subtracted, spatial_log_bands, welch_spectrum
+from texture_features.features.spectral import (
+    WelchPower,
+    force_normalised,
+    mean_subtracted,
+    spatial_log_bands,
+    welch_spectrum,
+)
+from texture_features.windows import WindowBatch, centred, first_difference, floor_param, power
 
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
