@@ -70,12 +70,8 @@ def test_samples_are_those_of_the_file_scaled_and_in_their_order(tmp_path: Path,
     assert batch.sampling_rate_hz == pytest.approx(RATE_HZ, rel=0.005)
 
 
-def test_the_jitter_is_measured(tmp_path: Path, mapping: TableMapping) -> None:
-    stream = run(tmp_path, mapping).streams['signal']
-    # The difference of two uniform errors of ±1.5 ms: 1.5·√(2/3) ms rms, 3 ms at most.
-    assert stream.jitter_s == pytest.approx(1.22e-3, rel=0.1)
-    assert 2e-3 < stream.jitter_max_s <= 3.1e-3
-    assert stream.lost == stream.gaps == stream.disordered == 0
+def test_jitter_of_the_times_is_no_loss(tmp_path: Path, mapping: TableMapping) -> None:
+    assert run(tmp_path, mapping).streams['signal'] == {'samples': 18 * STROKE_ROWS}
 
 
 def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: Path, mapping: TableMapping) -> None:
@@ -113,7 +109,7 @@ def test_a_gap_in_time_is_a_jump_of_the_index_and_counted(tmp_path: Path, mappin
     for one in recorded:
         one.time_ms[FIRST_STROKE + 100 :] += 70.0  # seven samples are missing
     report = import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
-    assert (report.streams['signal'].gaps, report.streams['signal'].lost) == (3, 21)
+    assert report.streams['signal'] == {'samples': 9 * STROKE_ROWS, 'gaps': 3, 'lost': 21}
     batches = SlideDataset.from_bags([tmp_path / 'out'])[0].signals['signal']
     jumps = [b.first_sample - a.next_sample for a, b in pairwise(batches)]
     assert [jump for jump in jumps if jump] == [7]
@@ -123,7 +119,7 @@ def test_times_that_go_back_within_a_slide_are_left_out_and_counted(tmp_path: Pa
     recorded = recordings(files=1, jitter_ms=0.0)
     recorded[0].time_ms[FIRST_STROKE + 50] -= 500.0
     report = import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
-    assert report.streams['signal'].disordered == 1
+    assert report.streams['signal']['disordered'] == 1
 
 
 @pytest.mark.parametrize(
@@ -301,9 +297,8 @@ def test_a_coarse_clock_or_samples_in_batches_are_no_gaps(tmp_path: Path, resolu
         'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}}, 'label': {'value': 'cork'},
     })  # fmt: skip
     report = import_tables(mapping, save(tmp_path, x=np.arange(6000.0), t=time_s) / 'in', tmp_path / 'out')
-    stream = report.streams['signal']
-    assert (stream.rate_hz, stream.samples) == (3000.0, 6000)
-    assert stream.gaps == stream.lost == stream.disordered == 0
+    assert report.rates_hz == {'signal': 3000.0}
+    assert report.streams['signal'] == {'samples': 6000}
 
 
 START_NS = 1_700_000_000 * NANOSECONDS

@@ -7,7 +7,6 @@ import csv
 import dataclasses
 import fnmatch
 import io
-import json
 import math
 import os
 import re
@@ -17,18 +16,17 @@ import signal
 import struct
 import subprocess
 import sys
-import threading
 import time
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import islice, pairwise
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -345,17 +343,6 @@ BLOCK_ROWS = 20_000  # of a text file, which are parsed at once
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
 
-class MalformedRow(NamedTuple):
-    """A row that cannot be read, for a sentence."""
-
-    row: int
-    column: str
-    reason: str
-
-    def __str__(self) -> str:
-        return f"row {self.row}, column '{self.column}': {self.reason}"
-
-
 @dataclass(frozen=True, eq=False)
 class Columns:
     """What was read of a table.
@@ -369,7 +356,7 @@ class Columns:
     rows
         Number in the file of each row, from 1, for sentences; None if rows count from 0.
     malformed
-        The first rows that are malformed.
+        What is wrong with the first malformed rows, by their numbers in the file.
     facts
         What holds for the whole table: `place`, `fields`, `rate_hz`, `clocks` as in `Table`, and `chosen`, the names of
         the columns of each stream.
@@ -378,7 +365,7 @@ class Columns:
     numbers: Mapping[str, Array]
     texts: Mapping[str, NDArray[np.str_]]
     rows: AnyArray | None = None
-    malformed: Sequence[MalformedRow] = ()
+    malformed: Mapping[int, str] = field(default_factory=dict)
     facts: Mapping[str, Any] = field(default_factory=dict)
 
     def row(self, index: int) -> int:
@@ -473,8 +460,7 @@ def _meant(name: str, names: Sequence[str]) -> list[str]:
 class TableFiles:
     """Read tables in a child process that has limits; use it in a `with` block.
 
-    The child reads one file after another and sends plain bytes, so that nothing which a file may do to it reaches this
-    process.
+    The child reads one file after another.
     """
 
     def __enter__(self) -> TableFiles:
@@ -515,18 +501,19 @@ class TableFiles:
         size = _checked_size(path, place)
         if self._child is None:
             self._begin()
-        self._limit_s = DEADLINE_S * max(1.0, size / DEADLINE_BYTES)
-        self._left_s = START_S  # until the child says that it has its libraries: they are not the file's fault
-        self._memory = MEMORY_BYTES + MEMORY_TIMES * size
+        memory = MEMORY_BYTES + MEMORY_TIMES * size
         with suppress(OSError):  # it has ended: the answer says why
-            self._connection.send((kind, str(path), place, mapping, dict(fields or {}), self._memory))
-        while reply := self._reply(place):
-            read: dict[str, dict[str, AnyArray]] = {'numbers': {}, 'texts': {}, 'rows': {}}
-            for group, name, dtype in reply['arrays']:
-                read[group][name] = np.frombuffer(self._receive(place), np.dtype(dtype))
-            malformed = [MalformedRow(*row) for row in reply['malformed']]
+            self._connection.send((kind, path, place, mapping, dict(fields or {}), memory))
+        self._receive(place, START_S, memory)  # it has its libraries, whose time is not the file's fault
+        left_s = DEADLINE_S * max(1.0, size / DEADLINE_BYTES)
+        while True:
+            began_s = time.monotonic()
+            columns = self._receive(place, left_s, memory)
+            left_s -= time.monotonic() - began_s
+            if columns is None:
+                return
             try:
-                yield Columns(read['numbers'], read['texts'], read['rows'].get(''), malformed, reply['facts'])
+                yield columns
             except GeneratorExit:
                 self._end()  # in the middle of a file: what comes next would be taken for an answer
                 raise
@@ -551,36 +538,23 @@ class TableFiles:
         child.kill()
         return child.wait()
 
-    def _reply(self, place: str) -> Any:
-        reply = json.loads(self._receive(place))
-        if reply.get('ready'):  # libraries are loaded; only now the time of the file begins
-            self._left_s = self._limit_s
-            reply = json.loads(self._receive(place))
-        if 'refused' in reply:
-            raise InvalidData(reply['refused'])
-        return reply
-
-    def _receive(self, place: str) -> bytes:
-        child, began_s = self._child, time.monotonic()
-        assert child is not None
-        timer = threading.Timer(self._left_s, child.kill)
-        timer.start()
+    def _receive(self, place: str, left_s: float, memory: int) -> Any:
+        """Return the next answer of the child, which has so many seconds; InvalidData if it is a refusal."""
+        began_s, late = time.monotonic(), False
         try:
-            if self._left_s <= 0.0:  # what came meanwhile came too late
-                raise EOFError
-            return self._connection.recv_bytes()
+            arrived = self._connection.poll(max(0.0, left_s))
+            late = not arrived or time.monotonic() - began_s >= left_s
+            reply = None if late else self._connection.recv()
         except (EOFError, OSError):
-            late = time.monotonic() - began_s >= self._left_s
+            late, reply = False, ''
+        if late or reply == '':
             code = self._end()
-            reason = (
-                'it takes longer to read than a file of its size may'
-                if late
-                else f'the process that reads it ended with code {code}, having at most {self._memory / MB:.0f} MB'
-            )
-            raise InvalidData(f"'{place}' was refused: {reason}; save it again, or split it") from None
-        finally:
-            timer.cancel()
-            self._left_s -= time.monotonic() - began_s
+            ended = f'the process that reads it ended with code {code}, having at most {memory / MB:.0f} MB'
+            reason = 'it takes longer to read than a file of its size may' if late else ended
+            raise InvalidData(f"'{place}' was refused: {reason}; save it again, or split it")
+        if isinstance(reply, str):
+            raise InvalidData(reply)
+        return reply
 
 
 def _checked_size(path: Path, place: str) -> int:
@@ -611,40 +585,40 @@ def serve(number: int) -> None:
             kind, path, place, mapping, fields, memory = connection.recv()
         except EOFError:
             return
-        reply = {}
+        refused = None
         try:
             for name, files, extra in LIBRARIES.get(kind, ()):
                 library(name, files, extra)
-            connection.send_bytes(b'{"ready": true}')
+            connection.send(True)
             taken = int(Path('/proc/self/statm').read_text(encoding='ascii').split()[0]) * resource.getpagesize()
-            resource.setrlimit(resource.RLIMIT_AS, (taken + memory, resource.RLIM_INFINITY))
-            for table in READERS[kind](Path(path), place, mapping):
-                _send(connection, table.mapped(mapping, fields), place)
+            _limit_memory(taken + memory)
+            for table in READERS[kind](path, place, mapping):
+                columns = table.mapped(mapping, fields)
+                _check_content(columns, place)
+                _limit_memory(resource.RLIM_INFINITY)  # what is sent is copied
+                connection.send(columns)
+                _limit_memory(taken + memory)
         except (InvalidData, MissingLibrary) as error:
-            reply = {'refused': str(error)}
+            refused = str(error)
         # Whatever a library raises, which depends on the byte that is wrong, is said of the file.
         except Exception as error:
             out_of_memory = f'it takes more than {memory / MB:.0f} MB of memory to read'
             reason = out_of_memory if isinstance(error, MemoryError) else str(error) or type(error).__name__
-            reply = {'refused': f"'{place}' cannot be read: {reason[:300]}; save it again"}
-        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-        connection.send_bytes(json.dumps(reply).encode())
+            refused = f"'{place}' cannot be read: {reason[:300]}; save it again"
+        _limit_memory(resource.RLIM_INFINITY)
+        connection.send(refused)
 
 
-def _send(connection: Connection, columns: Columns, place: str) -> None:
-    texts = {name: np.array(texts, dtype=str) for name, texts in columns.texts.items()}
-    for array in texts.values():
+def _limit_memory(most: int) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+
+
+def _check_content(columns: Columns, place: str) -> None:
+    for array in columns.texts.values():
         array.tolist()  # raises an error at what are no characters
-    arrays = [('numbers', name, np.ascontiguousarray(array)) for name, array in columns.numbers.items()]
-    arrays += [('texts', name, array) for name, array in texts.items()]
-    arrays += [('rows', '', columns.rows)] if columns.rows is not None else []
-    if sum(array.nbytes for _, _, array in arrays) > 8 * MAX_VALUES:
+    arrays = (*columns.numbers.values(), *columns.texts.values())
+    if sum(array.nbytes for array in arrays) > 8 * MAX_VALUES:
         raise InvalidData(f"'{place}' has more than {MAX_VALUES // 1_000_000} million values; split it into files")
-    listed = [(group, name, array.dtype.str) for group, name, array in arrays]
-    reply = {'arrays': listed, 'malformed': columns.malformed, 'facts': columns.facts}
-    connection.send_bytes(json.dumps(reply).encode())
-    for _, _, array in arrays:
-        connection.send_bytes(array.tobytes())
 
 
 # ---- text files ------------------------------------------------------------------------------------------------------
@@ -671,27 +645,26 @@ def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequenc
     names, numbers, texts = wanted
     at = {name: number for number, name in enumerate(names)}
     blocks: list[dict[str, AnyArray]] = []
-    malformed: list[MalformedRow] = []
+    malformed: dict[int, str] = {}
     with _lines(path, form) as lines:
         if form.header:
             next(lines, None)
         while block := list(islice(lines, BLOCK_ROWS)):
             cells = [_cells(line, form.delimiter) for _, line in block]
             rows = [row if len(row) == len(names) else None for row in cells]
-            found = [
-                MalformedRow(number, 'all', f'{len(row)} cells, {len(names)} are needed')
+            found = {
+                number: f"column 'all': {len(row)} cells, {len(names)} are needed"
                 for (number, _), row in zip(block, cells, strict=True)
                 if len(row) != len(names)
-            ]
+            }
             read: dict[str, AnyArray] = {'': np.array([number for number, _ in block])}
             for name in numbers:
                 read[f'number {name}'] = values = _parsed(rows, at[name], form.decimal)
-                found += [
-                    MalformedRow(block[index][0], name, f"'{row[at[name]][:40]}' is not a finite number")
-                    for index in np.flatnonzero(np.isnan(values)).tolist()
-                    if (row := rows[index])
-                ]
-            malformed += sorted(found, key=lambda row: row.row)[: EXAMPLES - len(malformed)]
+                for index in np.flatnonzero(np.isnan(values)).tolist():
+                    if row := rows[index]:
+                        reason = f"column '{name}': '{row[at[name]][:40]}' is not a finite number"
+                        found.setdefault(block[index][0], reason)
+            malformed |= dict(sorted(found.items())[: EXAMPLES - len(malformed)])
             # A row without any number, such as names or units that a logger wrote again, is none of a sample: its texts
             # are none of a sample, too, and a slide must not end at them.
             empty = np.logical_and.reduce([np.isnan(read[f'number {name}']) for name in numbers])
@@ -955,19 +928,19 @@ def _joined(name: str, part: str) -> str:
 
 def table_columns(columns: Mapping[str, AnyArray], place: str, numbers: Sequence[str], texts: Sequence[str]) -> Columns:
     """Return columns, (n,) each, as numbers and texts; NaN for numbers that are not finite."""
-    read, malformed = {}, []
+    read: dict[str, Array] = {}
+    malformed: dict[int, str] = {}
     for name in numbers:
         array = columns[name]
         if array.dtype.kind not in 'biuf':
             raise InvalidData(f"'{place}': column '{name}' holds {array.dtype}; numbers are needed, name another")
         read[name] = array.astype(np.float64)
         bad = ~np.isfinite(read[name])
-        malformed += [
-            MalformedRow(index, name, 'is not a finite number') for index in np.flatnonzero(bad)[:EXAMPLES].tolist()
-        ]
+        for index in np.flatnonzero(bad)[:EXAMPLES].tolist():
+            malformed.setdefault(index, f"column '{name}': is not a finite number")
         read[name][bad] = np.nan
-    malformed.sort(key=lambda row: row.row)
-    return Columns(read, {name: _texts(columns[name]) for name in texts}, None, malformed[:EXAMPLES])
+    first = dict(sorted(malformed.items())[:EXAMPLES])
+    return Columns(read, {name: _texts(columns[name]) for name in texts}, None, first)
 
 
 def _texts(array: AnyArray) -> AnyArray:
@@ -1191,32 +1164,6 @@ ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for th
 GAP = 1.75  # steps of time longer than so many sampling intervals are gaps, whose samples count as lost
 
 
-@dataclass(frozen=True, eq=False)
-class GridRows:
-    """Samples of one slide on an even grid.
-
-    Parameters
-    ----------
-    samples : (n, n_channels)
-        NaN for bad ones.
-    index : (n,)
-        Place of each on the grid from 0; it jumps where samples were lost.
-    jitter_s : (m,)
-        By how much steps of time differ from the sampling interval, gaps left out.
-    gaps, lost
-        Number of gaps, and of samples lost in them.
-    disordered
-        Number of rows left out because their time does not come after that of all rows before.
-    """
-
-    samples: Array
-    index: NDArray[np.int64]
-    jitter_s: Array = field(default_factory=lambda: np.empty(0))
-    gaps: int = 0
-    lost: int = 0
-    disordered: int = 0
-
-
 def estimated_rate_hz(time_s: Array) -> float:
     """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other.
 
@@ -1240,7 +1187,7 @@ def estimated_rate_hz(time_s: Array) -> float:
     return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
 
 
-def on_grid(samples: Array, time_s: Array | None, rate_hz: float) -> GridRows:
+def on_grid(samples: Array, time_s: Array | None, rate_hz: float) -> tuple[Array, NDArray[np.int64], Counter[str]]:
     """Return the rows of one slide on a grid that begins with its first row, evenly spaced between gaps.
 
     Jitter of the times is that of the host that stamped them, and not of the device that sampled.
@@ -1256,20 +1203,22 @@ def on_grid(samples: Array, time_s: Array | None, rate_hz: float) -> GridRows:
 
     Returns
     -------
-    GridRows
+    (m, n_channels)
         Rows whose time comes after that of all before.
+    (m,)
+        Place of each on the grid from 0; it jumps where samples were lost.
+    Counter
+        `samples`, `gaps`, samples `lost` in them, and `disordered` rows that are left out.
     """
     if time_s is None or len(samples) < 2:
-        return GridRows(samples, np.arange(len(samples)))
+        return samples, np.arange(len(samples)), Counter(samples=len(samples))
     times = _spread(_known(time_s))
     later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
-    samples, times = samples[later], times[later]
-    steps = np.diff(times) * rate_hz
-    gaps = steps > GAP
-    missing = np.where(gaps, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
+    steps = np.diff(times[later]) * rate_hz
+    missing = np.where(steps > GAP, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
     index = np.concatenate(([0], np.cumsum(1 + missing)))
-    jitter = (steps[~gaps] - 1.0) / rate_hz
-    return GridRows(samples, index, jitter, int(gaps.sum()), int(missing.sum()), int((~later).sum()))
+    counts = {'gaps': int((steps > GAP).sum()), 'lost': int(missing.sum()), 'disordered': int((~later).sum())}
+    return samples[later], index, Counter(samples=len(index), **counts)
 
 
 def _known(time_s: Array) -> Array:
@@ -1297,35 +1246,6 @@ def _spread(times: Array) -> Array:
 
 
 @dataclass
-class StreamCounts:
-    """Counts of one stream over all slides."""
-
-    rate_hz: float = 0.0
-    samples: int = 0
-    gaps: int = 0
-    lost: int = 0
-    disordered: int = 0
-    steps: int = 0
-    jitter_sum_s2: float = 0.0
-    jitter_max_s: float = 0.0
-
-    def add(self, rows: GridRows) -> None:
-        """Count one slide."""
-        self.samples += len(rows.samples)
-        self.gaps += rows.gaps
-        self.lost += rows.lost
-        self.disordered += rows.disordered
-        self.steps += len(rows.jitter_s)
-        self.jitter_sum_s2 += float(np.square(rows.jitter_s).sum())
-        self.jitter_max_s = max(self.jitter_max_s, float(np.abs(rows.jitter_s).max(initial=0.0)))
-
-    @property
-    def jitter_s(self) -> float:
-        """Root mean square of what steps of time differ from the sampling interval."""
-        return float(np.sqrt(self.jitter_sum_s2 / self.steps)) if self.steps else 0.0
-
-
-@dataclass
 class ImportReport:
     """Counts of an import."""
 
@@ -1337,13 +1257,8 @@ class ImportReport:
     examples: list[str] = field(default_factory=list)
     short_slides: int = 0
     slides: Counter[str] = field(default_factory=Counter)
-    streams: dict[str, StreamCounts] = field(default_factory=dict)
-
-    def note(self, place: str, count: int, rows: Iterable[MalformedRow]) -> None:
-        """Count malformed rows of a table, and keep the first ones."""
-        self.malformed_rows += count
-        if count:
-            self.examples += [f"'{place}', {row}" for row in rows][: EXAMPLES - len(self.examples)]
+    streams: dict[str, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))  # as `on_grid` counts
+    rates_hz: dict[str, float] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
         """Return the counts in lines for people."""
@@ -1354,81 +1269,60 @@ class ImportReport:
             f'malformed rows: {self.malformed_rows} of {self.rows}',
             *(f'  {example}' for example in self.examples),
         ]
-        for name, stream in self.streams.items():
-            said.append(
-                f'{name}: {stream.samples} samples at {stream.rate_hz:g} Hz; jitter {1e3 * stream.jitter_s:.2f} ms '
-                f'rms, {1e3 * stream.jitter_max_s:.2f} ms at most; {stream.lost} samples lost in {stream.gaps} gaps, '
-                f'{stream.disordered} rows out of order left out'
-            )
+        said += [
+            f'{name}: {counts["samples"]} samples at {self.rates_hz[name]:g} Hz; {counts["lost"]} samples lost in '
+            f'{counts["gaps"]} gaps, {counts["disordered"]} rows out of order left out'
+            for name, counts in self.streams.items()
+        ]
         if self.short_slides:
             said.append(f'slides too short, left out: {self.short_slides}')
         return said
 
 
-class SlideRows(NamedTuple):
-    """The rows by which slides are cut: their times (NaN where unknown), rate and keys.
+def spans(time_s: Array, rate_hz: float, keys: AnyArray | None, borders: SlideBorders, place: str) -> list[slice]:
+    """Return the rows of each slide in their order, the ends that are left out already taken away.
 
-    `keys`, (n,), are the values of the column that changes between slides, if one does; `place` is for sentences.
+    Parameters
+    ----------
+    time_s : (n,)
+        Of the rows by which slides are cut; NaN where unknown.
+    rate_hz
+        Of the rows.
+    keys : (n,)
+        Values of the column that changes between slides, if one does.
+    borders
+        What ends a slide.
+    place
+        For sentences.
     """
-
-    time_s: Array
-    rate_hz: float
-    keys: AnyArray | None
-    place: str
-
-
-def spans(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    """Return the rows of each slide in their order, the ends that are left out already taken away."""
-    found = CUTTING_RULES[borders.by](rows, borders)
-    skip, drop = (round(seconds * rows.rate_hz) for seconds in (borders.start_s, borders.end_s))
+    changes: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+    if borders.by == 'column' and keys is not None:  # without, it is a field of the name, which the whole file has
+        changes = np.flatnonzero(keys[1:] != keys[:-1]) + 1
+    elif borders.by == 'pause':
+        known = np.flatnonzero(np.isfinite(time_s))
+        steps = np.diff(time_s[known])
+        changes = known[1:][(steps >= borders.pause_s) | (steps < 0)]
+    elif borders.by == 'time':
+        since = np.nan_to_num(time_s - np.nanmin(time_s), nan=0.0)
+        changes = np.flatnonzero(np.diff(np.floor(np.maximum.accumulate(since) / borders.length_s + 1e-9))) + 1
+    found = [slice(first, last) for first, last in pairwise([0, *changes.tolist(), len(time_s)])]
+    if borders.by == 'time':
+        whole = (1.0 - 1e-6) * borders.length_s * rate_hz - 1.0
+        found = [span for span in found if span.stop - span.start >= whole]
+    elif borders.by == 'column' and keys is not None:
+        found = [span for span in found if _slides_at(str(keys[span.start]), borders.values)]
+        if not found:
+            raise InvalidData(
+                f"'{place}': column '{borders.column}' has none of the values "
+                f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(keys)[:5].tolist())}'
+            )
+    skip, drop = (round(seconds * rate_hz) for seconds in (borders.start_s, borders.end_s))
     return [slice(span.start + skip, max(span.start + skip, span.stop - drop)) for span in found]
-
-
-def _by_file(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    return [slice(0, len(rows.time_s))]
-
-
-def _by_column(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    if rows.keys is None:
-        return _by_file(rows, borders)  # a field of the file's name: it holds for the whole file
-    edges = [0, *(np.flatnonzero(rows.keys[1:] != rows.keys[:-1]) + 1).tolist(), len(rows.keys)]
-    chosen = [
-        slice(first, last) for first, last in pairwise(edges) if _slides_at(str(rows.keys[first]), borders.values)
-    ]
-    if not chosen:
-        raise InvalidData(
-            f"'{rows.place}': column '{borders.column}' has none of the values "
-            f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(rows.keys)[:5].tolist())}'
-        )
-    return chosen
 
 
 def _slides_at(value: str, wanted: Sequence[str]) -> bool:
     """Return whether the finger slides at a value of the column: one of those wanted, or any that is not empty."""
     return any(fnmatch.fnmatchcase(value, one) or value == one for one in wanted) if wanted else value != ''
-
-
-def _by_pause(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    known = np.flatnonzero(np.isfinite(rows.time_s))
-    steps = np.diff(rows.time_s[known])
-    edges = [0, *known[1:][(steps >= borders.pause_s) | (steps < 0)].tolist(), len(rows.time_s)]
-    return [slice(first, last) for first, last in pairwise(edges)]
-
-
-def _by_time(rows: SlideRows, borders: SlideBorders) -> list[slice]:
-    since = rows.time_s - np.nanmin(rows.time_s)
-    number = np.floor(np.maximum.accumulate(np.nan_to_num(since, nan=0.0)) / borders.length_s + 1e-9)
-    edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
-    whole = (1.0 - 1e-6) * borders.length_s * rows.rate_hz - 1.0
-    return [slice(a, b) for a, b in pairwise(edges) if b - a >= whole]
-
-
-CUTTING_RULES: Mapping[str, Callable[[SlideRows, SlideBorders], list[slice]]] = {
-    'file': _by_file,
-    'column': _by_column,
-    'pause': _by_pause,
-    'time': _by_time,
-}
 
 
 MAX_BAGS = 500
@@ -1451,26 +1345,10 @@ class Stream:
     clock: str
 
 
-@dataclass(frozen=True, eq=False)
-class ImportedSlide:
-    """One slide: label, name, the grid of each stream, and its conditions.
-
-    `spans`, in the order of time, begin at 0: time since the start of the slide, speed, force, direction; SI units,
-    NaN if unknown.
-    """
-
-    surface: str
-    exploration_id: str
-    streams: Mapping[str, tuple[Stream, GridRows]]
-    spans: Sequence[tuple[float, float, float, float]]
-
-    @property
-    def duration_s(self) -> float:
-        """How long all streams last."""
-        return min(
-            float(grid.index[-1] + 1) / stream.rate_hz if len(grid.index) else 0.0
-            for stream, grid in self.streams.values()
-        )
+# By topic: a stream, and of one slide its samples and their places on the grid.
+SlideStreams = Mapping[str, tuple[Stream, Array, NDArray[np.int64]]]
+# What holds from a time since the start of a slide on, in SI units, NaN if unknown: time, speed, force, direction.
+Conditions = Sequence[tuple[float, float, float, float]]
 
 
 class SlideBags:
@@ -1499,8 +1377,19 @@ class SlideBags:
         """Paths of the bags in the order in which they were begun."""
         return [bag.path for bag in self._bags.values()]
 
-    def write(self, session: str, slide: ImportedSlide) -> None:
+    def write(self, session: str, named: ExplorationState, streams: SlideStreams, conditions: Conditions) -> None:
         """Write a slide into the bag of a session.
+
+        Parameters
+        ----------
+        session
+            Names the bag.
+        named
+            State with the names of the slide; its times are made up.
+        streams
+            What was measured.
+        conditions
+            In the order of time; the first begins at 0.
 
         Raises
         ------
@@ -1508,18 +1397,18 @@ class SlideBags:
             If the bag exists already, cannot be made, or is one too many.
         """
         bag = self._bag(session)
-        end_ns = self._now_ns + round(slide.duration_s * NANOSECONDS)
-        messages: list[Message] = [*self._states(slide, end_ns)]
+        duration_s = min(float(index[-1] + 1) / stream.rate_hz for stream, _, index in streams.values())
+        messages: list[Message] = [*self._states(named, conditions, duration_s)]
         sensor = self._mapping.sensor
-        for topic, (stream, grid) in slide.streams.items():
+        for topic, (stream, samples, index) in streams.items():
             first, units = self._next.get((session, topic), 0), (stream.params.unit,) * len(stream.channels)
             none = np.empty((0, len(units)), dtype=np.float32)
             like = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz, first, none, sensor)
-            for batch in slide_batches(like, grid.samples, grid.index, self._now_ns):
+            for batch in slide_batches(like, samples, index, self._now_ns):
                 messages.append((batch.end_ns + DELAY_NS, topic, batch))
                 self._next[session, topic] = batch.next_sample
         bag.write_all(messages)
-        self._now_ns = max(end_ns, *(log_ns for log_ns, _, _ in messages)) + PAUSE_NS
+        self._now_ns = max(log_ns for log_ns, _, _ in messages) + PAUSE_NS
 
     def _bag(self, session: str) -> BagWriter:
         if session not in self._bags:
@@ -1533,20 +1422,18 @@ class SlideBags:
             self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
         return self._bags[session]
 
-    def _states(self, slide: ImportedSlide, end_ns: int) -> Iterator[Message]:
-        named = ExplorationState(
-            end_ns, slide.exploration_id, self._mapping.motion, Phase.SLIDE, surface=slide.surface, progress=1.0
-        )
-        edges_s = [*(start_s for start_s, *_ in slide.spans), slide.duration_s]
-        for (begin_s, *conditions), until_s in zip(slide.spans, edges_s[1:], strict=True):
+    def _states(self, named: ExplorationState, conditions: Conditions, duration_s: float) -> Iterator[Message]:
+        ends_s = [*(start_s for start_s, *_ in conditions[1:]), duration_s]
+        for (begin_s, speed_m_s, force_n, direction_rad), until_s in zip(conditions, ends_s, strict=True):
             stamp_ns, stop_ns = (self._now_ns + round(at_s * NANOSECONDS) for at_s in (begin_s, until_s))
-            facts: dict[str, Any] = dict(zip(('speed_m_s', 'force_n', 'direction_rad'), conditions, strict=True))
-            steady_s = max(0, stop_ns - stamp_ns) / NANOSECONDS
-            progress = begin_s / max(slide.duration_s, 1e-9)
-            state = replace(named, stamp_ns=stamp_ns, steady_s=steady_s, progress=progress, **facts)
-            yield stamp_ns, 'exploration', state
+            yield stamp_ns, 'exploration', replace(
+                named, stamp_ns=stamp_ns, steady_s=max(0, stop_ns - stamp_ns) / NANOSECONDS, speed_m_s=speed_m_s,
+                force_n=force_n, direction_rad=direction_rad, progress=begin_s / max(duration_s, 1e-9),
+            )  # fmt: skip
+        end_ns = self._now_ns + round(duration_s * NANOSECONDS)
         for count, phase in enumerate((Phase.LIFT, Phase.DONE), 1):
-            yield end_ns + (2 + count) * DELAY_NS, 'exploration', replace(named, phase=phase)
+            state = replace(named, stamp_ns=end_ns, phase=phase, progress=1.0)
+            yield end_ns + (2 + count) * DELAY_NS, 'exploration', state
 
     def __enter__(self) -> SlideBags:
         return self
@@ -1558,7 +1445,6 @@ class SlideBags:
                 shutil.rmtree(path, ignore_errors=True)
 
 
-MAX_FILES = 100_000
 STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_RATE = 1.05  # files of one stream may differ by this factor
 LONGEST_GAP_S = 3600.0
@@ -1595,9 +1481,9 @@ def import_tables(
     with SlideBags(mapping, out) as bags, TableFiles() as files:
         for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
             for table in files.tables(_kind(path), path, place, mapping, fields):
-                for session, slide in _TableSlides(mapping, table, report).slides():
-                    bags.write(session, slide)
-                    report.slides[slide.surface] += 1
+                for session, named, streams, conditions in _TableSlides(mapping, table, report).slides():
+                    bags.write(session, named, streams, conditions)
+                    report.slides[named.surface] += 1
         if not report.slides:
             raise InvalidData(
                 f"no slide of {mapping.slides.min_s:g} s or more in '{source}': {report.short_slides} are shorter; "
@@ -1634,18 +1520,8 @@ def _paths(source: Path, depth: int) -> list[Path]:
         raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
     if source.is_file() or is_bag(source):
         return [source]
-    paths: list[Path] = []
-    for folder, folders, names in os.walk(source):
-        level = len(Path(folder).relative_to(source).parts)
-        if level + 1 == depth:
-            paths += [Path(folder) / name for name in folders if is_bag(Path(folder) / name)]
-        if level + 1 >= depth:
-            folders.clear()
-        if level + 1 == depth:
-            paths += [Path(folder) / name for name in names]
-        if len(paths) > MAX_FILES:
-            raise InvalidData(f"'{source}' holds more than {MAX_FILES} files; give a smaller folder")
-    return sorted(paths)
+    found = source.glob('/'.join('*' * depth))
+    return sorted(path for path in found if is_bag(path) or not path.is_dir())
 
 
 def _kind(path: Path) -> str:
@@ -1663,8 +1539,8 @@ class _TableSlides:
         self._check_rows()
         self._streams = {name: self._stream(name, params) for name, params in mapping.streams.items()}
 
-    def slides(self) -> Iterator[tuple[str, ImportedSlide]]:
-        """Yield session and slide."""
+    def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
+        """Yield what `SlideBags.write` takes."""
         borders = self._mapping.slides
         reference, found = self._spans()
         for number, span in enumerate(found, 1):
@@ -1679,32 +1555,30 @@ class _TableSlides:
         reference = next(iter(self._streams.values()))
         keys = self._text(borders.column) if borders.by == 'column' else None
         if keys is None:
-            return reference, spans(SlideRows(reference.time_s, reference.rate_hz, None, place), borders)
+            return reference, spans(reference.time_s, reference.rate_hz, None, borders, place)
         clock = self._clocks.get(borders.column, '')
         # Rows of the column and of a stream correspond where their clocks and numbers do; otherwise, as of topics of a
         # bag, only their times can be compared.
         same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
         if same:
-            return same[0], spans(SlideRows(same[0].time_s, same[0].rate_hz, keys, place), borders)
+            return same[0], spans(same[0].time_s, same[0].rate_hz, keys, borders, place)
         times = self._times_of(borders.column, len(keys))
-        rows = SlideRows(times, estimated_rate_hz(times), keys, place)
-        return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in spans(rows, borders)]
+        found = spans(times, estimated_rate_hz(times), keys, borders, place)
+        return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in found]
 
-    def _slide(self, reference: Stream, span: slice, number: int) -> tuple[str, ImportedSlide]:
+    def _slide(
+        self, reference: Stream, span: slice, number: int
+    ) -> tuple[str, ExplorationState, SlideStreams, Conditions]:
         times = reference.time_s[span]
         begin_s, end_s = float(np.nanmin(times)), float(np.nanmax(times)) + 1.0 / reference.rate_hz
         cut = _Cut(len(reference.samples), reference.clock, span, begin_s, end_s)
         surface = self._label(cut)
         session = self._value(self._mapping.session, cut, 'session') if self._mapping.session else surface
-        slide = ImportedSlide(
-            surface,
-            f'{self._place}/{number}',
-            {name: self._samples(name, stream, cut) for name, stream in self._streams.items()},
-            self._conditions(cut),
-        )
-        return session, slide
+        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
+        streams = {name: self._samples(name, stream, cut) for name, stream in self._streams.items()}
+        return session, named, streams, self._conditions(cut)
 
-    def _samples(self, name: str, stream: Stream, cut: _Cut) -> tuple[Stream, GridRows]:
+    def _samples(self, name: str, stream: Stream, cut: _Cut) -> tuple[Stream, Array, NDArray[np.int64]]:
         rows = cut.rows(len(stream.samples), stream.clock, stream.time_s)
         samples, times = stream.samples[rows], stream.time_s[rows]
         if not len(samples):
@@ -1719,9 +1593,9 @@ class _TableSlides:
                 f"'{self._place}', row {row}, column '{stream.params.time.column}': time jumps by "
                 f'{steps.max():g} s within a slide; look at the unit of time and at `slides` in the mapping'
             )
-        grid = on_grid(samples, times if stream.timed else None, stream.rate_hz)
-        self._report.streams[name].add(grid)
-        return stream, grid
+        samples, index, counts = on_grid(samples, times if stream.timed else None, stream.rate_hz)
+        self._report.streams[name] += counts
+        return stream, samples, index
 
     def _stream(self, name: str, params: StreamColumns) -> Stream:
         names = self._chosen[name]
@@ -1754,22 +1628,22 @@ class _TableSlides:
 
     def _rate_hz(self, name: str, params: StreamColumns, time_column: str) -> float:
         """Return the rate of a stream: as stated, else that of the first file, from which later ones differ little."""
-        counts = self._report.streams.setdefault(name, StreamCounts(rate_hz=params.rate_hz))
         own = self._own_hz
         if time_column:
             own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
-        counts.rate_hz = counts.rate_hz or own  # of the first file: windows of all are to have as many samples
-        if not MIN_HZ <= counts.rate_hz <= MAX_HZ:
+        # Of the first file: windows of all are to have as many samples.
+        rate_hz = self._report.rates_hz.setdefault(name, params.rate_hz or own)
+        if not MIN_HZ <= rate_hz <= MAX_HZ:
             raise InvalidData(
-                f"'{self._place}': the rate of '{name}' is {counts.rate_hz:g} Hz by its times; give a column of "
+                f"'{self._place}': the rate of '{name}' is {rate_hz:g} Hz by its times; give a column of "
                 f'time that grows and its unit, or `rate_hz`, from {MIN_HZ:g} to {MAX_HZ:g}'
             )
-        if own and not 1 / SAME_RATE <= own / counts.rate_hz <= SAME_RATE:
+        if own and not 1 / SAME_RATE <= own / rate_hz <= SAME_RATE:
             raise InvalidData(
-                f"'{self._place}': '{name}' has {own:g} Hz by its times, {counts.rate_hz:g} Hz are expected; "
+                f"'{self._place}': '{name}' has {own:g} Hz by its times, {rate_hz:g} Hz are expected; "
                 f"look at the unit of column '{time_column}' and at `rate_hz` in the mapping"
             )
-        return counts.rate_hz
+        return rate_hz
 
     def _time_column(self, name: str) -> str:
         return self._mapping.streams[name].time.column or self._clocks.get(self._chosen[name][0], '')
@@ -1787,12 +1661,16 @@ class _TableSlides:
         for rows, bad in by_length.items():
             count = int(bad.sum())
             self._report.rows += rows
-            self._report.note(self._place, count, self._columns.malformed)
+            self._report.malformed_rows += count
+            if count:
+                told = [f"'{self._place}', row {row}, {reason}" for row, reason in self._columns.malformed.items()]
+                self._report.examples += told[: EXAMPLES - len(self._report.examples)]
             if not rows or count > self._mapping.max_malformed * rows:
                 raise InvalidData(self._malformed_sentence(count, rows))
 
     def _malformed_sentence(self, count: int, rows: int) -> str:
-        first = str(next(iter(self._columns.malformed), 'no row at all'))
+        named = (f'row {row}, {reason}' for row, reason in self._columns.malformed.items())
+        first = next(named, 'no row at all')
         return (
             f"'{self._place}' has {count} malformed rows of {rows}, first {first}; "
             f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
