@@ -2,6 +2,7 @@
 """What `texture explore` prints when an exploration does not come to its end."""
 
 import math
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -92,11 +93,11 @@ def test_a_check_repeats_the_slide_of_the_reference_unless_it_is_told_otherwise(
 ):
     asked = []
 
-    def slide(_bag, request, _namespace):
+    def slide(_bag, request, _namespace, _count):
         asked.append(request)
         raise MotionAborted('enough seen')
 
-    monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: None)
+    monkeypatch.setattr('texture_bringup.commands.explore.load_model', lambda _path: MagicMock())
     monkeypatch.setattr('texture_bringup.commands.explore.slide_over_plate', slide)
     write_reference(tmp_path / 'model', {}, stored)
     assert main(['check', str(tmp_path / 'model'), *options]) != 0

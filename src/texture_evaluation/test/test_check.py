@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.errors import ModelMismatch
+from texture_core.errors import InvalidData
 from texture_core.types import ExplorationRequest, Phase
 from texture_estimation.model import load_model
-from texture_evaluation.check import check_finger
+from texture_evaluation.check import check_finger, store_reference
 from texture_evaluation.train import train_from_bags
-from texture_features.correction import read_reference_slide
+from texture_features.correction import read_reference
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.offline import SlidePlan, write_simulated
@@ -24,7 +24,14 @@ def trained(tmp_path_factory):
     plan = SlidePlan(slides=6, speed_m_s=0.05, force_n=1.0, slide_s=3.0)
     bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'leather', 'cardboard'))
     train_from_bags('fast', bags, out=folder / 'three')
-    return folder / 'three', SlideDataset.from_bags([folder / 'bags' / 'leather'])
+    return folder / 'three', SlideDataset.from_bags([folder / 'bags' / 'leather']).slides
+
+
+TOPICS = ('signal',)
+
+
+def check(model, slide, **options):
+    return check_finger(model, TOPICS, read_reference(model)[0], slide, **options)
 
 
 def louder(slide, factor):
@@ -37,18 +44,16 @@ def louder(slide, factor):
 
 def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     model, slides = trained
-    with pytest.raises(ModelMismatch, match=r'no reference is stored.*--store'):
-        check_finger(model, slides[0])
-    assert check_finger(model, slides[0], store=True)[0]
-    as_trained, sentence = check_finger(model, slides[1])
+    store_reference(model, TOPICS, [slides[5], slides[0]])
+    as_trained, sentence = check(model, slides[1])
     assert as_trained and ': signal gain ' in sentence
 
-    as_trained, sentence = check_finger(model, louder(slides[2], 2.0))
+    as_trained, sentence = check(model, louder(slides[2], 2.0))
     assert not as_trained
     assert 'the gain changed by +6.' in sentence or 'the gain changed by +5.' in sentence
     assert sentence.endswith('correct the model by --correct')
 
-    check_finger(model, louder(slides[2], 2.0), correct=True)
+    check(model, louder(slides[2], 2.0), correct=True)
     corrected = load_model(model)
     of_extractor = FeatureSet.load(f'{model}.json')  # what the node loads
     for feature_set in (corrected.recipe.feature_set, of_extractor):
@@ -58,7 +63,7 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
     plain = SlideDataset((slides[3],)).features(FeatureSet.load('fast'))
     assert plain.feature_set != corrected.feature_set
 
-    as_trained, sentence = check_finger(model, slides[4], correct=True)  # the old finger is back
+    as_trained, sentence = check(model, slides[4], correct=True)  # the old finger is back
     assert as_trained and sentence.endswith('its correction is removed')
     assert load_model(model).feature_set == plain.feature_set
 
@@ -68,18 +73,29 @@ def test_the_reference_tells_how_its_slide_was_made(trained):
     asked = ExplorationRequest(
         'linear_slide', speed_m_s=0.03, force_n=5.0, distance_m=0.08, direction_rad=0.5, surface='plate'
     )
-    check_finger(model, slides[0], store=True, request=asked)
-    assert read_reference_slide(model) == {
+    store_reference(model, TOPICS, slides[:2], asked)
+    assert read_reference(model)[1] == {
         'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': 0.5
     }  # fmt: skip
     # Of a slide from a bag nobody knows what was asked: 3 s at 0.05 m/s and 1 N were simulated.
-    check_finger(model, slides[0], store=True)
-    made = read_reference_slide(model)
+    store_reference(model, TOPICS, slides[:2])
+    made = read_reference(model)[1]
     assert (made['speed_m_s'], made['force_n'], made['distance_m']) == pytest.approx((0.05, 1.0, 0.15), rel=0.05)
-    assert made['direction_rad'] == pytest.approx(slides[0].motion.direction_rad)
-    check_finger(model, replace(slides[0], motion=None), store=True)
-    assert read_reference_slide(model) == {}
-    assert check_finger(model, slides[1])[0]
+    assert made['direction_rad'] == pytest.approx(slides[1].motion.direction_rad)
+    store_reference(model, TOPICS, [slides[0], replace(slides[1], motion=None)])
+    assert read_reference(model)[1] == {}
+    assert check(model, slides[2])[0]
+
+
+def test_a_reference_is_stored_only_if_a_second_slide_shows_the_same(trained):
+    model, slides = trained
+    path = model.with_name('three.reference.json')
+    path.unlink(missing_ok=True)
+    with pytest.raises(InvalidData, match=r'^nothing is stored, .* differ: signal: the gain changed by \+[56].*again$'):
+        store_reference(model, TOPICS, [slides[0], louder(slides[1], 2.0)])
+    with pytest.raises(InvalidData, match='record two, and store again'):
+        store_reference(model, TOPICS, slides[:1])
+    assert not path.exists()
 
 
 def approached_for_longer(slide, seconds=0.7):
@@ -110,14 +126,15 @@ def starts(batches):
 
 def test_noise_and_drift_are_measured_where_there_is_rest_and_else_said_not_to_be(trained):
     model, slides = trained
-    stored = check_finger(model, slides[0], store=True)[1]
+    stored = store_reference(model, TOPICS, slides[:2])
     assert 'noise and drift were not measured' in stored
     assert 'NaN' not in model.with_name('three.reference.json').read_text()
-    as_trained, sentence = check_finger(model, slides[1])
+    as_trained, sentence = check(model, slides[2])
     assert as_trained and sentence.startswith('gain and response are as trained, noise and drift were not measured')
     assert 'nan' not in sentence
 
-    assert 'not measured' not in check_finger(model, approached_for_longer(slides[0]), store=True)[1]
-    as_trained, sentence = check_finger(model, approached_for_longer(slides[1]))
+    longer = [approached_for_longer(one) for one in slides[:3]]
+    assert 'not measured' not in store_reference(model, TOPICS, longer[:2])
+    as_trained, sentence = check(model, longer[2])
     assert as_trained and sentence.startswith('the finger is as trained: signal gain ')
     assert 'noise × 1.0, drift 0.0 rms' in sentence

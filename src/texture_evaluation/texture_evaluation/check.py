@@ -23,7 +23,6 @@ from texture_features.correction import (
     InputStatistics,
     compare,
     file_beside,
-    read_reference,
     write_reference,
 )
 from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
@@ -61,45 +60,81 @@ def _at_rest(slide: LabelledSlide, topic: str) -> Array:
     return np.concatenate([one.samples[:count] for one, count in zip(batches, counts, strict=True)]).astype(np.float64)
 
 
+def store_reference(
+    model: str | Path,
+    topics: Iterable[str],
+    slides: Sequence[LabelledSlide],
+    request: ExplorationRequest | None = None,
+) -> str:
+    """Store the last slide over the plate as that of the finger of the training, once the one before shows the same.
+
+    Parameters
+    ----------
+    model
+        Path of the model, beside which the reference will lie.
+    topics
+        Inputs of the model.
+    slides
+        Over the reference plate, two or more.
+    request
+        By which they were made; it is stored with the reference. None takes what the last one shows.
+
+    Returns
+    -------
+    str
+        What was stored, in a sentence.
+
+    Raises
+    ------
+    InvalidData
+        If there is one slide only, a slide proves nothing, or the two differ by more than `check_finger` allows.
+    """
+    if len(slides) < 2:
+        raise InvalidData('one slide over the plate does not prove itself; record two, and store again')
+    before, last = (statistics_of(slide, topics) for slide in slides[-2:])
+    if faults := _faults({topic: compare(before[topic], last[topic]) for topic in last}):
+        raise InvalidData(
+            f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
+            'finger, close what else the machine computes, and store again'
+        )
+    path = write_reference(model, last, _numbers_of(request) if request else _numbers_shown(slides[-1]))
+    unknown = '' if all(np.isfinite(one.rest_rms).all() for one in last.values()) else f'; {UNMEASURED}'
+    return f"the slide is stored as the reference of the finger, '{path}'{unknown}"
+
+
 def check_finger(
     model: str | Path,
+    topics: Iterable[str],
+    reference: Mapping[str, InputStatistics],
     slide: LabelledSlide,
     *,
-    store: bool = False,
     correct: bool = False,
-    request: ExplorationRequest | None = None,
 ) -> tuple[bool, str]:
     """Compare the finger with the one of the training by a slide over the plate; return whether it is, and a sentence.
 
     Parameters
     ----------
     model
-        Path of the model, beside which reference and correction lie.
+        Path of the model, beside which the correction lies.
+    topics
+        Inputs of the model.
+    reference
+        What the finger of the training showed, by topic.
     slide
         Over the reference plate.
-    store
-        Take this slide as the reference instead: the finger is the one of the training.
     correct
         Write the correction, or remove one that is needed no more.
-    request
-        By which the slide was made; it is stored with the reference. None takes what the slide shows.
 
     Raises
     ------
-    ModelMismatch, InvalidData
-        If no reference is stored, the sensor is another, or the slide proves nothing.
+    InvalidData
+        If the sensor is another, or the slide proves nothing.
     """
-    topics = load_model(model).recipe.feature_set.topics
     today = statistics_of(slide, topics)
-    if store:
-        path = write_reference(model, today, _numbers_of(request) if request else _numbers_shown(slide))
-        unknown = '' if all(np.isfinite(one.rest_rms).all() for one in today.values()) else f'; {UNMEASURED}'
-        return True, f"the slide is stored as the reference of the finger, '{path}'{unknown}"
-    reference = read_reference(model)
-    if missing := sorted(set(topics) - set(reference)):
+    if missing := sorted(set(today) - set(reference)):
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
-    found = {topic: compare(reference[topic], today[topic]) for topic in topics}
-    faults = [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
+    found = {topic: compare(reference[topic], one) for topic, one in today.items()}
+    faults = _faults(found)
     correction = file_beside(model, CORRECTION)
     if not faults:
         # Of a finger that is as trained a correction would make another one.
@@ -114,6 +149,10 @@ def check_finger(
         return False, f'{sentence}. Clean or replace the skin, or correct the model by --correct'
     write_json(Correction.of(found).as_mapping(), correction)
     return False, f"{sentence}. The model is corrected, '{correction}': start it again, with its card as the recipe"
+
+
+def _faults(found: Mapping[str, InputComparison]) -> list[str]:
+    return [f'{topic}: {fault}' for topic, one in found.items() for fault in one.faults]
 
 
 def _numbers_of(request: ExplorationRequest) -> dict[str, float]:

@@ -339,29 +339,16 @@ def write_reference(model: str | Path, inputs: Mapping[str, InputStatistics], sl
     return path
 
 
-def read_reference(model: str | Path) -> dict[str, InputStatistics]:
-    """Return what the finger of the training showed on the reference plate, by topic.
+def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[str, float]]:
+    """Return what the finger of the training showed on the reference plate, by topic, and how it slid.
+
+    The numbers are those of the request that repeats the slide; none if it was not straight.
 
     Raises
     ------
     ModelMismatch
         If no reference is stored, or the file is damaged.
     """
-    return _read_reference(model)[0]
-
-
-def read_reference_slide(model: str | Path) -> dict[str, float]:
-    """Return the numbers of the request that repeats the slide of the reference; none where it does not tell them.
-
-    Raises
-    ------
-    ModelMismatch
-        As `read_reference`.
-    """
-    return _read_reference(model)[1]
-
-
-def _read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[str, float]]:
     path = file_beside(model, REFERENCE)
     if not path.exists():
         raise ModelMismatch(
@@ -370,12 +357,10 @@ def _read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict
         )
     try:
         content = load_json(path, MOST_BYTES)
-        # Before the slide was stored, too, the inputs were all there was.
-        inputs, slide = (content['inputs'], content['slide']) if 'inputs' in content else (content, {})
-        numbers = {str(name): float(value) for name, value in slide.items()}
+        numbers = {str(name): float(value) for name, value in content['slide'].items()}
         for name, value in numbers.items():
             if name not in SLIDE_NUMBERS or not math.isfinite(value) or (value < 0.0 and name != 'direction_rad'):
                 raise ValueError(f"its slide has '{name}' {value}")
-        return {str(topic): InputStatistics.from_mapping(one) for topic, one in inputs.items()}, numbers
+        return {str(topic): InputStatistics.from_mapping(one) for topic, one in content['inputs'].items()}, numbers
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ModelMismatch(f"reference '{path}' cannot be used: {error}; store it again by --store") from error

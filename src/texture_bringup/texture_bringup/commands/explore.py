@@ -30,10 +30,10 @@ from texture_core.types import (
 )
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.next_motion import NextTouchModel, slide_values
-from texture_evaluation.check import adapt_to_today, check_finger
+from texture_evaluation.check import adapt_to_today, check_finger, store_reference
 from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
-from texture_features.correction import read_reference_slide
+from texture_features.correction import read_reference
 from texture_recordings.dataset import SlideDataset
 
 # Option, field of the request, unit or '', meaning.
@@ -291,7 +291,9 @@ def _collect(options: argparse.Namespace) -> int:
 def _configure_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='path of the model; reference and correction are next to it')
     parser.add_argument(
-        '--store', action='store_true', help='store this slide as that of the finger of the training, to be repeated'
+        '--store',
+        action='store_true',
+        help='slide twice, and store that as the slide of the finger of the training, if both agree',
     )
     parser.add_argument('--correct', action='store_true', help='write the correction of gain and response, if needed')
     parser.add_argument('--bag', help='take the last labelled slide of a bag instead of sliding now')
@@ -310,17 +312,19 @@ def _check(options: argparse.Namespace) -> int:
     if options.today or options.trained:
         print(adapt_to_today(options.model, options.trained or (), options.today or ())[1])
         return 0
-    load_model(options.model)  # what is missing is said before the robot moves
-    stored = {} if options.store else read_reference_slide(options.model)
-    request = None if options.bag else plate_request(options, stored)
+    # What is missing is said before the robot moves.
+    topics = load_model(options.model).recipe.feature_set.topics
+    reference, made = ({}, {}) if options.store else read_reference(options.model)
+    request = None if options.bag else plate_request(options, made)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(options.bag) if options.bag else Path(folder) / 'plate'
         if request:
-            slide_over_plate(bag, request, options.namespace)
-        slide = SlideDataset.from_bags([bag])[-1]
-    as_trained, sentence = check_finger(
-        options.model, slide, store=options.store, correct=options.correct, request=request
-    )
+            slide_over_plate(bag, request, options.namespace, 2 if options.store else 1)
+        slides = SlideDataset.from_bags([bag]).slides
+    if options.store:
+        print(store_reference(options.model, topics, slides, request))
+        return 0
+    as_trained, sentence = check_finger(options.model, topics, reference, slides[-1], correct=options.correct)
     print(sentence)
     return 0 if as_trained or options.correct else 1
 
@@ -335,14 +339,15 @@ def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> E
     return ExplorationRequest('linear_slide', surface=PLATE, **numbers)
 
 
-def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str) -> None:
-    """Slide over the reference plate, and record that into a bag; MotionAborted if the slide fails."""
+def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str, count: int) -> None:
+    """Slide over the reference plate so many times, and record that into a bag; MotionAborted if a slide fails."""
     with Operator(namespace) as operator:
         operator.wait_for_explorer(10.0)
         with recorder(operator, bag, namespace):
-            explored = operator.explore(request)
-        if not explored.success:
-            raise MotionAborted(f'the slide over the plate failed: {explored.message}')
+            for _ in range(count):
+                explored = operator.explore(request)
+                if not explored.success:
+                    raise MotionAborted(f'the slide over the plate failed: {explored.message}')
 
 
 explore = Command('slide the finger over the surface and print what it is', _configure_explore, _explore)
