@@ -14,7 +14,7 @@ from texture_evaluation.collection import CollectionParams
 pytestmark = pytest.mark.ros
 EXPLORER = {
     'patch_x_low_m': -0.05, 'patch_x_high_m': 0.05, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05,
-    'min_force_n': 3.0, 'max_force_n': 8.0,
+    'min_force_n': 3.0, 'max_force_n': 8.0, 'max_speed_m_s': 0.03,
 }  # fmt: skip
 REFUSED, ABORTED = (ExplorationError.INVALID_REQUEST, ''), (ExplorationError.FORCE_LIMIT, 'id')
 
@@ -59,28 +59,28 @@ def collected(monkeypatch, tmp_path):
     return collected
 
 
-def test_the_forces_are_those_that_the_explorer_allows(collected, tmp_path):
+def test_forces_and_speeds_are_those_that_the_explorer_allows(collected, tmp_path):
     explorer = Explorer(REFUSED, REFUSED, REFUSED)
     collected(explorer)
-    assert all(3.0 <= one.force_n <= 6.0 for one in explorer.requests)
+    assert all(3.0 <= one.force_n <= 6.0 and 0.012 <= one.speed_m_s <= 0.03 for one in explorer.requests)
     with pytest.raises(InvalidParameter, match="'force_low_n' is 1 N; the explorer allows 3 to 8 N"):
         collected(Explorer(), force_low_n=1.0)
-    assert list(tmp_path.iterdir()) == []
+    assert not tmp_path.exists()
 
 
 @pytest.mark.parametrize(
     ('ends', 'error', 'kept'),
     [
         ((REFUSED, REFUSED, REFUSED), CollectionError.MOTION_FAILED, False),
-        ((REFUSED, ABORTED, REFUSED), CollectionError.MOTION_FAILED, True),  # the abort was recorded
-        ((REFUSED, KeyboardInterrupt('lifted')), CollectionError.CANCELLED, True),  # in the middle of a touch
+        ((REFUSED, ABORTED, REFUSED), CollectionError.MOTION_FAILED, False),
+        ((REFUSED, KeyboardInterrupt('lifted')), CollectionError.CANCELLED, False),  # in the middle of a touch
         (None, CollectionError.NOT_RECORDED, True),  # the recorder has ended, and the bag may be another's
     ],
 )
-def test_a_bag_without_any_touch_is_removed_and_the_sentence_says_so(collected, tmp_path, ends, error, kept):
+def test_a_bag_without_any_slide_is_removed_and_the_sentence_says_so(collected, tmp_path, ends, error, kept):
     (tmp_path / 'cork').mkdir()  # of yesterday
     end, bag = collected(Explorer(*(ends or ())), recorder_ends=ends is None)
     assert (end.error, end.slides) == (error, 0)
     assert bag == (tmp_path / 'cork-2' if kept else None)
     assert sorted(one.name for one in tmp_path.iterdir()) == (['cork', 'cork-2'] if kept else ['cork'])
-    assert end.message.endswith('; no touch was made, so no bag is kept') != kept
+    assert end.message.endswith('; no slide was made, so no bag is kept') != kept

@@ -13,13 +13,13 @@ from texture_evaluation.collection import (
     PlacePlan,
     collect,
     evaluate_places,
-    force_range,
+    fitted_range,
     next_bag,
 )
 from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 PATCH = Patch(-0.05, 0.05, 0.0, 0.06)
-PARAMS = CollectionParams(places=4, most_places=9, distance_m=0.02, speed_high_m_s=0.03)
+PARAMS = CollectionParams(places=4, most_places=9, distance_m=0.02, speed_low_m_s=0.02, speed_high_m_s=0.03)
 
 
 def test_the_touches_lie_on_the_patch_and_spread_over_places_directions_speeds_and_forces():
@@ -54,7 +54,7 @@ def test_a_patch_that_is_too_small_and_a_nameless_surface_are_refused():
     with pytest.raises(InvalidParameter, match="'force_low_n' is 3; it must not be above 'force_high_n', 2"):
         CollectionParams(force_low_n=3.0, force_high_n=2.0)
     with pytest.raises(InvalidParameter, match=r'lasts 0\.20 s at .*; 0\.6 s are needed'):
-        CollectionParams(distance_m=0.01)
+        PlacePlan('oak', CollectionParams(distance_m=0.01), PATCH)
 
 
 ANY, UR5E = (0.1, 6.0), (3.0, 8.0)
@@ -78,11 +78,23 @@ def test_forces_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that
     asked, allowed_n, expected_n
 ):
     params = replace(PARAMS, force_low_n=asked[0], force_high_n=asked[1], seed=1)
-    assert force_range(params, allowed_n) == pytest.approx(expected_n)
+    assert fitted_range(params, ('force_low_n', 'force_high_n'), allowed_n) == pytest.approx(expected_n)
     plan = PlacePlan('oak', params, PATCH, allowed_n)
     forces_n = [plan.next().force_n for _ in range(9)]
     assert allowed_n[0] <= min(forces_n) and max(forces_n) <= allowed_n[1]
     assert min(forces_n) == pytest.approx(expected_n[0])
+
+
+def test_speeds_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that_the_explorer_allows():
+    def speeds_m_s(most_m_s, **asked):
+        plan = PlacePlan('oak', CollectionParams(**asked), PATCH, allowed_speeds_m_s=(0.002, most_m_s))
+        made = [plan.next().speed_m_s for _ in range(9)]
+        return min(made), max(made)
+
+    assert speeds_m_s(0.25) == pytest.approx((0.02, 0.05), rel=0.1)
+    assert speeds_m_s(0.03) == pytest.approx((0.012, 0.03), rel=0.1)
+    with pytest.raises(InvalidParameter, match=r"'speed_high_m_s' is 0\.05 m/s; the explorer allows 0\.002 to 0\.03"):
+        speeds_m_s(0.03, speed_high_m_s=0.05)
 
 
 @pytest.mark.parametrize(

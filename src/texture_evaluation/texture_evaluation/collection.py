@@ -31,8 +31,16 @@ class CollectionParams:
     places: int = param(6, 'Fewest places that are touched.', low=2, high=1000)
     most_places: int = param(18, 'Most places that are touched.', low=2, high=1000)
     distance_m: float = param(0.04, 'Length of each slide.', unit='m', low=0.002, high=1.0)
-    speed_low_m_s: float = param(0.02, 'Lowest speed of the slides.', unit='m/s', low=0.002, high=1.0)
-    speed_high_m_s: float = param(0.05, 'Highest speed of the slides.', unit='m/s', low=0.002, high=1.0)
+    speed_low_m_s: float = param(
+        0.0, 'Lowest speed of the slides; 0: 0.02 m/s, or the nearest that fits.', unit='m/s', low=0.0, high=1.0
+    )
+    speed_high_m_s: float = param(
+        0.0,
+        'Highest speed of the slides; 0: 2.5 times the lowest, or the nearest that the explorer allows.',
+        unit='m/s',
+        low=0.0,
+        high=1.0,
+    )
     force_low_n: float = param(
         0.0, 'Lowest normal force of the slides; 0: 1 N, or the nearest that fits.', unit='N', low=0.0, high=50.0
     )
@@ -58,12 +66,6 @@ class CollectionParams:
                 raise InvalidParameter(
                     f"'{low}' is {getattr(self, low):g}; it must not be above '{high}', {getattr(self, high):g}"
                 )
-        shortest_s = self.distance_m / self.speed_high_m_s
-        if shortest_s < SHORTEST_S:
-            raise InvalidParameter(
-                f"a slide of 'distance_m' {self.distance_m:g} m lasts {shortest_s:.2f} s at 'speed_high_m_s' "
-                f'{self.speed_high_m_s:g} m/s; {SHORTEST_S:g} s are needed to recognise it'
-            )
 
 
 @dataclass(frozen=True)
@@ -76,32 +78,32 @@ class Patch:
     y_high_m: float
 
 
-USUAL_FORCE_N = 1.0  # the lowest; the highest is so many times as much:
-FORCE_SPAN = 2.0
 UNLIMITED = (0.0, math.inf)
+# By the names of the lowest and the highest: the usual lowest, so many times which is the usual highest, and the unit.
+USUAL = {('force_low_n', 'force_high_n'): (1.0, 2.0, 'N'), ('speed_low_m_s', 'speed_high_m_s'): (0.02, 2.5, 'm/s')}
 
 
-def force_range(params: CollectionParams, allowed_n: tuple[float, float]) -> tuple[float, float]:
-    """Return lowest and highest force of the slides; what was not asked for is fitted into what the explorer allows.
+def fitted_range(params: CollectionParams, names: tuple[str, str], allowed: tuple[float, float]) -> tuple[float, float]:
+    """Return the lowest and highest force or speed; what was not asked for is fitted into what the explorer allows.
 
     Raises
     ------
     InvalidParameter
-        If a force was asked for that is not allowed.
+        If a number was asked for that is not allowed.
 
     Examples
     --------
-    >>> force_range(CollectionParams(), (0.1, 6.0)), force_range(CollectionParams(), (3.0, 8.0))
+    >>> forces = ('force_low_n', 'force_high_n')
+    >>> fitted_range(CollectionParams(), forces, (0.1, 6.0)), fitted_range(CollectionParams(), forces, (3.0, 8.0))
     ((1.0, 2.0), (3.0, 6.0))
     """
-    least_n, most_n = allowed_n
-    for name in ('force_low_n', 'force_high_n'):
-        asked_n = getattr(params, name)
-        if asked_n and not least_n <= asked_n <= most_n:
-            raise InvalidParameter(f"'{name}' is {asked_n:g} N; the explorer allows {least_n:g} to {most_n:g} N")
-    wanted_n = min(USUAL_FORCE_N, (params.force_high_n or most_n) / FORCE_SPAN)
-    low_n = params.force_low_n or max(wanted_n, least_n)
-    return low_n, params.force_high_n or min(FORCE_SPAN * low_n, most_n)
+    usual_low, span, unit = USUAL[names]
+    (least, most), (low, high) = allowed, (getattr(params, name) for name in names)
+    for name, asked in zip(names, (low, high), strict=True):
+        if asked and not least <= asked <= most:
+            raise InvalidParameter(f"'{name}' is {asked:g} {unit}; the explorer allows {least:g} to {most:g} {unit}")
+    low = low or max(min(usual_low, (high or most) / span), least)
+    return low, high or min(span * low, most)
 
 
 # --------------------
@@ -121,7 +123,7 @@ class PlacePlan:
     InvalidData
         If no slide of this length lies on the patch.
     InvalidParameter
-        If a force is asked for that is not allowed.
+        If a force or a speed is asked for that is not allowed, or a slide would be too short to recognise it.
 
     Examples
     --------
@@ -137,11 +139,20 @@ class PlacePlan:
         params: CollectionParams,
         patch: Patch,
         allowed_forces_n: tuple[float, float] = UNLIMITED,
+        allowed_speeds_m_s: tuple[float, float] = UNLIMITED,
     ) -> None:
         self._surface, self._params, self._patch = checked_label(surface), params, patch
         if not self._surface:
             raise InvalidData('no surface was named; give the label of what is collected')
-        self._forces_n = force_range(params, allowed_forces_n)
+        forces, speeds = USUAL
+        self._forces_n = fitted_range(params, forces, allowed_forces_n)
+        self._speeds_m_s = fitted_range(params, speeds, allowed_speeds_m_s)
+        highest_m_s = self._speeds_m_s[1]
+        if (shortest_s := params.distance_m / highest_m_s) < SHORTEST_S:
+            raise InvalidParameter(
+                f"a slide of 'distance_m' {params.distance_m:g} m lasts {shortest_s:.2f} s at {highest_m_s:g} m/s; "
+                f'{SHORTEST_S:g} s are needed to recognise it'
+            )
         self._rng = np.random.default_rng(params.seed)
         self._middles: list[Array] = []
         if not self._candidates(CANDIDATES):
@@ -163,7 +174,7 @@ class PlacePlan:
         self._middles.append(middle)
         return ExplorationRequest(
             'linear_slide',
-            speed_m_s=_between(params.speed_low_m_s, params.speed_high_m_s, (number * GOLDEN) % 1.0),
+            speed_m_s=_between(*self._speeds_m_s, (number * GOLDEN) % 1.0),
             force_n=_between(*self._forces_n, (number * PLASTIC) % 1.0),
             distance_m=params.distance_m,
             direction_rad=direction_rad,
@@ -187,8 +198,8 @@ class PlacePlan:
         ]
 
 
-def _between(low: float, high: float, share: float) -> float:
-    return float(low * (high / low) ** share)  # equal ratios apart, not equal steps
+def _between(low: float, high: float, fraction: float) -> float:
+    return float(low * (high / low) ** fraction)  # equal ratios apart, not equal steps
 
 
 # --------------------

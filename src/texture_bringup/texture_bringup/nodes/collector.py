@@ -11,7 +11,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
@@ -52,7 +52,8 @@ RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
 PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
-FORCES = ('min_force_n', 'max_force_n')
+LEAST_SPEED_M_S = 0.002  # of every explorer
+LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
 Tell = Callable[[str, int], None]
 
 
@@ -61,7 +62,7 @@ def collect_surface(
 ) -> tuple[CollectionEnd, Path | None]:
     """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
 
-    A bag is removed if the explorer has refused every touch; then None is returned instead.
+    A bag without any slide is removed; then None is returned instead.
 
     Parameters
     ----------
@@ -83,37 +84,36 @@ def collect_surface(
     InvalidData
         If no surface is taught, no slide lies on the patch, or the recorder does not begin.
     InvalidParameter
-        If a force is asked for that the explorer does not allow.
+        If a force or a speed is asked for that the explorer does not allow.
     """
-    low_x, high_x, low_y, high_y, *forces_n = operator.parameters('explorer', (*PATCH, *FORCES))
+    low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
         raise InvalidData(
             'no surface is taught: touch the corners of the surface by `texture touch-surface`, or give the explorer '
             f'{", ".join(PATCH)}'
         )
-    plan = PlacePlan(surface, params, Patch(low_x, high_x, low_y, high_y), (forces_n[0], forces_n[1]))
+    patch = Patch(low_x, high_x, low_y, high_y)
+    plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
-    touched = False
     with recorder(operator, bag, namespace) as check:
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
-            nonlocal touched
             check()
-            before, touched = touched, True  # until the answer says that it was refused
             try:
                 explored = operator.explore(request)
             except (MotionRefused, MotionAborted) as error:
                 return error.error, str(error)
-            touched = before or bool(explored.exploration_id)
             return explored.error, explored.message
 
         end = collect(plan, params, explore, partial(_evaluate_bag, bag, surface), tell)
     # Where the recorder has ended, what lies there may be another's.
-    if touched or end.error is CollectionError.NOT_RECORDED:
+    if end.slides or end.error is CollectionError.NOT_RECORDED:
         return end, bag
     shutil.rmtree(bag, ignore_errors=True)
-    return replace(end, message=f'{end.message}; no touch was made, so no bag is kept'), None
+    with suppress(OSError):  # other surfaces lie in it
+        folder.rmdir()
+    return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
 
 
 def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
