@@ -48,7 +48,7 @@ def bad(benchmark: BenchmarkOptions) -> BenchmarkResult:
 
 
 def missing(benchmark: BenchmarkOptions) -> BenchmarkResult:
-    raise InvalidData("no recorded data in 'no folder'")
+    raise InvalidData('no folder of recorded data was given')
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(
         assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
         said = capfd.readouterr().out
         assert f'{count} benchmarks in ' in said
-        assert "missing: left out: no recorded data in 'no folder'" in said
+        assert 'missing: left out: no folder of recorded data was given' in said
         assert 'left out, for their data is missing: missing; failed: none' in said
 
 

@@ -49,8 +49,8 @@ class BenchmarkOptions:
     def recordings(self, name: str) -> Path:
         """Return the folder of a recorded data set, by its name; InvalidData says that it is missing."""
         if self.data is None or not (self.data / name).is_dir():
-            where = self.data or 'no folder'
-            raise InvalidData(f"no recorded data in '{where}'; give the folder that holds {name}/ with --data")
+            missing = f"there is no '{name}' in '{self.data}'" if self.data else 'no folder of recorded data was given'
+            raise InvalidData(f'{missing}; give the folder that holds {name}/ with --data')
         return self.data / name
 
 

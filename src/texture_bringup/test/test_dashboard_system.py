@@ -115,7 +115,7 @@ def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_explora
     operator.explore(SHORT)
     operator.wait_for_estimate(SURFACES[1])
     operator.wait_for_said('ended as asked')
-    assert 'tare has begun' in operator.post('tare', {})
+    assert operator.post('tare', {}).endswith(' tared')
     operator.explore(LONG)
     operator.wait_for_phase('slide')
     operator.stop()

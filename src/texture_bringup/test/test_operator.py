@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import os
 import threading
+import time
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -53,12 +54,15 @@ def silent_explorer(taken=None):
         context.try_shutdown()
 
 
-def test_an_explorer_that_is_there_and_says_nothing_is_not_waited_for_for_ever(monkeypatch):
-    monkeypatch.setattr(operators, 'SILENT_S', 1.0)
+def test_an_explorer_that_says_nothing_although_ros_lists_it_is_given_up_within_seconds():
     with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
         operator.wait_for_explorer(30.0)
-        with pytest.raises(MotionAborted, match='no answer for 1 s'):
+        begin_s = time.monotonic()
+        with pytest.raises(
+            MotionAborted, match=r'the explorer has vanished; .* look at the robot, and at the output of'
+        ):
             operator.explore(ExplorationRequest('linear_slide'))
+        assert time.monotonic() - begin_s < 7.0
 
 
 def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):

@@ -27,8 +27,15 @@ from texture_msgs import action, msg, srv
 
 from texture_core.cli import task
 from texture_core.config import unknown_name
-from texture_core.errors import ExplorationError, InvalidData, InvalidParameter, LaunchFailed, MotionAborted
-from texture_core.ros import FEATURE_QOS, SENSOR_QOS, from_msg, to_msg
+from texture_core.errors import (
+    ExplorationError,
+    InvalidData,
+    InvalidParameter,
+    LaunchFailed,
+    MotionAborted,
+    TextureError,
+)
+from texture_core.ros import FEATURE_QOS, SENSOR_QOS, STATE_QOS, from_msg, to_msg
 from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
 
 # --------------------
@@ -120,15 +127,14 @@ STEP_S = 0.1
 CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
-# So long the explorer may be away; meanwhile `guard` can tell why.
-GONE_S = 10.0
-# So long it may say nothing although it is there; it waits for the last estimates for a minute at most.
-SILENT_S = 75.0
+# An explorer that explores sends feedback, and else its idle state once a second: silent for so long, it has ended or
+# hangs. Whether ROS still lists a killed one says nothing for 20 s.
+GONE_S = 4.0
+LISTEN_S = 0.5  # without feedback, until its state is listened to
 # So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
-# So long a service is looked for, and so long its answer may take: an arm needs seconds to recover.
-OFFERED_S, ANSWER_S = 10.0, 60.0
-# After so much silence the explorer is asked again: one that was started again says that it knows of nothing.
+# So long a service is looked for, and so long its answer may take: an arm needs seconds to recover, a tare up to 65 s.
+OFFERED_S, ANSWER_S = 10.0, 75.0
 RETRY_PERIOD_S = 5.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
@@ -185,7 +191,8 @@ class Operator:
         self._explore = ActionClient(self._node, action.Explore, 'explore')
         self._stop = self._node.create_client(Trigger, 'explorer/stop')
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
-        self._received_s = 0.0
+        self._heard_s = 0.0  # of the explorer
+        self._states: Any = None  # nobody listens yet
         self._vectors: list[FeatureVector] | None = None  # nobody listens yet
 
     def __enter__(self) -> Operator:
@@ -256,26 +263,33 @@ class Operator:
         Raises
         ------
         MotionAborted
-            If the explorer vanishes meanwhile, or says nothing any more.
+            If the explorer vanishes meanwhile.
         KeyboardInterrupt
             After Ctrl-C; its sentence is how the exploration ended.
         """
 
         def on_feedback(message: Any) -> None:
-            self._received_s = time.monotonic()
+            self._heard_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback)
-        self._wait(accepted.done, ACCEPT_S)
+        silent = 'the explorer takes no request; stop it, and see that it is alone'
+        self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
         goal = accepted.result()
         endings = [goal.get_result_async()]
         deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
+        self._heard_s = asked_s = time.monotonic()
         try:
-            self._wait(
-                lambda: any(ending.done() for ending in endings) or time.monotonic() > deadline_s,
-                SILENT_S,
-                lambda: endings.append(goal.get_result_async()),
-            )
+            while not any(ending.done() for ending in endings) and (now_s := time.monotonic()) < deadline_s:
+                self._step()
+                silent_s = now_s - self._heard_s
+                if silent_s > LISTEN_S:
+                    self._listen_to_states()
+                if silent_s > GONE_S:
+                    raise MotionAborted(VANISHED)
+                if now_s - asked_s > RETRY_PERIOD_S:  # one that was started again says that it knows of nothing
+                    endings.append(goal.get_result_async())
+                    asked_s = now_s
         except KeyboardInterrupt:
             raise KeyboardInterrupt(self._cancel(goal, endings[0])) from None
         answer = next((ending.result() for ending in endings if ending.done()), None)
@@ -543,7 +557,7 @@ class Operator:
 
     def _answer(self, node: str, future: Future) -> Any:
         """Return the answer of a node that may run without an explorer."""
-        self._until(future.done, SILENT_S, f"node '{node}' does not answer")
+        self._until(future.done, ANSWER_S, f"node '{node}' does not answer")
         return future.result()
 
     def _set(self, node: str, client: AsyncParameterClient, parameters: Sequence[Parameter]) -> None:
@@ -552,32 +566,27 @@ class Operator:
             if not outcome.successful:
                 raise InvalidParameter(f"node '{node}' refused parameter '{name}': {outcome.reason}")
 
-    def _wait(
-        self, condition: Callable[[], bool], silent_s: float, ask_again: Callable[[], None] = lambda: None
-    ) -> None:
-        """Wait while there is an explorer; `ask_again` is called after each `RETRY_PERIOD_S` of its silence."""
-        seen_s = requested_s = self._received_s = time.monotonic()
-        while not condition():
-            self._step()
-            now_s = time.monotonic()
-            if self._explore.server_is_ready():
-                seen_s = now_s
-            elif now_s - seen_s > GONE_S:
-                raise MotionAborted(VANISHED)
-            if now_s - self._received_s > silent_s:
-                raise MotionAborted(
-                    f'no answer for {silent_s:g} s, though there is an explorer; stop it, and see that it is alone'
-                )
-            if now_s - max(requested_s, self._received_s) > RETRY_PERIOD_S:
-                requested_s = now_s
-                ask_again()
+    def _listen_to_states(self) -> None:
+        if self._states is None:
+            self._states = self._node.create_subscription(
+                msg.ExplorationState, 'exploration', self._on_state, STATE_QOS, raw=True
+            )
 
-    def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:
+    def _on_state(self, _data: bytes) -> None:
+        self._heard_s = time.monotonic()
+
+    def _until(
+        self,
+        condition: Callable[[], bool],
+        deadline_s: float,
+        complaint: str,
+        error: type[TextureError] = LaunchFailed,
+    ) -> None:
         deadline = time.monotonic() + deadline_s
         with task(f'waiting; so far {complaint}'):
             while not condition():
                 if time.monotonic() > deadline:
-                    raise LaunchFailed(f'{complaint} (waited {deadline_s:.0f} s)')
+                    raise error(f'{complaint} (waited {deadline_s:.0f} s)')
                 self._step()
 
     def _step(self) -> None:

@@ -326,6 +326,11 @@ class ChannelWatch:
         """Whether a tare is under way."""
         return any(stream.taring for stream in self._streams.values())
 
+    @property
+    def baselines(self) -> Mapping[str, Baseline | None]:
+        """The newest baseline by topic; None before the first tare."""
+        return {topic: stream.baseline for topic, stream in self._streams.items()}
+
     def start_tare(self, skip_s: float = 0.0) -> None:
         """Measure the baseline of every stream from now on, after a while that is left out."""
         with self._lock:

@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_bringup.dashboard import FRAME_PERIOD_S, Access, Feed, Recorder, Serving, make_app, offered
-from texture_bringup.operator import VANISHED, answer_of, ready
+from texture_bringup.operator import GONE_S, VANISHED, answer_of, ready
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.ros import (
@@ -40,12 +40,11 @@ from texture_core.ros import (
     run,
     to_msg,
 )
-from texture_core.types import ExplorationRequest, checked_label
+from texture_core.types import ExplorationRequest, ExplorationState, checked_label
 from texture_exploration.safety import SafetyLimits
 
 ANSWER_DEADLINE_S = 30.0
 RETRY_PERIOD_S = 2.0
-GONE_S = 10.0  # so long the explorer may be away before an exploration is given up
 MAX_CHARACTERS = 200
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 
@@ -71,6 +70,7 @@ class DashboardNode(Node):
         params = declare(self, DashboardParams)
         self._feed = Feed()
         self._bad = 0
+        self._heard_s = 0.0  # of the explorer
         self._recordings = Path(params.recordings).expanduser()
         self._command: asyncio.subprocess.Process | None = None
         self._recorder = Recorder(self._recordings, self.get_namespace())
@@ -112,12 +112,11 @@ class DashboardNode(Node):
         wanted = action.Explore.Goal(request=to_msg(request))
         goal = await answer_of(self._explorer.send_goal_async(wanted), ANSWER_DEADLINE_S)
         ending = goal.get_result_async()
-        seen_s = time.monotonic()
-        while time.monotonic() - seen_s < GONE_S:
+        self._heard_s = time.monotonic()
+        while time.monotonic() - self._heard_s < GONE_S:
             try:
                 result = (await answer_of(ending, RETRY_PERIOD_S)).result.result
             except LaunchFailed:
-                seen_s = time.monotonic() if self._explorer.server_is_ready() else seen_s
                 continue
             success = result.error_code == msg.ExplorationResult.ERROR_NONE
             return {'success': success, 'message': result.message, 'id': result.exploration_id}
@@ -215,7 +214,7 @@ class DashboardNode(Node):
         for kind, topic, take, qos in (
             (msg.TactileSignal, 'signal', feed.on_signal, SENSOR_QOS),
             (msg.TactileSignal, 'signal_static', feed.on_static, SENSOR_QOS),
-            (msg.ExplorationState, 'exploration', feed.on_state, STATE_QOS),
+            (msg.ExplorationState, 'exploration', self._on_state, STATE_QOS),
             (msg.TextureEstimate, 'texture', feed.on_texture, ESTIMATE_QOS),
             (msg.RoughnessEstimate, 'roughness', feed.on_roughness, ESTIMATE_QOS),
             (msg.ModelInfo, 'model_info', feed.on_model, quality_of_service('model_info')),
@@ -229,6 +228,10 @@ class DashboardNode(Node):
         except InvalidData as error:
             self._bad += 1
             self.get_logger().warning(f'left out: {error}', throttle_duration_sec=10.0)
+
+    def _on_state(self, state: ExplorationState) -> None:
+        self._heard_s = time.monotonic()
+        self._feed.on_state(state)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         ours = self.get_namespace().rstrip('/') + '/'

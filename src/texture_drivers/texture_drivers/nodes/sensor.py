@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 from texture_msgs import msg
@@ -18,6 +20,7 @@ from texture_core.ros import (
     STATE_QOS,
     Diagnostics,
     PatientLifecycleNode,
+    WaitingExecutor,
     declare,
     frame_name,
     read,
@@ -28,6 +31,8 @@ from texture_core.types import Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
+
+TARE_POLL_S, TARE_LATE_S = 0.02, 5.0  # how often a tare is looked at, and how much longer it may take with a bias
 
 # Phases of an exploration in which nothing touches the finger; after an abort it may still.
 UNLOADED = frozenset(
@@ -55,7 +60,7 @@ class SensorNode(PatientLifecycleNode):
         self._reader: SensorReader | None = None
         self._topics: dict[str, Any] = {}
         self._baselines: dict[str, Any] = {}
-        self.create_service(Trigger, '~/tare', self._on_tare)
+        self.create_service(Trigger, '~/tare', self._on_tare, callback_group=ReentrantCallbackGroup())
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_exploration, STATE_QOS)
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
         if params.autostart:
@@ -79,6 +84,7 @@ class SensorNode(PatientLifecycleNode):
         self._baselines = {
             topic: self.create_publisher(msg.TactileSignal, f'{topic}_baseline', STATE_QOS) for topic in self._topics
         }
+        self._tare_s = params.tare_s
         self._watch = ChannelWatch(params, list(self._topics), getattr(sensor, 'limits', {}))
         return super().on_configure(state)
 
@@ -136,18 +142,22 @@ class SensorNode(PatientLifecycleNode):
         return message
 
     def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Start a tare: its result comes on the topics of the baselines, a refusal on /diagnostics."""
-        if self._reader is None:
-            response.message = 'the sensor node is not active; activate it'
+        """Tare, and answer when that is done or refused; called in a thread of its own."""
+        watch, reader = self._watch, self._reader
+        if reader is None or reader.fault:
+            cause = 'the sensor delivers no samples; see its message on /diagnostics'
+            response.message = cause if reader else 'the sensor node is not active; activate it'
             return response
-        if self._reader.fault:
-            response.message = 'the sensor delivers no samples; see its message on /diagnostics'
-            return response
-        self._start_tare()
-        response.success = True
+        before, begun = watch.baselines, self._start_tare()
+        end_s = time.monotonic() + self._tare_s + TARE_LATE_S
+        while time.monotonic() < end_s and (watch.taring or not begun.is_set()):
+            time.sleep(TARE_POLL_S)
+        missing = [topic for topic, baseline in watch.baselines.items() if baseline is before[topic]]
+        response.success = not missing
         response.message = (
-            'the tare has begun; it is done when the baseline comes on the topics that end with _baseline, and '
-            'has failed if /diagnostics reports it'
+            watch.refusal or f'{" and ".join(missing)} not tared: too few samples came, or the finger touched something'
+            if missing
+            else f'{", ".join(before)} tared'
         )
         return response
 
@@ -155,11 +165,17 @@ class SensorNode(PatientLifecycleNode):
         if self._reader is not None:
             self._watch.set_unloaded(state.phase in UNLOADED)
 
-    def _start_tare(self) -> None:
-        """Let the device set its own bias, if it has one, and then measure what is left."""
-        sensor, watch = self._sensor, self._watch
-        set_bias = getattr(sensor, 'set_bias', lambda: 0.0)
-        self._reader.between_reads(lambda: watch.start_tare(set_bias()))
+    def _start_tare(self) -> threading.Event:
+        """Let the device set its own bias, if any, and then measure what is left; return what tells that it began."""
+        sensor, watch, begun = self._sensor, self._watch, threading.Event()
+
+        def start() -> None:
+            watch.start_tare(getattr(sensor, 'set_bias', lambda: 0.0)())
+            begun.set()
+
+        if self._reader is not None:
+            self._reader.between_reads(start)
+        return begun
 
     def _report(self) -> tuple[str, str, dict[str, Any]]:
         if self._reader is None:
@@ -172,4 +188,4 @@ class SensorNode(PatientLifecycleNode):
 
 def main() -> None:
     """Run the node."""
-    run(SensorNode)
+    run(SensorNode, make_executor=WaitingExecutor)
