@@ -52,8 +52,10 @@ class Launched:
 def launch(tmp_path):
     """Return a function: scripts by node name (and extra attributes of a node) → a running launcher."""
     (tmp_path / 'share/ament_index/resource_index/packages').mkdir(parents=True)
-    (tmp_path / 'share/ament_index/resource_index/packages/p').touch()
     (tmp_path / 'lib/p').mkdir(parents=True)
+    (tmp_path / 'lib/texture_simulation').symlink_to('p')
+    for package in ('p', 'texture_simulation'):
+        (tmp_path / 'share/ament_index/resource_index/packages' / package).touch()
     started = []
 
     def start(scripts: dict[str, str], *options: str, **attributes: str) -> Launched:
@@ -61,7 +63,8 @@ def launch(tmp_path):
         for name, script in scripts.items():
             (tmp_path / 'lib/p' / name).write_text(f'#!/bin/sh\n{script}\n')
             (tmp_path / 'lib/p' / name).chmod(0o755)
-            nodes += f'<node pkg="p" exec="{name}" output="screen" {attributes.get(name, "")}/>'
+            package = 'texture_simulation' if name == 'emulated' else 'p'
+            nodes += f'<node pkg="{package}" exec="{name}" output="screen" {attributes.get(name, "")}/>'
         (tmp_path / 'a.launch.xml').write_text(f'<launch>{nodes}</launch>')
         started.append(Launched(tmp_path / 'a.launch.xml', tmp_path, options))
         return started[-1]
@@ -95,6 +98,16 @@ def test_a_stop_ends_every_node_and_what_nodes_started(launch) -> None:
     assert any(line.startswith('[good] ready') for line in launched.lines)
 
 
+def test_emulated_devices_are_ended_once_the_nodes_that_use_them_have_ended(launch) -> None:
+    lifting = 'trap "sleep 1; echo lifted; exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'
+    launched = launch({'emulated': GOOD, 'lifting': lifting})
+    launched.ready(), launched.ready()
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.end() == 0
+    said = ['[lifting] lifted', '[launch] lifting has finished', '[launch] SIGINT to emulated']
+    assert [line for line in launched.lines if line in said] == said
+
+
 def test_further_ctrl_c_leave_a_node_its_time_to_lift_the_finger(launch) -> None:
     script = 'trap "sleep 1; echo lifted; exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'
     launched = launch({'lifting': script})
@@ -124,7 +137,7 @@ def test_a_python_node_that_is_still_importing_ends_without_a_traceback(launch) 
     launched.process.send_signal(signal.SIGINT)
     launched.end()
     assert not [line for line in launched.lines if 'Traceback' in line or 'KeyboardInterrupt' in line]
-    assert any('importing was killed by SIGTERM' in line for line in launched.lines)
+    assert any('importing was ended while it started' in line for line in launched.lines)
 
 
 def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) -> None:

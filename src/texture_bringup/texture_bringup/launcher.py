@@ -229,6 +229,7 @@ class RunningNode:
     ) -> None:
         self.node = node
         self.deaths = 0  # of processes of the same node before
+        self.signals = 0  # of those that ask it to end, sent so far
         self.last = ''  # line that it wrote
         self._say = say
         try:
@@ -317,6 +318,7 @@ def ending(returncode: int) -> str:
 
 # How nodes are asked to end: so many seconds after the wish, this signal.
 STOP = ((0.0, signal.SIGINT), (5.0, signal.SIGTERM), (8.0, signal.SIGKILL))
+EMULATED = 'texture_simulation'  # package of the devices that are ended last: a finger may be lifted from them
 STOPPING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 POLL_S = 0.1
 PROFILES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')  # where Fast DDS looks for settings
@@ -345,7 +347,6 @@ class Supervisor:
         self._running: list[RunningNode] = []
         self._selector = selectors.DefaultSelector()
         self._stopping_since_s: float | None = None
-        self._signals_sent = 0
         self._failed = False
         self._cause = ''  # why the launch ends by itself
 
@@ -406,17 +407,19 @@ class Supervisor:
         self._say(f'[launch] {node.label} started (process {process.pid})')
 
     def _send_signals(self, since_s: float) -> None:
-        while self._signals_sent < len(STOP) and STOP[self._signals_sent][0] <= since_s:
-            number = STOP[self._signals_sent][1]
-            self._signals_sent += 1
-            if not self._running:
-                continue
-            self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in self._running)}')
-            for process in self._running:
-                process.send(number)
-            if number is signal.SIGKILL:
-                self._failed = True
-                self._say('[launch] nodes were killed that did not end; see whether the finger still presses')
+        due = sum(at_s <= since_s for at_s, _ in STOP)
+        number = STOP[due - 1][1]
+        users = [one for one in self._running if one.node.package != EMULATED]
+        told = [one for one in (users if users and due == 1 else self._running) if one.signals < due]
+        if not told:
+            return
+        self._say(f'[launch] {number.name} to {", ".join(one.node.label for one in told)}')
+        for process in told:
+            process.signals = due
+            process.send(number)
+        if number is signal.SIGKILL:
+            self._failed = True
+            self._say('[launch] nodes were killed that did not end; see whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
         self._forget(process)
@@ -426,7 +429,8 @@ class Supervisor:
         restart = restart and (node.respawn_max_retries < 0 or process.deaths < node.respawn_max_retries)
         needed = node.needed or node.respawn or (self._together and code != 0)
         self._failed |= code != 0 and not (stopping or restart)
-        self._say(f'[launch] {node.label} {ending(code)}')
+        ended = 'was ended while it started' if stopping and code == -signal.SIGTERM else ending(code)
+        self._say(f'[launch] {node.label} {ended}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:

@@ -341,7 +341,10 @@ ANSWERING_S = 2.0  # the longest that callbacks may take to answer once the node
 
 
 def run(
-    make_node: Callable[[], Any], args: Sequence[str] | None = None, make_executor: Callable[[], Executor] = OneThread
+    make_node: Callable[[], Any],
+    args: Sequence[str] | None = None,
+    make_executor: Callable[[], Executor] = OneThread,
+    on_stop: Callable[[], None] = lambda: None,
 ) -> None:
     """Make the node, spin it until a signal ends it, destroy it; exit with 2 and one sentence on a user's error.
 
@@ -356,12 +359,19 @@ def run(
         Arguments of the command line; None for those of the process.
     make_executor
         Makes the executor that spins it.
+    on_stop
+        Called in the signal's handler, also while the node is still being made: a wait for a device ends then.
     """
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stopped = threading.Event()
+
+    def stop(_number: int, _frame: Any) -> None:
+        stopped.set()
+        on_stop()
+
     for number in STOP_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN or number != signal.SIGHUP:  # as nohup wants it
-            signal.signal(number, lambda _number, _frame: stopped.set())
+            signal.signal(number, stop)
     node = executor = None
     try:
         node = make_node()

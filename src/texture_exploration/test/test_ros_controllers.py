@@ -2,6 +2,7 @@
 """The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
 
 import math
+import threading
 import re
 from dataclasses import replace
 
@@ -353,6 +354,16 @@ def test_nothing_is_commanded_by_an_arm_that_is_unsafe_when_it_is_connected():
     robot = Robot(connect_timeout_s=0.1)
     robot.unsafe_because = "'/other' commands the arm, too"
     with pytest.raises(DeviceError, match='commands the arm, too'):
+        robot.driven.connect()
+    assert not any(any(velocity) for _, velocity in robot.sent)
+
+
+def test_a_process_that_was_told_to_end_waits_for_no_controller_and_commands_nothing(monkeypatch):
+    robot = Robot(connect_timeout_s=30.0)
+    told = threading.Event()
+    told.set()
+    monkeypatch.setattr('texture_exploration.arms.arm.ENDING', told)
+    with pytest.raises(DeviceError, match='given up, as this process was told to end'):
         robot.driven.connect()
     assert not any(any(velocity) for _, velocity in robot.sent)
 

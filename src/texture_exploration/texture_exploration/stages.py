@@ -262,7 +262,7 @@ class TouchParams:
     )
     lost_force_fraction: float = param(
         0.25,
-        'Fraction of the wanted force below which contact counts as lost during a slide; a larger fraction aborts sooner.',
+        'Fraction of the wanted force below which contact counts as lost during a slide; a larger one aborts sooner.',
         low=0.05,
         high=0.9,
     )
@@ -627,8 +627,9 @@ class SlideWatch:
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
         if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
             yield (
-                f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off the '
-                f"{asked_m_s:g} m/s that were asked for ('mean_speed_fraction'); see what scales the speed of the arm"
+                f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off '
+                f"the {asked_m_s:g} m/s that were asked for ('mean_speed_fraction'); see what scales the speed of the "
+                'arm'
             )
         mean_n = self._tangential_sum_n / max(1, self._tangential_states)
         if mean_n > touch.mean_friction * asked_n:

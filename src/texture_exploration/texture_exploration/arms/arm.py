@@ -8,6 +8,7 @@ import enum
 import math
 import subprocess
 import sys
+import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -383,6 +384,13 @@ class CommandedVelocity:
 
 DONE = b'.'
 LEAVE_S = 2.0
+ENDING = threading.Event()  # set once this process was told to end
+
+
+def give_up_when_ending() -> None:
+    """Raise DeviceError once this process was told to end; called by what waits for a robot to be ready."""
+    if ENDING.is_set():
+        raise DeviceError('connecting was given up, as this process was told to end')
 
 
 class GuardProcess:

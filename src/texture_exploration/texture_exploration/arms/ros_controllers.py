@@ -31,6 +31,7 @@ from texture_exploration.arms.arm import (
     SurfacePoseParams,
     Vector,
     ZeroingParams,
+    give_up_when_ending,
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
@@ -757,6 +758,7 @@ class RosControllersArm(SurfaceArm):
         params, tool = self._params, self._tool
         end_s = time.monotonic() + params.connect_timeout_s
         while True:
+            give_up_when_ending()
             self._take(topics, self._clock())
             missing = {
                 f"no pose comes on '{params.pose_topic}'": tool.pose_ns == 0,

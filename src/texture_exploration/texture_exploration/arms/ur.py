@@ -31,6 +31,7 @@ from texture_exploration.arms.arm import (
     SurfacePoseParams,
     Vector,
     ZeroingParams,
+    give_up_when_ending,
     tangential_force_n,
 )
 from texture_exploration.safety import CommandLimits
@@ -282,11 +283,14 @@ class WorkerLink:
         DeviceError
             If the worker ends before, or none comes in time.
         """
-        if not self._state_received.wait(self._timeout_s):
-            raise DeviceError(
-                f'the controller did not let the arm be ready within {self._timeout_s:g} s; '
-                'look at its pendant, and restart it if it hangs'
-            )
+        end_s = time.monotonic() + self._timeout_s
+        while not self._state_received.wait(POLL_S):
+            give_up_when_ending()
+            if time.monotonic() > end_s:
+                raise DeviceError(
+                    f'the controller did not let the arm be ready within {self._timeout_s:g} s; '
+                    'look at its pendant, and restart it if it hangs'
+                )
         self.check()
 
     def check(self) -> None:

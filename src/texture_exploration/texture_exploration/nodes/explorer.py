@@ -42,6 +42,7 @@ from texture_core.ros import (
     to_stamp,
 )
 from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate, quaternion
+from texture_exploration.arms.arm import ENDING
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.explorer import (
     STILL_MOVING,
@@ -510,4 +511,4 @@ def _accept_cancel(_goal: Any) -> CancelResponse:
 
 def main() -> None:
     """Run the node."""
-    run(ExplorerNode, make_executor=WaitingExecutor)
+    run(ExplorerNode, make_executor=WaitingExecutor, on_stop=ENDING.set)

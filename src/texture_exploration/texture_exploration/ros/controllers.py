@@ -30,7 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import DeviceError
 from texture_core.ros import to_ns
-from texture_exploration.arms.arm import DONE, LEAVE_S, GuardProcess, Vector
+from texture_exploration.arms.arm import DONE, ENDING, LEAVE_S, GuardProcess, Vector, give_up_when_ending
 from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersParams
 
 # --------------------
@@ -403,6 +403,9 @@ class RosTopics:
                 found_s = now_s
             if found_s and now_s - found_s >= DISCOVERY_S and not other and not self._unnamed_s:
                 return
+            if ENDING.is_set():
+                self._leave()
+                give_up_when_ending()
             time.sleep(LOOKING_S)
 
     def _other_commander(self, own: tuple[str, ...] = ()) -> str:

@@ -344,7 +344,12 @@ class ControllerProcess:
         options = [f'--{name.replace("_", "-")}={value}' for name, value in dataclasses.asdict(self.params).items()]
         command = [sys.executable, '-m', 'texture_simulation.devices.ur', *options]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # Ctrl-C is for the owner; the process sees that it has ended
         )
         if not self._ready(self._process):
             self._process.kill()
