@@ -89,7 +89,6 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('evaluate fast glass --slides 7-9', '1 to 3'),
         ('train defualt glass -o x', "did you mean 'default'?"),
         ('train default glass -o x', 'at least two surfaces'),
-        ('train default glass leather -o x --channels all', "recipe 'default' uses the vibration alone"),
         ('train roughness glass leather -o x', 'give them with --grades'),
         ('evaluate fast glass --json /proc/none/x.json', '/proc/none'),
         ('cross-validate stratified:x fast glass', 'write stratified:FOLDS (2 or more)'),

@@ -64,20 +64,9 @@ def add_slides(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_channels(parser: argparse.ArgumentParser) -> None:
-    """Add `--channels`."""
-    parser.add_argument(
-        '--channels',
-        choices=('fast', 'all'),
-        help='fast: the vibration alone; all: the slow channels, too; default: all that there are',
-    )
-
-
 def add_dask(parser: argparse.ArgumentParser) -> None:
     """Add `--dask`."""
-    parser.add_argument(
-        '--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead, or local:WORKERS'
-    )
+    parser.add_argument('--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead')
 
 
 def add_seed(parser: argparse.ArgumentParser) -> None:

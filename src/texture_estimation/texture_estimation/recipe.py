@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from texture_core.config import from_mapping, param, unknown_name
@@ -313,27 +313,4 @@ def load_recipe(name_or_path: str) -> Recipe:
     return Recipe.from_mapping(content, name)
 
 
-# --------------------
-# A recipe for the vibration alone, or for all channels of a sensor.
-
-FAST_TOPIC = 'signal'
-CHANNELS = ('fast', 'all')
-
-
-def with_channels(recipe: Recipe, channels: str) -> Recipe:
-    """Return the recipe as it is for 'all' channels, with the input `signal` alone for 'fast'.
-
-    Raises
-    ------
-    InvalidParameter
-        If `channels` is neither, or the recipe has no vibration.
-    """
-    if channels not in CHANNELS:
-        raise InvalidParameter(f"channels are '{channels}'; 'fast' or 'all' is needed")
-    if channels == 'all':
-        return recipe
-    inputs = tuple(item for item in recipe.feature_set.inputs if item.topics == (FAST_TOPIC,))
-    if not inputs:
-        raise InvalidParameter(f"recipe '{recipe.name}' has no input '{FAST_TOPIC}'; use it with all channels")
-    feature_set = replace(recipe.feature_set, inputs=inputs, _layouts={})
-    return replace(recipe, feature_set=feature_set)
+FAST_TOPIC = 'signal'  # the vibration

@@ -198,7 +198,7 @@ def test_states_come_before_the_samples_they_cover_and_a_slide_ends(tmp_path: Pa
     assert value.phase is Phase.DONE
 
 
-def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tmp_path: Path) -> None:
+def test_wrong_sources_names_and_numbers_are_refused_with_a_sentence(tmp_path: Path) -> None:
     ntp, fabric = make_ntp21(tmp_path / 'ntp'), make_fabricslide(tmp_path / 'fabric')
     dated, sound = make_fingersense(tmp_path / 'dated'), make_lmt29(tmp_path / 'sound')
     broken = tmp_path / 'broken'
@@ -219,5 +219,3 @@ def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tm
             importer(tmp_path, tmp_path / 'out')
         with pytest.raises(InvalidData, match='not a file of this data set'):
             importer(broken, tmp_path / 'out')
-        with pytest.raises(InvalidData, match='channels are'):
-            importer(source, tmp_path / 'out', channels='some')

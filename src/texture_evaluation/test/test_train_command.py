@@ -17,10 +17,11 @@ from texture_estimation.roughness import load_roughness_model
 from texture_estimation.training import train
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.commands.train import summary
-from texture_evaluation.evaluate import evaluate
+from texture_evaluation.evaluate import evaluate, evaluate_dataset
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
+from texture_recordings.dataset import SlideDataset
 
 
 @pytest.fixture(scope='module')
@@ -163,12 +164,6 @@ def test_a_model_is_saved_with_the_data_it_was_trained_on(simulated: Path, tmp_p
     assert evaluate(load_model(tmp_path / 'mine.npz'), [simulated], '4').as_json()['window_accuracy'] > 0.9
 
 
-def test_fast_channels_leave_the_slow_input_out(simulated: Path) -> None:
-    fast = train_from_bags('vibration-and-taxels', [simulated], '1-4', channels='fast')
-    assert fast.recipe.feature_set.topics == ('signal',)
-    assert fast.feature_set.endswith('signal=1000Hz*1')
-
-
 def test_another_rate_is_refused_and_nothing_is_scored(
     evaluated: TextureModel, simulated: Path, tmp_path: Path
 ) -> None:
@@ -186,17 +181,16 @@ def test_of_two_fingers_in_a_bag_one_is_named(evaluated: TextureModel, simulated
             bag.write(f'/right/{topic}', value, log_ns)
     with pytest.raises(InvalidData, match='namespaces /left, /right'):
         evaluate(evaluated, [tmp_path / 'two'])
-    assert len(evaluate(evaluated, [tmp_path / 'two'], namespace='/left').known) == 6
+    left = SlideDataset.from_bags([tmp_path / 'two'], namespace='/left')
+    assert len(evaluate_dataset(evaluated, left).known) == 6
 
 
 def halved(signal: TactileSignal) -> TactileSignal:
     return replace(signal, sampling_rate_hz=500.0, first_sample=signal.first_sample // 2, samples=signal.samples[::2])
 
 
-def test_a_wrong_recipe_model_or_choice_of_channels_is_refused(simulated: Path, tmp_path: Path) -> None:
+def test_a_wrong_recipe_or_model_is_refused(simulated: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="did you mean 'default'"):
         train_from_bags('defalt', [simulated])
-    with pytest.raises(InvalidParameter, match="'fast' or 'all'"):
-        train_from_bags('default', [simulated], channels='slow')
     with pytest.raises(ModelMismatch, match='there is no model'):
         load_model(tmp_path / 'none')

@@ -77,9 +77,7 @@ class EvaluationReport:
         }
 
 
-def evaluate(
-    model: TextureModel, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
-) -> EvaluationReport:
+def evaluate(model: TextureModel, bags: Iterable[str | Path], slides: str = '') -> EvaluationReport:
     """Return how a model does on the labelled slides of bags.
 
     Parameters
@@ -90,8 +88,6 @@ def evaluate(
         Bags, or folders of bags.
     slides
         Which slides of each surface, such as '31-40'; '' for all. Surfaces without training are unknown ones.
-    namespace
-        Of the finger, if bags hold several.
 
     Returns
     -------
@@ -104,7 +100,7 @@ def evaluate(
     InvalidData
         If a bag cannot be read or no slide is usable.
     """
-    return evaluate_dataset(model, SlideDataset.from_bags(bags, slides, namespace, model.recipe.feature_set.topics))
+    return evaluate_dataset(model, SlideDataset.from_bags(bags, slides, topics=model.recipe.feature_set.topics))
 
 
 def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationReport:

@@ -18,7 +18,7 @@ from texture_core.config import writing
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Array
 from texture_estimation import search
-from texture_estimation.recipe import Recipe, load_recipe, with_channels
+from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import RoughnessRecipe, load_roughness_recipe, read_grades
 from texture_evaluation.charts import chart, line_styles
 from texture_features.feature_set import AGAIN, FeatureSet
@@ -222,8 +222,6 @@ class Wanted:
         Name or path of the search space; '' for that of the recipe or its learner.
     slides
         Which slides of each surface, such as '1-30'; '' for all.
-    channels
-        'fast' leaves all inputs of the recipe but `signal` out.
     grades
         CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
     per_pair
@@ -234,7 +232,6 @@ class Wanted:
     bags: tuple[str, ...]
     search: str = ''
     slides: str = ''
-    channels: str = 'all'
     grades: str = ''
     per_pair: bool = False
 
@@ -335,7 +332,7 @@ def _space(wanted: Wanted) -> search.RecipeSpace:
         recipe = load_roughness_recipe(wanted.recipe)
         learner = recipe.regressor_name
     else:
-        recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
+        recipe = load_recipe(wanted.recipe)
         learner = recipe.learner_name
     of_pairs = search.space_for('pairs_of', recipe.name) if wanted.per_pair else None
     name = (

@@ -10,7 +10,7 @@ from pathlib import Path
 from texture_core.cli import task
 from texture_core.config import writing
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe, load_recipe, with_channels
+from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, read_grades, train_grades
 from texture_estimation.training import train
 from texture_features.feature_set import LabelledFeatures
@@ -25,9 +25,6 @@ def train_from_bags(
     bags: Sequence[str | Path],
     slides: str = '',
     out: str | Path | None = None,
-    *,
-    channels: str = 'all',
-    namespace: str | None = None,
 ) -> TextureModel:
     """Return a model trained on the labelled slides of bags, and save it; a TextureError says what is wrong.
 
@@ -41,17 +38,13 @@ def train_from_bags(
         Which slides of each surface, such as '1-30'; '' for all.
     out
         Path of the model, with or without .npz; not saved if None.
-    channels
-        'fast' leaves all inputs of the recipe but `signal` out.
-    namespace
-        Of the finger, if bags hold several.
 
     Returns
     -------
     TextureModel
     """
-    plan = with_channels(load_recipe(recipe), channels)
-    dataset = SlideDataset.from_bags(bags, slides, namespace, plan.feature_set.topics)
+    plan = load_recipe(recipe)
+    dataset = SlideDataset.from_bags(bags, slides, topics=plan.feature_set.topics)
     examples = training_examples(plan, dataset)
     with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
@@ -68,8 +61,6 @@ def train_grades_from_bags(
     grades: str | Path,
     slides: str = '',
     out: str | Path | None = None,
-    *,
-    namespace: str | None = None,
 ) -> RoughnessModel:
     """Return a roughness model trained on labelled slides, and save it; a TextureError says what is wrong.
 
@@ -85,8 +76,6 @@ def train_grades_from_bags(
         Which slides of each surface, such as '1-30'; '' for all.
     out
         Path of the model, with or without .npz; not saved if None.
-    namespace
-        Of the finger, if bags hold several.
 
     Returns
     -------
@@ -94,7 +83,7 @@ def train_grades_from_bags(
     """
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
+    examples = SlideDataset.from_bags(bags, slides, topics=windows.topics).features(windows)
     with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
         model = train_grades(plan, examples, table, _name(out, plan.name))
     if out is not None:

@@ -21,7 +21,6 @@ CLUSTER_ADVICE = (
     'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
     'suite'
 )
-LOCAL, MAX_LOCAL_WORKERS = 'local:', 64
 
 
 @contextmanager
@@ -43,8 +42,7 @@ def dask_backend(address: str) -> Iterator[None]:
     Parameters
     ----------
     address
-        Address of its scheduler, such as 'tcp://192.168.1.5:8786', or 'local:2' to start a cluster of two workers on
-        this machine.
+        Address of its scheduler, such as 'tcp://192.168.1.5:8786'.
 
     Raises
     ------
@@ -52,17 +50,6 @@ def dask_backend(address: str) -> Iterator[None]:
         If no scheduler answers there, it has no worker, or one of them lacks the suite or has another version.
     """
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
-
-    if address.startswith(LOCAL):
-        workers = address.removeprefix(LOCAL)
-        if not workers.isdecimal() or not 1 <= int(workers) <= MAX_LOCAL_WORKERS:
-            raise InvalidParameter(
-                f"the local cluster has '{workers}' workers; 1 to {MAX_LOCAL_WORKERS} are allowed, such as '{LOCAL}2'"
-            )
-        cluster: Any = cluster_of.LocalCluster(n_workers=int(workers), threads_per_worker=1, dashboard_address=None)
-        with cluster, dask_backend(cluster.scheduler_address):
-            yield
-        return
 
     try:
         client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)

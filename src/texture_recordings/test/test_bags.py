@@ -24,7 +24,6 @@ from texture_core.types import (
 from texture_recordings.bags import (
     TYPES,
     BagWriter,
-    SignalDecoder,
     decode,
     encode,
     find_bags,
@@ -87,14 +86,6 @@ def test_messages_come_in_the_order_of_their_log_times_whatever_the_order_of_wri
         for log_ns in (3, 1, 2):
             bag.write('signal', signal(log_ns), log_ns)
     assert [value.first_sample for _, _, value in read_bag(tmp_path / 'bag')] == [1, 2, 3]
-
-
-def test_the_fast_decoder_agrees_with_the_general_one_when_the_stream_changes() -> None:
-    decoder = SignalDecoder()
-    for sent in (signal(0), signal(5), signal(10, ('a', 'b', 'c')), signal(15), signal(2**40)):
-        fast, general = decoder.decode(encode(sent)), decode(encode(sent), TYPES[TactileSignal])
-        for field in dataclasses.fields(sent):
-            np.testing.assert_array_equal(getattr(fast, field.name), getattr(general, field.name))
 
 
 def test_a_bag_played_by_ros_offers_every_topic_as_the_nodes_do(tmp_path: Path) -> None:

@@ -127,12 +127,7 @@ def test_the_sign_follows_the_rule_sample_by_sample() -> None:
     np.testing.assert_array_equal(restore_sign(rectified), expected)
 
 
-def test_fast_channels_alone_leave_the_slow_topic_out(tmp_path: Path) -> None:
-    (bag,) = import_biotac20(make_source(tmp_path / 'in'), tmp_path / 'out', channels='fast')
-    assert {topic for topic, _, _ in read_bag(bag)} == {'signal', 'exploration'}
-
-
-def test_a_wrong_source_material_slide_or_channel_is_refused_with_a_sentence(tmp_path: Path) -> None:
+def test_a_wrong_source_material_or_slide_is_refused_with_a_sentence(tmp_path: Path) -> None:
     source = make_source(tmp_path / 'in')
     (tmp_path / 'broken').mkdir()
     (tmp_path / 'broken' / 'material01.npz').write_bytes(b'nothing')
@@ -144,5 +139,3 @@ def test_a_wrong_source_material_slide_or_channel_is_refused_with_a_sentence(tmp
         import_biotac20(source, tmp_path / 'out', materials=['material70'])
     with pytest.raises(InvalidData, match='none of the slides'):
         import_biotac20(source, tmp_path / 'out', slides='50')
-    with pytest.raises(InvalidData, match="'fast' or 'all'"):
-        import_biotac20(source, tmp_path / 'out', channels='some')

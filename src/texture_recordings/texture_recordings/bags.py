@@ -327,81 +327,6 @@ def _fields(cls: type) -> Mapping[str, Convert]:
     return {name: WIRE.get(kind, SAME) for name, kind in get_type_hints(cls).items()}
 
 
-class SignalDecoder:
-    """Decode the signals of one stream fast: its batches differ in stamp, index and samples only.
-
-    Examples
-    --------
-    >>> batch = TactileSignal(5, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
-    >>> decoder = SignalDecoder()
-    >>> [decoder.decode(encode(batch)).samples[:, 0].tolist() for _ in range(2)]
-    [[1.0, 2.0], [1.0, 2.0]]
-    """
-
-    def __init__(self) -> None:
-        self._head = b''
-        self._like: TactileSignal | None = None
-        self._heads_left = MAX_HEADS_BYTES
-
-    def decode(self, raw: bytes) -> TactileSignal:
-        """Return the signal in the CDR of a TactileSignal; `samples` is a view of `raw`."""
-        like, tail = self._like, STAMP_END + len(self._head)
-        if like is None or raw[STAMP_END:tail] != self._head or not raw.startswith(LITTLE_ENDIAN):
-            return self._decode_first(raw)
-        seconds, nanoseconds = STAMP.unpack_from(raw, len(LITTLE_ENDIAN))
-        first, length = INDEX_AND_LENGTH.unpack_from(raw, tail)
-        columns = len(like.channels)
-        if length % columns or len(raw) < tail + INDEX_AND_LENGTH.size + 4 * length:
-            return self._decode_first(raw)
-        samples = np.frombuffer(raw, '<f4', length, tail + INDEX_AND_LENGTH.size)
-        return TactileSignal(
-            seconds * NANOSECONDS + nanoseconds, like.sensor, like.channels, like.units, like.sampling_rate_hz,
-            first, samples.reshape(-1, columns), like.frame_id, like.tared,
-        )  # fmt: skip
-
-    def _decode_first(self, raw: bytes) -> TactileSignal:
-        _check_texts(raw)
-        signal: TactileSignal = decode(raw, TYPES[TactileSignal])
-        # The samples are the last field: what stands before them, without the stamp, is common to the stream.
-        tail = len(raw) - 4 * signal.samples.size - INDEX_AND_LENGTH.size
-        self._head, self._like = raw[STAMP_END:tail], signal
-        self._heads_left -= len(self._head)
-        if self._heads_left < 0:
-            raise InvalidData(f"the channels of sensor '{signal.sensor}' change again and again")
-        return signal
-
-
-def _check_texts(raw: bytes) -> None:
-    """Raise InvalidData if a TactileSignal has more channels or units than any sensor: a text takes 8 bytes."""
-    try:
-        at = STAMP_END
-        for _ in ('frame', 'sensor'):
-            at = _after_text(raw, at)
-        for name in ('channels', 'units'):
-            (count,) = LENGTH.unpack_from(raw, at)
-            if count > MAX_CHANNELS:
-                raise InvalidData(f'a signal has {count} {name}; {MAX_CHANNELS} are allowed')
-            at += LENGTH.size
-            for _ in range(count):
-                at = _after_text(raw, at)
-    except struct.error:
-        pass  # whoever reads on says what is wrong
-
-
-def _after_text(raw: bytes, at: int) -> int:
-    (length,) = LENGTH.unpack_from(raw, at)
-    return -(-(at + LENGTH.size + int(length)) // LENGTH.size) * LENGTH.size
-
-
-LITTLE_ENDIAN = b'\x00\x01'
-STAMP = struct.Struct('<2xiI')
-STAMP_END = 12
-INDEX_AND_LENGTH = struct.Struct('<QI')
-LENGTH = struct.Struct('<I')
-MAX_CHANNELS = 4096
-MAX_HEADS_BYTES = 2_000_000  # a stream says the same of itself all the time, unless its driver is started again
-
-
 # --------------------
 # The names of the topics of a sensor in a bag.
 
@@ -612,17 +537,13 @@ def read_bag(
         If there is no bag, or it is damaged.
     """
     wanted = None if topics is None else set(topics)
-    signals: dict[str, SignalDecoder] = {}
 
     def chosen(connection: Connection, name: str) -> bool:
         return connection.msgtype in MESSAGES and (wanted is None or name in wanted)
 
     for name, message in _read(Path(path), chosen, namespace, start_ns, stop_ns):
         try:
-            if message.msgtype == TYPES[TactileSignal]:
-                value: Any = signals.setdefault(message.topic, SignalDecoder()).decode(message.data)
-            else:
-                value = decode(message.data, message.msgtype)
+            value = decode(message.data, message.msgtype)
         except InvalidData as error:
             raise InvalidData(f"the bag '{path}' is damaged: {error}; record it again") from error
         yield name, message.log_ns, value

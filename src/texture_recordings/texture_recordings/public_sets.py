@@ -105,15 +105,11 @@ LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a los
 FIELDS = ('frames', 'frame_time', 'velocity', 'wrench')
 
 
-def import_biotac20(
-    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
-) -> list[Path]:
+def import_biotac20(source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = ()) -> list[Path]:
     """Write one bag a material, 'material01' and so on, from files materialNN.npz, and return their paths.
 
     The vibration is PAC at 2200 Hz, the slow channels have 100 Hz.
     """
-    if channels not in ('fast', 'all'):
-        raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")
     files = {path.stem: path for path in sorted(Path(source).glob('material*.npz'))}
     if not files:
         raise InvalidData(f"no files materialNN.npz in '{source}'; give the folder that holds them")
@@ -123,12 +119,12 @@ def import_biotac20(
     wanted = parse_selection(slides)
     names = materials or list(files)
     return [
-        _import_material(files[name], Path(out) / name, wanted, channels)
+        _import_material(files[name], Path(out) / name, wanted)
         for name in progress(names, 'import materials', len(names))
     ]
 
 
-def _import_material(file: Path, out: Path, wanted: frozenset[int] | None, channels: str) -> Path:
+def _import_material(file: Path, out: Path, wanted: frozenset[int] | None) -> Path:
     recordings = list(_recordings(file, wanted))
     if not recordings:
         raise InvalidData(f"'{file}' has none of the slides asked for; it has 1 to 40")
@@ -138,7 +134,7 @@ def _import_material(file: Path, out: Path, wanted: frozenset[int] | None, chann
             # Where the recording computer's clock went back, a slide follows the one before.
             start_ns = max(round(recording.epoch * 1000) * 1_000_000, ready_ns)
             indices = next_frame + frame_indices(recording.frame_time[:SLIDE_FRAMES])
-            _write_slide(bag, recording, start_ns, indices, channels)
+            _write_slide(bag, recording, start_ns, indices)
             next_frame = int(indices[-1]) + 1
             ready_ns = start_ns + (next_frame - int(indices[0])) * FRAME_NS + PAUSE_NS
     return out
@@ -201,7 +197,7 @@ def restore_sign(rectified: AnyArray) -> Array:
     return x * signs
 
 
-def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices: AnyArray, channels: str) -> None:
+def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices: AnyArray) -> None:
     """Write one slide: a state every 0.1 s, the samples, then the end; `indices` number the frames."""
     frames, first = recording.frames[: len(indices)], int(indices[0])
     places = indices - first
@@ -211,7 +207,7 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
         'signal_static': (_like('slow', STATIC_CHANNELS, first), frames[:, STATIC_COLUMNS], places),
     }
     messages: list[tuple[int, str, Any]] = []
-    for topic, (like, samples, index) in streams.items() if channels == 'all' else [('signal', streams['signal'])]:
+    for topic, (like, samples, index) in streams.items():
         batches = list(slide_batches(like, samples, index, start_ns, batch_s=BIOTAC_BATCH_S))
         messages += [(batch.end_ns + DELAY_NS, topic, batch) for batch in batches]
     named, stop_ns = recording.named(), start_ns + (int(places[-1]) + 1) * FRAME_NS
@@ -265,7 +261,7 @@ class SlideSet:
     r"""A data set of one stream: what its files and slides are called, and how its arrays are read.
 
     Call it with the folder of the files, the folder for the bags, the numbers of the slides of each surface ('' for
-    all), surfaces (none for all) and channels; it returns the bags.
+    all), and surfaces (none for all); it returns the bags.
 
     Examples
     --------
@@ -300,7 +296,6 @@ class SlideSet:
         out: str | Path,
         slides: str = '',
         materials: Sequence[str] = (),
-        channels: str = 'all',
     ) -> list[Path]:
         """Write the bags, and return their paths.
 
@@ -314,17 +309,12 @@ class SlideSet:
             Numbers of the slides of each surface, such as '1-30'; '' for all.
         materials
             Labels of the surfaces; none for all.
-        channels
-            'all', or 'fast' for a stream of vibration, which is the same here.
 
         Raises
         ------
         InvalidData, UnknownName
             If the folder `source` lacks the files, slides or a surface, the channels are not there, or a bag exists.
         """
-        allowed = ('fast', 'all') if self.topic == 'signal' else ('all',)
-        if channels not in allowed:
-            raise InvalidData(f"channels are '{channels}'; this set has {' and '.join(allowed)}")
         arrays, wanted = self._read(Path(source)), parse_selection(slides)
         found: defaultdict[str, list[tuple[tuple[Any, ...], str]]] = defaultdict(list)
         for key in arrays:

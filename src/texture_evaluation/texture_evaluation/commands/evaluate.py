@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from texture_core.cli import Command, add_channels, add_dask, add_seed, add_slides, core_count, task
+from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count, task
 from texture_core.config import refuse_inputs, shipped, write_json
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import both_files, load_model
-from texture_estimation.recipe import load_recipe, with_channels
+from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
     CrossValidation,
@@ -64,7 +64,6 @@ def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
     )
     add_dask(parser)
     add_slides(parser)
-    add_channels(parser)
     add_seed(parser)
 
 
@@ -73,7 +72,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
     split = parse_split(options.split, options.seed)
     names, bags = recipes_and_bags([options.recipe, *options.bags])
     _check_outputs(options, [*names, *bags])
-    recipes = [with_channels(load_recipe(name), options.channels or 'all') for name in names]
+    recipes = [load_recipe(name) for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
     source = partial(_read, [str(Path(bag).absolute()) for bag in bags], options.slides, tuple(topics), split)
     dataset = source()
@@ -92,7 +91,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
     for one in compared:
         print(sentence(one))
     if options.json:
-        setting = {'split': split.name, 'seed': options.seed, 'bags': bags, 'channels': options.channels or 'all'}
+        setting = {'split': split.name, 'seed': options.seed, 'bags': bags}
         _write_figures(results, compared, setting, options.json)
     if options.chart:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'

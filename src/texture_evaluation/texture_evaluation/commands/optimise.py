@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 
-from texture_core.cli import add_channels, add_dask, add_seed, add_slides, core_count
+from texture_core.cli import add_dask, add_seed, add_slides, core_count
 from texture_core.config import from_mapping
 from texture_estimation.search import Generation, SearchParams
 from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
@@ -34,14 +34,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_dask(parser)
     parser.add_argument('--resume', action='store_true', help='continue from the checkpoint next to FILE')
     add_slides(parser)
-    add_channels(parser)
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Search, write the recipe, and say how good it is."""
     given = {name: getattr(options, name) for name in ('recipe', 'search', 'slides', 'grades', 'per_pair')}
-    wanted = Wanted(bags=tuple(options.bags), channels=options.channels or 'all', **given)
+    wanted = Wanted(bags=tuple(options.bags), **given)
     chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed')}
     if options.all_halves:
         chosen['search_halves'] = options.halves

@@ -7,11 +7,10 @@ import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
-from texture_core.cli import add_channels, add_slides
+from texture_core.cli import add_slides
 from texture_core.config import shipped
 from texture_core.errors import InvalidParameter
 from texture_estimation.model import TextureModel
-from texture_estimation.recipe import FAST_TOPIC, load_recipe
 from texture_estimation.roughness import RoughnessModel
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 
@@ -27,27 +26,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('-o', '--out', required=True, metavar='MODEL', help='makes MODEL.npz and MODEL.json')
     add_slides(parser)
-    add_channels(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Train, save, and say what was trained."""
     if options.grades:
-        if options.channels:
-            raise InvalidParameter('--channels holds for recipes of textures; a roughness recipe names its own inputs')
         graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
         print('\n'.join(graded_summary(graded, Path(options.out))))
         return 0
     if options.recipe in shipped('texture_estimation', 'config/roughness'):
         raise InvalidParameter(f"recipe '{options.recipe}' learns grades of roughness; give them with --grades FILE")
-    if options.channels == 'all' and set(load_recipe(options.recipe).feature_set.topics) <= {FAST_TOPIC}:
-        raise InvalidParameter(
-            f"recipe '{options.recipe}' uses the vibration alone; train one with slow channels, such as "
-            'vibration-and-taxels'
-        )
-    model = train_from_bags(
-        options.recipe, options.bags, options.slides, options.out, channels=options.channels or 'all'
-    )
+    model = train_from_bags(options.recipe, options.bags, options.slides, options.out)
     for line in summary(model, Path(options.out)):
         print(line)
     return 0

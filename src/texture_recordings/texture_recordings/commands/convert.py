@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_core.cli import Command, add_channels, add_parameters, add_slides, parameters_from, task
+from texture_core.cli import Command, add_parameters, add_slides, parameters_from, task
 from texture_core.config import find, writing
 from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
@@ -29,7 +29,6 @@ def _configure_import(parser: argparse.ArgumentParser) -> None:
         '--materials', nargs='+', default=(), metavar='NAME', help='only these surfaces; all if not given'
     )
     add_slides(parser)
-    add_channels(parser)
 
 
 def _import(options: argparse.Namespace) -> int:
@@ -37,9 +36,9 @@ def _import(options: argparse.Namespace) -> int:
     mapped = options.data_set in MAPPED
     if len(options.places) != 2 + mapped:
         raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
-    if mapped and (options.slides or options.materials or options.channels):
+    if mapped and (options.slides or options.materials):
         raise InvalidParameter(
-            f'--slides, --materials and --channels choose from a known data set; of {options.data_set} the mapping '
+            f'--slides and --materials choose from a known data set; of {options.data_set} the mapping '
             'file says what is read'
         )
     for bag in _import_mapped(options) if mapped else _import_known(options):
@@ -56,13 +55,7 @@ def source_folder(source: str, data_set: str) -> Path:
 def _import_known(options: argparse.Namespace) -> list[Path]:
     importer = find(IMPORTS, options.data_set, 'data set')
     source, out = options.places
-    return importer(
-        source_folder(source, options.data_set),
-        out,
-        options.slides,
-        options.materials,
-        channels=options.channels or 'all',
-    )
+    return importer(source_folder(source, options.data_set), out, options.slides, options.materials)
 
 
 def _import_mapped(options: argparse.Namespace) -> list[Path]:

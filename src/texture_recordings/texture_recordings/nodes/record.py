@@ -22,7 +22,7 @@ from texture_core.config import param
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import DiagnosticReport, Diagnostics, declare, run
 from texture_core.types import Quality
-from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, SignalDecoder, typestore
+from texture_recordings.bags import COMMON, MESSAGES, BagWriter, Continuity, RawMessage, decode, typestore
 from texture_recordings.ros import TOPICS, message_class
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
@@ -58,7 +58,6 @@ class RecordNode(Node):
         self._bag = BagWriter(params.out)
         self._counts: Counter[str] = Counter()
         self._continuity = Continuity()
-        self._decoders: dict[str, SignalDecoder] = {}
         self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
         self._error: OSError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
@@ -173,7 +172,7 @@ class RecordNode(Node):
         if not message.msgtype.endswith('/TactileSignal'):
             return
         try:
-            signal = self._decoders.setdefault(message.topic, SignalDecoder()).decode(message.data)
+            signal = decode(message.data, message.msgtype)
         except InvalidData:
             self._counts['bad'] += 1
             return
