@@ -43,27 +43,16 @@ from texture_papers.protocol import digest_of
 from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide
 
 VIBRATION, ALL_CHANNELS = 'vibration', 'all channels'
-OURS, PAPERS, VARIANTS, PEERS = 'this suite', 'papers, word for word', 'variants, of no paper', 'general classifiers'
+OURS, PAPERS, PEERS = 'this suite', 'papers, word for word', 'general classifiers'
 RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
     VIBRATION: {
         OURS: ('default', 'fast', 'onset', 'any-place'),
-        PAPERS: (
-            'ets-fine-svm',
-            'ets-linear-svm',
-            'ets-linear-svm-vote',
-            'ets-linear-ann',
-            'hu-pca-svm',
-            'jamali-naive-bayes-3',
-            'jamali-naive-bayes-5',
-            'jamali-amplitude',
-        ),
-        VARIANTS: ('hu-log-pca-svm', 'jamali-stft', 'ets-linear-svm-recorded', 'peaks-naive-bayes'),
+        PAPERS: ('ets-fine-svm', 'ets-linear-svm', 'hu-pca-svm', 'jamali-naive-bayes-5'),
         PEERS: ('SVC on log bands',),
     },
     ALL_CHANNELS: {
         OURS: ('vibration-and-taxels', 'any-place-and-taxels', 'taxels-changes'),
-        PAPERS: ('kaboli-svm', 'kaboli-pa', 'kaboli-em'),
-        VARIANTS: ('kaboli-svm-rbf',),
+        PAPERS: ('kaboli-svm', 'kaboli-pa'),
     },
 }
 QUICK_RECIPES = {'default', 'jamali-naive-bayes-5', 'kaboli-pa', 'vibration-and-taxels'}
@@ -229,10 +218,13 @@ def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
         'ends_when_decided': dict(metrics.early_decision(results)) if job.kind == OURS else None,
         'train_s': round(fold.train_s, 2),
     }
-    timed = dataset.slides[:: max(1, len(dataset) // TIMED_SLIDES)]
-    cut = [cut_slide(slide, recipe.feature_set) for slide in timed]
-
+    cut = [cut_slide(slide, recipe.feature_set) for slide in _timed(dataset.slides)]
     return _Tried(figures, partial(_time_recipe, replace(fold.model), cut))
+
+
+def _timed(slides: Sequence[Any]) -> Sequence[Any]:
+    """Return the slides, among all, whose windows are timed: the same for every method."""
+    return slides[:: max(1, len(slides) // TIMED_SLIDES)]
 
 
 def _time_recipe(model: Any, cut: Sequence[Any]) -> Array:
@@ -265,7 +257,7 @@ def _try_peer(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tri
         'ends_when_decided': None,
         'train_s': round(taken_s, 2),
     }
-    timed = np.concatenate([windows[row][:2] for row in tested])[:: max(1, 2 * len(tested) // 100)]
+    timed = np.concatenate(_timed(windows))
     return _Tried(figures, partial(_time_peer, peer, timed))
 
 
@@ -306,7 +298,6 @@ def _at(found: Mapping[float, Any], seconds: float) -> Any:
 STYLES: Mapping[str, dict[str, Any]] = {
     OURS: {'color': COLOURS[0]},
     PAPERS: {'color': '#4d4d4d'},
-    VARIANTS: {'color': '#9a9a9a'},
     PEERS: {'color': COLOURS[5]},
 }
 DASHES = {OURS: '-', PAPERS: '-.', PEERS: '--'}
@@ -424,7 +415,7 @@ def _name_points(axes: Any, names: Sequence[str], kinds: Sequence[str], points: 
     """Write names above their points, the most accurate first, where they cover no other name."""
     figure = axes.figure
     taken: list[Any] = []
-    for index in sorted(range(len(names)), key=lambda at: (kinds[at] == VARIANTS, -points[at][1])):
+    for index in sorted(range(len(names)), key=lambda at: -points[at][1]):
         for offset, side in (((6, 7), 'left'), ((-6, 7), 'right'), ((6, -7), 'left'), ((-6, -7), 'right')):
             text = axes.annotate(names[index], (points[index][0], wrong_percent(points[index][1])), xytext=offset,
                                  textcoords='offset points', ha=side, va='center', **STYLES[kinds[index]])  # fmt: skip
