@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `texture explore` prints when an exploration does not come to its end."""
 
+import contextlib
 import math
 from unittest.mock import MagicMock
 
@@ -8,9 +9,17 @@ import pytest
 
 from texture_bringup.command import main
 from texture_bringup.commands.explore import explored, texture_text
+from texture_bringup.operator import ExplorationResult
 from texture_core.cli import run_program
-from texture_core.errors import MotionAborted
-from texture_core.types import ExplorationRequest, ExplorationState, Phase, Rejection, TextureEstimate
+from texture_core.errors import ExplorationError, MotionAborted
+from texture_core.types import (
+    ExplorationRequest,
+    ExplorationState,
+    Phase,
+    Rejection,
+    RoughnessEstimate,
+    TextureEstimate,
+)
 from texture_features.correction import write_reference
 
 pytestmark = pytest.mark.ros
@@ -44,6 +53,34 @@ def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress
     assert progress.strip() == ''  # the terminal returns to the beginning of the line before it draws
     assert below[0].startswith('slide')
     assert below[1:] == lines
+
+
+@pytest.mark.parametrize('last', ['aborted', 'refused', 'vanished'])
+def test_slides_in_several_directions_end_with_the_first_that_fails_and_tell_how_to_go_on(monkeypatch, capsys, last):
+    """Whatever aborted a slide, somebody has to look at it: an operator who is away must not find the finger worn."""
+    nothing = TextureEstimate(0, ''), RoughnessEstimate(0, '')
+    asked = []
+
+    class FailingOperator(contextlib.nullcontext):
+        wait_for_explorer = staticmethod(lambda deadline_s: None)
+
+        def explore(self, request, _on_progress):
+            asked.append(round(math.degrees(request.direction_rad)))
+            if len(asked) < 3:
+                return ExplorationResult(ExplorationError.NONE, 'the motion ended as asked', 'one', *nothing)
+            if last == 'vanished':
+                raise MotionAborted('the explorer has vanished')
+            return ExplorationResult(
+                ExplorationError.FORCE_LIMIT, 'too hard', '' if last == 'refused' else 'three', *nothing
+            )
+
+        def __enter__(self):
+            return self
+
+    monkeypatch.setattr('texture_bringup.commands.explore.Operator', FailingOperator)
+    assert main(['explore', 'linear_slide', '--direction', '0', '180', '45.5', '180']) != 0
+    assert asked == [0, 180, 46]
+    assert '2 of 4 slides were made; go on with --direction 45.5 180\n' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

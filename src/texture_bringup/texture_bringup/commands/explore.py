@@ -85,12 +85,18 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
 
 
 def _explore(options: argparse.Namespace) -> int:
-    """Explore once in each direction; return 1 as soon as one was ended early by a fault or a stop."""
-    requests = requests_of(options)
-    with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(deadline_s=10.0)
-        succeeded = all(tell(explored(operator, request)) for request in requests)
-    return 0 if succeeded else 1
+    """Explore once in each direction; after the first without success say how to go on, and return 1."""
+    requests, made = requests_of(options), 0
+    try:
+        with Operator(options.namespace) as operator:
+            operator.wait_for_explorer(deadline_s=10.0)
+            while made < len(requests) and tell(explored(operator, requests[made])):
+                made += 1
+    finally:
+        if made < len(requests) > 1:
+            left = ' '.join(f'{degrees:g}' for degrees in options.direction[made:])
+            print(f'{made} of {len(requests)} slides were made; go on with --direction {left}', file=sys.stderr)
+    return int(made < len(requests))
 
 
 def explored(operator: Operator, request: ExplorationRequest) -> ExplorationResult:
