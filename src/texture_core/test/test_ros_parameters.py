@@ -76,6 +76,16 @@ def test_a_parameter_that_the_node_does_not_know_is_named_in_a_warning(make_node
     assert "this has no effect: no parameter 'colour'. Known: " in line
 
 
+def test_a_node_that_shares_the_file_of_another_takes_what_it_knows_and_says_nothing(
+    make_node: Any, capfd: Any
+) -> None:
+    node = make_node(colour=2.0, naem='x', name='y')
+    node.shares_file = True
+    assert declare(node, Params).name == 'y'
+    check_names(node)
+    assert not capfd.readouterr().err
+
+
 @pytest.mark.parametrize('section', ['/**', '/n', '/**/n'])
 def test_a_node_with_a_misspelled_parameter_does_not_start(tmp_path: Any, capfd: Any, section: str) -> None:
     file = tmp_path / 'robot.yaml'

@@ -263,12 +263,15 @@ def check_names(node: Any) -> None:
     """Refuse a parameter that was given and is nearly one of the node's; log a warning for others that are unknown.
 
     Names in the node's `names_elsewhere`, if it has them, belong to what it did not choose: they are not misspelled.
+    A node with `shares_file` takes only what it knows from the file of another node, such as the pose of a surface.
 
     Raises
     ------
     InvalidParameter
         With the nearest name. A mistyped limit limits nothing, and the node would run with its default.
     """
+    if getattr(node, 'shares_file', False):
+        return
     declared = set(node._parameters)
     elsewhere = getattr(node, 'names_elsewhere', ())
     for name in sorted(set(node._parameter_overrides) - declared):

@@ -106,6 +106,9 @@ class TwistControllerParams(TouchedSurfaceParams):
     surface_ry_rad: float = param(
         0.0, 'Y component of the rotation vector of the surface in the base frame.', unit='rad'
     )
+    surface_rz_rad: float = param(
+        0.0, 'Z component of the rotation vector of the surface in the base frame.', unit='rad'
+    )
     stiffness_n_m: float = param(
         2000.0,
         'Stiffness of finger and surface in contact; 0 removes the surface.',
@@ -172,7 +175,7 @@ class EmulatedTwistArm:
     def __init__(self, params: TwistControllerParams, now_ns: int) -> None:
         self.params = params
         self._rng = np.random.default_rng(params.seed)
-        self._axes = rotation_matrix((params.surface_rx_rad, params.surface_ry_rad, 0.0))
+        self._axes = rotation_matrix((params.surface_rx_rad, params.surface_ry_rad, params.surface_rz_rad))
         self._origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
         self.position: Array = self._origin + params.start_height_m * self._axes[:, 2]
         self.velocity: Array = np.zeros(3)
