@@ -94,22 +94,6 @@ def test_a_rough_surface_that_the_finger_bounces_over_is_slid_on(make_logged_tab
     assert min(window.mean() for window in windows_from(table)) >= 0.9
 
 
-def test_a_lost_contact_is_sought_again_if_asked(make_logged_table):
-    table = make_logged_table(touch=TouchParams(seek_lost_contact=True), shape=DROP)
-    outcome = table.explore(REQUEST)
-    assert outcome.success, outcome.message
-    assert [phase for phase in table.phases if phase is Phase.SLIDE] == [Phase.SLIDE, Phase.SLIDE]
-    assert table.arm.state().position[0] < 0.19
-    assert min(window.mean() for window in windows_from(table)) >= 0.9
-
-
-def test_seeking_a_surface_that_has_ended_gives_up(make_table):
-    table = make_table(touch=TouchParams(seek_lost_contact=True), shape=SurfaceShape(edge_m=EDGE_IN_SLIDE_M))
-    outcome = table.explore(REQUEST)
-    assert not outcome.success
-    assert outcome.message.startswith(('no surface within', 'the finger left the workspace: z'))
-
-
 @pytest.mark.parametrize(
     ('edge_m', 'success'),
     [

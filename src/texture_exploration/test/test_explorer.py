@@ -59,6 +59,21 @@ def test_a_motion_that_would_begin_outside_the_workspace_is_refused(explorer, li
     assert explorer.counts['refused'] == 1
 
 
+def test_a_start_outside_names_every_axis_at_once_and_a_finger_brought_inside_begins_there(explorer):
+    explorer.limits = SafetyLimits(x_low_m=0.05, z_high_m=0.001)
+    both = r'x is 0\.0000 m, allowed is 0\.05 to 0\.2 m and z is 0\.0020 m, allowed is -0\.02 to 0\.001 m; bring'
+    with pytest.raises(MotionRefused, match=both):
+        explorer.check_start()
+    with pytest.raises(MotionRefused, match=both):
+        explorer.begin('one', QUICK)
+    explorer.limits = SafetyLimits(x_low_m=0.05)
+    explorer.arm.displace((0.06, 0.0, 0.0))
+    exploration = explorer.begin('one', QUICK)
+    assert exploration.ended.wait(DEADLINE_S)
+    assert exploration.outcome.success, exploration.outcome.message
+    explorer.check_start()
+
+
 def test_stopping_lifts_the_finger(explorer):
     explorer.table.gate.clear()
     exploration = explorer.begin('one', SLOW)

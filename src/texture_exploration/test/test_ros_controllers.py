@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, MotionRefused
+from texture_core.errors import CommandRefused, DeviceError, ExplorationError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, Phase, quaternion_matrix, rotation_matrix
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ros_controllers import (
@@ -484,6 +484,23 @@ def test_every_motion_succeeds_behind_a_late_controller(motion):
         'in_hand_random': {'duration_s': 1.0},
     }
     outcome, _ = robot.explore(ExplorationRequest(motion, **requests.get(motion, {'distance_m': 0.02})), TouchParams())
+    assert outcome.success, outcome.message
+
+
+@pytest.mark.parametrize(
+    ('off_m', 'where'), [(0.079, '0.179) m in the base frame, 79 mm above'), (-0.025, '25 mm below')]
+)
+def test_a_contact_far_from_the_declared_surface_is_refused_with_both_places_and_the_finger_lifted(off_m, where):
+    robot = Robot(TwistControllerParams(surface_z_m=0.1 + off_m))
+    robot.driven.connect()
+    outcome, _ = robot.explore(PRESS, TouchParams(), limits=replace(LIMITS, z_low_m=-0.05))
+    assert (outcome.error, outcome.slid, outcome.lifted) == (ExplorationError.NO_SURFACE, False, True)
+    assert where in outcome.message
+    assert "the surface declared at (0.4, 0, 0.1) m, and 20 mm are allowed ('surface_tolerance_m')" in outcome.message
+    assert max(robot.pressed_n) < PRESS.force_n
+    assert robot.arm.finger().force_n == 0.0
+    robot.driven.connect()
+    outcome, _ = robot.explore(PRESS, TouchParams(), limits=replace(LIMITS, z_low_m=-0.05, surface_tolerance_m=0.08))
     assert outcome.success, outcome.message
 
 

@@ -330,12 +330,27 @@ class Exploration:
             (ExplorationError.ARM_FAULT, arm.unsafe),
             (ExplorationError.FORCE_LIMIT, self._guard.violation(relative, self.state.phase)),
             (ExplorationError.FORCE_SENSOR, frozen),
+            (ExplorationError.NO_SURFACE, self._off_surface(arm)),
             (ExplorationError.WORKSPACE, workspace_violation if self._entered else ''),
             (ExplorationError.ARM_FAULT, self._arm.doubt()),
             (ExplorationError.NO_SIGNAL, self._signal_fault(self._listening)),
             (ExplorationError.TIMEOUT, self._overdue(now_ns)),
         )
         return next(((error, text) for error, text in reasons if text), None)
+
+    def _off_surface(self, arm: ArmState) -> str:
+        """Return in a sentence that the finger presses on something far from the declared surface, '' if not."""
+        height_m, most_m = arm.position[2], self._limits.surface_tolerance_m
+        if self.state.phase is not Phase.CONTACT or not self._arm.base_frame_id or abs(height_m) <= most_m:
+            return ''
+        pose = self._arm.surface_pose
+        x, y, z = SurfaceFrame(pose).place_to_base(arm.position)
+        return (
+            f'contact was at ({x:.3f}, {y:.3f}, {z:.3f}) m in the base frame, {1e3 * abs(height_m):.0f} mm '
+            f'{"above" if height_m > 0 else "below"} the surface declared at ({pose[0]:g}, {pose[1]:g}, {pose[2]:g}) '
+            f"m, and {1e3 * most_m:g} mm are allowed ('surface_tolerance_m'); correct its pose ('surface_z_m'), or "
+            'remove what the finger met'
+        )
 
     def _overdue(self, now_ns: int) -> str:
         """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
@@ -632,6 +647,17 @@ class Explorer:
         self._home = self._home or self.arm.state().position
         return self._home
 
+    def check_start(self) -> None:
+        """Return if explorations may begin where they would, so that nobody learns it from the first request.
+
+        Raises
+        ------
+        MotionRefused
+            If that place is outside the workspace, along which axes.
+        """
+        if self._home is not None:
+            self._check_inside(self._home)
+
     def release(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go; until `connect`, requests are refused.
 
@@ -883,12 +909,7 @@ class Explorer:
         self._check_idle()
         plan = find(MOTIONS, request.motion, 'motion')
         start = self.patch.start(request, self._ready(), self.limits)
-        # A motion that begins outside would never be seen to leave: a wrong pose of the surface shows here.
-        if outside := self.limits.outside(start):
-            raise MotionRefused(
-                f'the start of the motion lies outside the workspace: {outside}; bring the finger inside and take '
-                'control again, or correct the pose of the surface or the limits'
-            )
+        self._check_inside(start)
         motion = plan(request, start, self.touch, self.limits)
         if request.use_start:
             try:
@@ -907,6 +928,15 @@ class Explorer:
             on_state=self._on_state,
             signal_fault=self._signal_fault,
         )
+
+    def _check_inside(self, start: Vector) -> None:
+        """Refuse a motion that begins outside: it would never be seen to leave, as with a wrong pose of the surface."""
+        if outside := self.limits.outside(start):
+            self._home = None  # the next request begins where the finger is then, as it has to be moved
+            raise MotionRefused(
+                f'the start of the motion lies outside the workspace: {outside}; bring the finger inside and take '
+                'control again, or correct the pose of the surface or the limits'
+            )
 
     def _check_idle(self) -> None:
         if self._released:

@@ -24,7 +24,6 @@ from texture_exploration.stages import (
     ContactWatch,
     Follower,
     GoHomeStage,
-    Halt,
     LiftStage,
     Motion,
     PathFollower,
@@ -69,24 +68,16 @@ def plan_surface_slide(
     along = Along(follower, speed, force, touch, limits, ContactWatch(force, touch))
     slide = SlideStage(along)
 
-    def come_down() -> list[Stage]:
-        return [
-            ApproachStage(force, touch, limits),
-            SettleForceStage(force, touch, limits),
-            AccelerateStage(along),
-        ]
-
-    def seek() -> list[Stage]:
-        return [Halt(along), *come_down()]
-
     stages = [
         GoHomeStage(home, touch, limits),
-        *come_down(),
+        ApproachStage(force, touch, limits),
+        SettleForceStage(force, touch, limits),
+        AccelerateStage(along),
         slide,
         BrakeStage(along),
         LiftStage(home, force, touch, limits),
     ]
-    return Motion(stages, slide, seek if touch.seek_lost_contact else None)
+    return Motion(stages, slide)
 
 
 # --------------------

@@ -195,6 +195,14 @@ class SafetyLimits:
         low=-2.0,
         high=2.0,
     )
+    surface_tolerance_m: float = param(
+        0.02,
+        'Height above or below the declared surface beyond which a contact is none with it and aborts; an arm without '
+        'a base frame has no declared surface.',
+        unit='m',
+        low=0.001,
+        high=0.5,
+    )
     state_timeout_s: float = param(
         0.13,
         'Age of the newest arm state above which an exploration is aborted; a longer time notices a dead arm later.',
@@ -332,11 +340,12 @@ class SafetyLimits:
         return f'the finger left the workspace: {outside}' if outside else ''
 
     def outside(self, position: Vector) -> str:
-        """Return in words how a position in the surface frame, m, lies outside the workspace, or an empty text."""
-        for at, (axis, (low, high)) in zip(position, self.workspace.items(), strict=True):
-            if not low <= at <= high:
-                return f'{axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'
-        return ''
+        """Return in words along which axes a position in the surface frame, m, lies outside the workspace, or ''."""
+        return ' and '.join(
+            f'{axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'
+            for at, (axis, (low, high)) in zip(position, self.workspace.items(), strict=True)
+            if not low <= at <= high
+        )
 
 
 # --------------------

@@ -273,9 +273,6 @@ class TouchParams:
         low=0.02,
         high=5.0,
     )
-    seek_lost_contact: bool = param(
-        False, 'Stops where contact was lost, comes down again and goes on, up to 3 times; false aborts.'
-    )
     stall_speed_fraction: float = param(
         0.25,
         'Fraction of the commanded way below which a sliding finger counts as stalled; a larger fraction aborts '
@@ -423,10 +420,6 @@ class ContactWatch:
         """Whether the newest state was one with contact."""
         return self._lost_ns is None
 
-    def restart(self) -> None:
-        """The finger was brought to the surface again."""
-        self._lost_ns = None
-
     def update(self, arm: ArmState) -> None:
         """Take a state of the arm.
 
@@ -488,10 +481,6 @@ class StallWatch:
         self._ways: deque[tuple[int, float, float]] = deque()  # time, ns, and ways commanded and made so far, m
         self._velocity = (0.0, 0.0)  # commanded last
         self._place = (0.0, 0.0)
-
-    def restart(self) -> None:
-        """The finger moves from here on."""
-        self._ways.clear()
 
     def update(self, arm: ArmState, velocity_m_s: tuple[float, float]) -> None:
         """Take a state of the arm, and the velocity that is commanded from now on.
@@ -560,12 +549,6 @@ class SlideWatch:
         self._force_sum_n = self._tangential_sum_n = 0.0
         self._states = self._tangential_states = 0
         self._peaks = [0.0, 0.0, 0.0]  # normal force, speed, tangential force
-
-    def restart(self) -> None:
-        """The finger slides on from here; what was measured stays."""
-        self._recent.clear()
-        self._forces.clear()
-        self._chunk = None
 
     def update(self, arm: ArmState, constant: bool) -> bool:
         """Take a state; return whether what it shows is within what was asked for.
@@ -866,11 +849,6 @@ class Along(NamedTuple):
         """How long it takes to gain or lose the speed."""
         return self.touch.ramp_s(self.speed_m_s)
 
-    def slowing(self, time_s: float) -> tuple[float, float] | None:
-        """Return the velocity so long after the finger began to lose speed, None once it is at rest."""
-        share = time_s / self.ramp_s
-        return None if share >= 1.0 else self.follower.velocity(self.speed_m_s * smooth(1.0 - share))
-
 
 class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
@@ -879,11 +857,6 @@ class AccelerateStage(Stage):
         goal = f'the finger to slide at {along.speed_m_s:g} m/s with {along.force_n:g} N'
         super().__init__(Phase.CONTACT, along.ramp_s + along.limits.contact_timeout_s, goal)
         self._along = along
-
-    def begin(self, time_ns: int, arm: ArmState) -> None:
-        """The force has settled: the finger touches."""
-        super().begin(time_ns, arm)
-        self._along.contact.restart()
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp, then wait for the arm to follow."""
@@ -914,7 +887,7 @@ class SlideStage(Stage):
         self.along = along
         self._stall = StallWatch(along.touch)
         self._watch = SlideWatch(along.speed_m_s, along.force_n, along.touch)
-        self._start_m: float | None = None
+        self._start_m = 0.0
         self._steady_until_ns = 0
         self._finish = False
         self.progress = 0.0
@@ -925,13 +898,10 @@ class SlideStage(Stage):
         return self.along.follower.direction_rad
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
-        """The slide counts from here, also if it goes on later after the contact was lost."""
+        """The slide counts from here."""
         super().begin(time_ns, arm)
-        self._stall.restart()
-        self._watch.restart()
-        if self._start_m is None:
-            self._start_m = self.along.follower.travelled_m
-            self.along.follower.begin_slide()
+        self._start_m = self.along.follower.travelled_m
+        self.along.follower.begin_slide()
 
     def finish(self) -> None:
         """End as soon as the guaranteed time is over."""
@@ -964,7 +934,6 @@ class SlideStage(Stage):
         return ArmCommand(velocity, force_n=self.along.force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
-        assert self._start_m is not None
         age_s = max(0.0, (time_ns - arm.time_ns) * 1e-9)
         slid_m = self.along.follower.travelled_m - self._start_m + self.along.speed_m_s * age_s
         length_m = self.along.follower.length_m
@@ -994,11 +963,12 @@ class BrakeStage(Stage):
         """Follow the ramp down."""
         self._along.follower.update(time_ns, arm)
         touching = self._touches(arm)
-        velocity = self._along.slowing(self.elapsed_s(time_ns))
-        if velocity is None:
+        share = self.elapsed_s(time_ns) / self._along.ramp_s
+        if share >= 1.0:
             if not self._whole:
                 self._along.contact.refuse()
             return None
+        velocity = self._along.follower.velocity(self._along.speed_m_s * smooth(1.0 - share))
         return ArmCommand(velocity, force_n=self._along.force_n if touching else None)
 
     def _touches(self, arm: ArmState) -> bool:
@@ -1009,20 +979,6 @@ class BrakeStage(Stage):
         with suppress(ContactLost):
             self._along.contact.update(arm)
         return self._along.contact.touching
-
-
-class Halt(Stage):
-    """Lose speed along the path at a constant height, after the contact was lost."""
-
-    def __init__(self, along: Along) -> None:
-        super().__init__(Phase.APPROACH, along.limits.lift_timeout_s, 'the finger to come to rest')
-        self._along = along
-
-    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Follow the ramp down."""
-        self._along.follower.update(time_ns, arm)
-        velocity = self._along.slowing(self.elapsed_s(time_ns))
-        return None if velocity is None else ArmCommand(velocity)
 
 
 class LiftStage(Stage):
@@ -1312,8 +1268,6 @@ AHEAD = (Rise, CalmDown, GoBack)  # the stages of a motion that lifts first
 # --------------------
 # A motion made of stages, one after the other, that can be aborted in any of them or finished early.
 
-SEEKS = 3  # a surface that is lost more often is not one to slide on
-
 
 class Motion:
     """One planned exploration: go through the stages; on any error go to the last one, which lifts the finger.
@@ -1326,9 +1280,6 @@ class Motion:
         In their order; the last one lifts.
     slide
         The one among them that slides.
-    seek
-        Returns new stages that bring the finger back to the surface and to its speed after the contact was lost while
-        it moved along; without it a lost contact aborts.
 
     Attributes
     ----------
@@ -1336,14 +1287,10 @@ class Motion:
         Why the motion itself aborted; NONE if it did not, or was told to.
     """
 
-    def __init__(
-        self, stages: Sequence[Stage], slide: SlideStage, seek: Callable[[], Sequence[Stage]] | None = None
-    ) -> None:
+    def __init__(self, stages: Sequence[Stage], slide: SlideStage) -> None:
         self._remaining_stages = list(stages)
         self._lift = stages[-1]
         self._slide = slide
-        self._seek = seek
-        self._seeks = 0
         self._stage: Stage | None = None
         self._phase = Phase.IDLE
         self._abort_reason = ''
@@ -1451,9 +1398,7 @@ class Motion:
                 self._free_ahead = stage.free
 
     def _give_way(self, stage: Stage, error: MotionAborted) -> None:
-        """Go on in the way that is left: back, further up, to the surface, by the lift, or stay where the finger is."""
-        if self._sought(error, stage):
-            return
+        """Go on in the way that is left: back, further up, by the lift, or stay where the finger is."""
         reason, self.error = str(error), self.error or error.error
         if stage is self._lift:
             before = f'{self._abort_reason}; ' if self._abort_reason else ''
@@ -1472,17 +1417,6 @@ class Motion:
         self._abort_reason = self._abort_reason or reason
         self._ended_ahead = True
         self._stage, self._remaining_stages = None, [*stages]
-
-    def _sought(self, error: MotionAborted, stage: Stage) -> bool:
-        """Put the stages ahead that bring a lost contact back; return whether there are any."""
-        if self._seek is None or self._seeks >= SEEKS or not isinstance(error, ContactLost):
-            return False
-        if stage.phase is Phase.LIFT:  # the slide is over
-            return False
-        self._seeks += 1
-        again = [stage] if stage is self._slide else []
-        self._stage, self._remaining_stages = None, [*self._seek(), *again, *self._remaining_stages]
-        return True
 
 
 # Plans a motion from a request, whose numbers of 0 take the default; the place where the slide begins and to which

@@ -248,12 +248,12 @@ class ExplorerNode(PatientLifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take control of the arm; at the start of the node an arm that is not there yet is waited for."""
-        if self._tried(self._explorer.connect):
-            if not self._lift_at_start:
-                self.get_logger().info(NOT_KNOWN)
-            else:
-                self._tried(self._explorer.lift)
-        elif not self._autostart:
+        connected = self._tried(self._explorer.connect)
+        if connected and self._lift_at_start:
+            self._tried(self._explorer.lift)
+        elif connected:
+            self.get_logger().info(NOT_KNOWN)
+        if not (connected and self._tried(self._explorer.check_start)) and not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
