@@ -13,12 +13,15 @@ from texture_bringup.launcher import find_launch_file, read
 from texture_core import config as resources
 from texture_core.config import parameters_of
 from texture_core.errors import InvalidLaunch, UnknownName
+from texture_exploration.arms.arm import SurfacePoseParams
 from texture_exploration.arms.in_hand import InHandParams
 from texture_exploration.arms.rails import RailsParams
 from texture_exploration.arms.ros_controllers import RosControllersParams
 from texture_exploration.arms.ur import UrArmParams
 from texture_exploration.safety import SafetyLimits, SignalWatchParams
 from texture_exploration.stages import TouchParams
+from texture_simulation.devices.twist_controller import TwistControllerParams
+from texture_simulation.devices.ur import UrControllerParams
 from texture_simulation.emulator import EmulatorParams
 from texture_simulation.nodes.leap_hand import LeapHandParams
 from texture_simulation.nodes.rails import RailsLinkParams
@@ -84,6 +87,19 @@ def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
     nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
     explorer = next(node for node in nodes if node.executable == 'explorer')
     assert explorer.parameters[-1] == file
+
+
+@pytest.mark.parametrize(
+    ('robot', 'node', 'params', 'pose'),
+    [('ur', 'ur_controller', UrControllerParams, 3), ('ros_controllers', 'twist_controller', TwistControllerParams, 6)],
+)
+def test_the_emulated_surface_lies_where_the_file_of_the_explorer_says(robot, node, params, pose, tmp_path):
+    file = tmp_path / 'my_robot.yaml'
+    file.touch()
+    nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
+    assert file in next(one for one in nodes if one.executable == node).parameters
+    declared = {item.name for item in parameters_of(SurfacePoseParams)}
+    assert len(declared & {item.name for item in parameters_of(params)}) == pose
 
 
 def given_to(node):

@@ -26,11 +26,9 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 # tests of texture_exploration; here each motion goes through all nodes once.
 OTHER = {'ur': CIRCULAR, 'hand': IN_HAND}
 ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75, 'ros_controllers': 95}  # and the domain of its nodes
-# The emulated surface lies where the file of the explorer says, so that it can be rehearsed.
-SURFACE_POSE = {'surface_x_m': 0.412, 'surface_y_m': -0.135, 'surface_z_m': 0.021}
 PATIENCE = {  # of the arm itself; the explorer would warn of a parameter that its arm has not
-    'ur': {**SURFACE_POSE, 'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
-    'ros_controllers': {**SURFACE_POSE, 'surface_rz_rad': 0.5, 'deadman_s': 1.5, 'connect_timeout_s': 30.0},
+    'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
+    'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
 }
 # Not the default of 1 N for arms whose approach is the slower the less force is wanted, as they may not be heard yet.
 FORCES = {robot: ['--force', '5'] for robot in ('ur', 'ros_controllers')}
