@@ -106,7 +106,7 @@ def test_a_cluster_that_lacks_the_suite_or_workers_is_refused_at_once_with_what_
 
 
 @pytest.mark.realtime
-def test_two_workers_that_read_the_bags_themselves_give_the_figures_of_one_process(bags: Path, tmp_path: Path) -> None:
+def test_two_workers_of_a_cluster_give_the_figures_of_one_process(bags: Path, tmp_path: Path) -> None:
     files = [tmp_path / name for name in ('one.json', 'cluster.json')]
     arguments = ['cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json']
     assert main([*arguments, str(files[0])]) == 0

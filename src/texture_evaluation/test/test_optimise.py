@@ -11,7 +11,7 @@ from texture_estimation.recipe import load_recipe
 from texture_estimation.search import SearchParams
 from texture_evaluation import optimise
 from texture_evaluation.evaluate import evaluate
-from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
+from texture_evaluation.optimise import checkpoint_of, optimise_from_bags
 from texture_evaluation.train import train_from_bags
 
 SMALL = SearchParams(population=5, generations=2, halves=3)
@@ -21,7 +21,8 @@ def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: 
     out = tmp_path / 'best.yaml'
     said: list[int] = []
     files, _lines = optimise_from_bags(
-        Wanted('ets-linear-svm', (str(simulated),)),
+        'ets-linear-svm',
+        [simulated],
         SMALL,
         out,
         tell=lambda _, generation: said.append(generation.number),
@@ -44,7 +45,7 @@ def test_the_same_seed_writes_the_same_recipe_and_resuming_evaluates_nothing_aga
     for name, resume in (('a', False), ('b', False), ('a', True)):
         out = tmp_path / f'{name}.yaml'
         optimise_from_bags(
-            Wanted('ets-linear-svm', (str(simulated),)), SMALL, out,
+            'ets-linear-svm', [simulated], SMALL, out,
             resume=resume, tell=lambda _, generation: evaluated.append(generation.evaluated),
         )  # fmt: skip
         texts.append(out.read_text())
@@ -53,8 +54,7 @@ def test_the_same_seed_writes_the_same_recipe_and_resuming_evaluates_nothing_aga
 
 
 def test_the_variables_of_all_pairs_are_trained_as_one_model(simulated: Path, tmp_path: Path) -> None:
-    wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
-    optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
+    optimise_from_bags('ets-linear-svm', [simulated], SMALL, tmp_path / 'best.yaml', per_pair=True)
     model = load_model(train_from_bags(str(tmp_path / 'best.yaml'), [simulated]).save(tmp_path / 'model'))
     assert model.recipe.learner_name == 'texture_papers.roberge:TunedPairs'
     assert '3 of 3 pairs have variables of their own' in model.training['calibration']
@@ -68,8 +68,7 @@ def test_pairs_that_cannot_be_joined_are_written_alone_and_it_is_said_why(
         raise InvalidParameter("the pairs differ in 'windows'")
 
     monkeypatch.setattr(optimise, 'joined_recipe', refuse)
-    wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
-    _files, lines = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
+    _files, lines = optimise_from_bags('ets-linear-svm', [simulated], SMALL, tmp_path / 'best.yaml', per_pair=True)
     assert not (tmp_path / 'best.yaml').exists()
     assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
     assert lines[-1] == "no recipe of all pairs was written: the pairs differ in 'windows'"
@@ -78,21 +77,20 @@ def test_pairs_that_cannot_be_joined_are_written_alone_and_it_is_said_why(
 def test_grades_are_tuned_by_a_roughness_recipe(simulated: Path, tmp_path: Path) -> None:
     table = tmp_path / 'grades.csv'
     table.write_text('texture,grade\nglass,1\nleather,3\nridge_2mm_deep,5\n')
-    wanted = Wanted('ets-roughness-svm5', (str(simulated),), grades=str(table))
-    files, _lines = optimise_from_bags(wanted, SMALL, tmp_path / 'rough.yaml')
+    out = tmp_path / 'rough.yaml'
+    files, _lines = optimise_from_bags('ets-roughness-svm5', [simulated], SMALL, out, grades=str(table))
     assert 'Svm5' in files[0].read_text()
 
 
 @pytest.mark.parametrize(
-    ('change', 'options', 'sentence'),
+    ('recipe', 'options', 'sentence'),
     [
-        ({'recipe': 'hu-pca-svm'}, {}, 'has no search space of its own'),
-        ({'search': 'ets-svn'}, {}, "did you mean 'ets-svm'"),
-        ({}, {'resume': True}, 'there is no checkpoint'),
+        ('hu-pca-svm', {}, 'has no search space of its own'),
+        ('ets-linear-svm', {'search_space': 'ets-svn'}, "did you mean 'ets-svm'"),
+        ('ets-linear-svm', {'resume': True}, 'there is no checkpoint'),
     ],
 )
-def test_mistakes_are_named(change, options, sentence, simulated: Path, tmp_path: Path) -> None:
-    wanted = Wanted(**{'recipe': 'ets-linear-svm', 'bags': (str(simulated),), **change})
+def test_mistakes_are_named(recipe, options, sentence, simulated: Path, tmp_path: Path) -> None:
     with pytest.raises(TextureError, match=sentence):
-        optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml', **options)
+        optimise_from_bags(recipe, [simulated], SMALL, tmp_path / 'best.yaml', **options)
     assert not np.any([path.exists() for path in (tmp_path / 'best.yaml', checkpoint_of(tmp_path / 'best.yaml'))])

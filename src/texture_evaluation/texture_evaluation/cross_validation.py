@@ -5,24 +5,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from joblib import Parallel, delayed
-from joblib import hash as hash_of
+from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
 
-from texture_core.config import unknown_name
+from texture_core.config import library, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
+from texture_estimation.search import single_blas_thread
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
@@ -30,6 +31,78 @@ from texture_evaluation.metrics import SlideResult, curve
 from texture_evaluation.train import training_examples
 from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import CONDITIONS, SlideDataset
+
+# --------------------
+# Spread work over the cores of this machine, or over a Dask cluster.
+
+ANSWER_S, WORKERS_S = 4, 4  # for a scheduler to answer, and for its first worker to come
+# What scheduler and workers must have as this process has it: both unpack what is computed, and a scheduler that cannot
+# says so in its own log alone, while everybody waits.
+ON_CLUSTER = ('texture_core', 'texture_features', 'texture_estimation', 'texture_recordings', 'texture_evaluation')
+CLUSTER_ADVICE = (
+    'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
+    'suite'
+)
+
+
+@contextmanager
+def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
+    """Have joblib use so many cores (-1: all) within a `with` block, or the cluster whose address is given.
+
+    Threads, not processes: what takes the time (libsvm, products of arrays) lets go of Python's lock, and nothing is
+    copied.
+    """
+    spread = dask_backend(dask) if dask else parallel_config(backend='threading', n_jobs=jobs)
+    with single_blas_thread(), spread:
+        yield
+
+
+@contextmanager
+def dask_backend(address: str) -> Iterator[None]:
+    """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block.
+
+    Parameters
+    ----------
+    address
+        Address of its scheduler, such as 'tcp://192.168.1.5:8786'.
+
+    Raises
+    ------
+    InvalidParameter
+        If no scheduler answers there, it has no worker, or one of them lacks the suite or has another version.
+    """
+    cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
+
+    try:
+        client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        raise InvalidParameter(
+            f"no Dask scheduler answers at '{address}' ({reason}); {CLUSTER_ADVICE}, "
+            "or leave '--dask' out to use this machine's cores"
+        ) from error
+    with client:
+        _check_cluster(client, address)
+        with client.as_current(), parallel_config(backend='dask'):
+            yield
+
+
+def _check_cluster(client: Any, address: str) -> None:
+    """Raise InvalidParameter if a cluster has no worker, or not everywhere what this process has."""
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_S)
+    except TimeoutError as error:
+        raise InvalidParameter(f"the Dask scheduler at '{address}' has no worker; {CLUSTER_ADVICE}") from error
+    versions = client.get_versions(packages=ON_CLUSTER)
+    own = versions['client']['packages']
+    places = {f"the Dask scheduler at '{address}'": versions['scheduler']}
+    places |= {f"the Dask worker '{worker}'": found for worker, found in versions['workers'].items()}
+    for place, found in places.items():
+        for name in ON_CLUSTER:
+            has = found['packages'].get(name)
+            if own[name] and has != own[name]:
+                raise InvalidParameter(f'{place} has {has or "no"} {name}, {own[name]} is needed; {CLUSTER_ADVICE}')
+
 
 # --------------------
 # Shares of windows and slides that are right, with 95 % intervals by bootstrap over slides; exact at 0 and 100 %.
@@ -698,31 +771,6 @@ def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
 # Cross-validate a recipe on labelled slides: the one loop of training and testing.
 
 
-@dataclass(frozen=True, eq=False)
-class FoldFeatures:
-    """Features of all slides, computed once for all folds, and for all recipes of the same windows and features.
-
-    Parameters
-    ----------
-    trained
-        Windows as the recipe is trained on, with its augmentation.
-    tested
-        Windows as the recipe classifies them.
-    """
-
-    trained: LabelledFeatures
-    tested: LabelledFeatures
-
-    @classmethod
-    def of(cls, recipe: Recipe, dataset: SlideDataset) -> FoldFeatures:
-        """Return the features of a recipe; raise InvalidData if no slide has a window."""
-        tested = dataset.features(recipe.feature_set)
-        further = recipe.augmentation.copies or recipe.training.touch_s or recipe.training.slowest_m_s
-        if recipe.training_windows == recipe.feature_set.windows and not further:
-            return cls(tested, tested)
-        return cls(training_examples(recipe, dataset), tested)
-
-
 def cross_validate(
     recipe: Recipe,
     dataset: SlideDataset,
@@ -730,8 +778,6 @@ def cross_validate(
     n_jobs: int | None = None,
     *,
     groups: str | AnyArray = 'slide',
-    features: FoldFeatures | None = None,
-    source: Callable[[], SlideDataset] | None = None,
 ) -> CrossValidation:
     """Train a recipe on some slides and test it on others, for each split of the slides.
 
@@ -752,11 +798,6 @@ def cross_validate(
         `joblib.parallel_config` says, such as the workers of a Dask cluster.
     groups
         What must not be on both sides: 'slide', a condition of the data set, such as 'speed', or an array (n_slides,).
-    features
-        Those of the recipe, if they were computed already.
-    source
-        Reads the same slides, such as a `functools.partial` of `SlideDataset.from_bags` with paths that all computers
-        share. Each worker process then computes the features itself, once, instead of being sent them with each fold.
 
     Returns
     -------
@@ -785,38 +826,22 @@ def cross_validate(
         (names[train_rows], names[test_rows], _fold_name(number, columns, test_rows))
         for number, (train_rows, test_rows) in enumerate(splits, 1)
     ]
-    if source is None:
-        features = features or FoldFeatures.of(recipe, dataset)
-        tasks = [
-            delayed(_fold)(recipe, features.trained.of_slides(train), features.tested.of_slides(test), train, name)
-            for train, test, name in named
-        ]
-    else:
-        key = str(hash_of((source, recipe)))
-        tasks = [delayed(_fold_there)(key, source, recipe, one) for one in named]
-    folds, usable = zip(*Parallel(n_jobs=n_jobs)(tasks), strict=True)
-    found = set().union(*usable) if features is None else set(features.tested.groups.tolist())
+    # Computed once for all folds: windows as the recipe classifies them, and as it is trained on.
+    tested = trained = dataset.features(recipe.feature_set)
+    further = recipe.augmentation.copies or recipe.training.touch_s or recipe.training.slowest_m_s
+    if recipe.training_windows != recipe.feature_set.windows or further:
+        trained = training_examples(recipe, dataset)
+    folds = Parallel(n_jobs=n_jobs)(
+        delayed(_fold)(recipe, trained.of_slides(train), tested.of_slides(test), train, name)
+        for train, test, name in named
+    )
+    usable = set(tested.groups.tolist())
     return CrossValidation(
         recipe.name,
         tuple(np.unique(dataset.labels).tolist()),
-        folds,
-        tuple(name for name in names.tolist() if name not in found),
+        tuple(folds),
+        tuple(name for name in names.tolist() if name not in usable),
     )
-
-
-_KEPT: dict[str, FoldFeatures] = {}  # in a worker: of the slides and the recipe that were computed last
-
-
-def _fold_there(
-    key: str, source: Callable[[], SlideDataset], recipe: Recipe, fold: tuple[AnyArray, AnyArray, str]
-) -> tuple[FoldResult, set[str]]:
-    """Return a fold, computed where the slides are read, and the names of all slides that have windows."""
-    features = _KEPT.get(key) or FoldFeatures.of(recipe, source())
-    _KEPT.clear()  # those of one recipe alone: they bound the memory of a worker
-    _KEPT[key] = features
-    train, test, name = fold
-    result, _ = _fold(recipe, features.trained.of_slides(train), features.tested.of_slides(test), train, name)
-    return result, set(features.tested.groups.tolist())
 
 
 def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str, SlideResult]:
@@ -842,13 +867,12 @@ def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> st
 
 def _fold(
     recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: AnyArray, name: str
-) -> tuple[FoldResult, set[str]]:
-    """Return what a fold gave, and the names of its test slides that have windows."""
+) -> FoldResult:
+    """Return what a fold gave."""
     start = time.process_time()  # not the wall clock: other folds share the machine
     try:
         model = train(recipe, trained)
     except InvalidData as error:
         raise InvalidData(f"fold '{name}' cannot be trained: {error}; {SPLIT_ADVICE}") from error
     taken_s = time.process_time() - start
-    names = tuple(trained_on.tolist())
-    return FoldResult(name, names, predict_slides(model, tested), model, taken_s), set(tested.groups.tolist())
+    return FoldResult(name, tuple(trained_on.tolist()), predict_slides(model, tested), model, taken_s)

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 from itertools import combinations, cycle
 from pathlib import Path
 from typing import Any
@@ -33,17 +33,8 @@ LEARNER = 'texture_papers.roberge:TunedPairs'
 SHARED = ('windows', 'evidence', 'training')
 
 
-@dataclass(frozen=True, eq=False)
-class PairSearchResult:
-    """The search of each pair; learning and test accuracy of the most pairs won, over all surfaces, on each half."""
-
-    by_pair: Mapping[Pair, search.SearchResult]
-    scores: tuple[search.HalfScore, ...]
-
-    @property
-    def fitness(self) -> float:
-        """Mean of learning and test accuracy of all pairs together."""
-        return search.fitness(self.scores)
+# The search of each pair, by its two surfaces; of all surfaces at once, by none.
+Found = Mapping[tuple[str, ...], search.SearchResult]
 
 
 def optimise_pairs(
@@ -54,15 +45,23 @@ def optimise_pairs(
     checkpoint: str | Path | None = None,
     resume: str | Path | None = None,
     tell: Callable[[Pair, search.Generation], None] = lambda *_: None,
-) -> PairSearchResult:
+) -> tuple[Found, tuple[search.HalfScore, ...]]:
     """Search for each pair of surfaces by itself, then evaluate all pairs together.
 
     Arguments are those of `optimise`; each pair has its own checkpoint, named after it.
 
+    Returns
+    -------
+    Found
+        The search of each pair.
+    tuple of HalfScore
+        Learning and test accuracy of the most pairs won, over all surfaces, on each half.
+
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
     to each pair of textures.
     """
-    task, found = search.ClassificationTask(), {}
+    task = search.ClassificationTask()
+    found: dict[tuple[str, ...], search.SearchResult] = {}
     names = slides.split(space.base.training_windows)[0].names
     for pair in combinations(names, 2):
         reached = beside(resume, pair) if resume else None
@@ -81,44 +80,39 @@ def optimise_pairs(
         pair: search.trials_of(search.RecipeSpace(result.best.recipe, {}), slides, task, [()])[0]
         for pair, result in found.items()
     }
-    together = Parallel()(delayed(search.scored_alone)(_MostPairsWon(best), number) for number in range(params.halves))
-    return PairSearchResult(found, tuple(together))
+    most_pairs_won = partial(_most_pairs_won, best)
+    together = Parallel()(delayed(search.scored_alone)(most_pairs_won, number) for number in range(params.halves))
+    return found, tuple(together)
 
 
-def beside(path: str | Path, pair: Pair) -> Path:
+def beside(path: str | Path, pair: Sequence[str]) -> Path:
     """Return the path with the pair's name in it: 'best.yaml' → 'best-cork-vs-measured.yaml'."""
     path = Path(path)
     return path.with_name(f'{path.stem}-{pair[0]}-vs-{pair[1]}{path.suffix}')
 
 
-@dataclass(frozen=True, eq=False)
-class _MostPairsWon:
-    """The recipes of all pairs on the slides of all surfaces."""
-
-    trials: Mapping[Pair, search.Trial]
-
-    def __call__(self, number: int) -> search.HalfScore:
-        """Return learning and test accuracy of the surface that wins most pairs."""
-        wins: Array | None = None
-        for pair, trial in self.trials.items():
-            windows, halves = trial.recipe.training_windows, trial.halves[number]
-            two = np.array([trial.names.index(name) for name in pair])
-            training = halves & np.isin(trial.codes, two)
-            of_pair = (trial.codes[training] == two[1]).astype(np.intp)
-            learner = trial.recipe.learner
-            fitted = learner.fit(trial.values[training], of_pair, trial.slides[training])
-            scores = learner.predictor(fitted.parameters)(trial.values)
-            hop_share = windows.hop_s / windows.length_s
-            decided, first = search.decided_by_slide(scores, trial.slides, trial.recipe.evidence, hop_share)
-            codes, known = trial.codes[first], halves[first]
-            wins = np.zeros((len(codes), len(trial.names))) if wins is None else wins
-            rows = np.flatnonzero(decided != search.UNDECIDED)
-            wins[rows, two[decided[rows]]] += 1.0
-        assert wins is not None
-        return search.shares_right(search.decisions(wins), codes, known)
+def _most_pairs_won(trials: Mapping[tuple[str, ...], search.Trial], number: int) -> search.HalfScore:
+    """Return learning and test accuracy of the surface that wins most pairs, on a half of the slides of all."""
+    wins: Array | None = None
+    for pair, trial in trials.items():
+        windows, halves = trial.recipe.training_windows, trial.halves[number]
+        two = np.array([trial.names.index(name) for name in pair])
+        training = halves & np.isin(trial.codes, two)
+        of_pair = (trial.codes[training] == two[1]).astype(np.intp)
+        learner = trial.recipe.learner
+        fitted = learner.fit(trial.values[training], of_pair, trial.slides[training])
+        scores = learner.predictor(fitted.parameters)(trial.values)
+        hop_share = windows.hop_s / windows.length_s
+        decided, first = search.decided_by_slide(scores, trial.slides, trial.recipe.evidence, hop_share)
+        codes, known = trial.codes[first], halves[first]
+        wins = np.zeros((len(codes), len(trial.names))) if wins is None else wins
+        rows = np.flatnonzero(decided != search.UNDECIDED)
+        wins[rows, two[decided[rows]]] += 1.0
+    assert wins is not None
+    return search.shares_right(search.decisions(wins), codes, known)
 
 
-def joined_recipe(recipes: Mapping[Pair, Recipe], base: Recipe) -> Recipe:
+def joined_recipe(recipes: Mapping[tuple[str, ...], Recipe], base: Recipe) -> Recipe:
     """Return the recipe of one model in which each pair of textures has the features and the learner of its own recipe.
 
     Each input of a pair's recipe becomes an input of the joined one, named 'signal#1' and so on; pairs with the same
@@ -208,38 +202,6 @@ def convergence_chart(searches: Mapping[str, Sequence[search.Generation]], title
 Tell = Callable[[str, search.Generation], None]
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What is tuned, and on which slides.
-
-    Parameters
-    ----------
-    recipe
-        Name of a shipped recipe, or path of any; of a roughness recipe if there are `grades`.
-    bags
-        Bags, or folders of bags.
-    search
-        Name or path of the search space; '' for that of the recipe or its learner.
-    slides
-        Which slides of each surface, such as '1-30'; '' for all.
-    grades
-        CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
-    per_pair
-        Tune the variables of each pair of surfaces by themselves; one recipe joins them.
-    """
-
-    recipe: str
-    bags: tuple[str, ...]
-    search: str = ''
-    slides: str = ''
-    grades: str = ''
-    per_pair: bool = False
-
-    def __post_init__(self) -> None:
-        if self.grades and self.per_pair:
-            raise InvalidParameter('grades are not decided pair by pair; leave --per-pair or --grades out')
-
-
 def _named_windows(dataset: SlideDataset, plan: FeatureSet) -> Iterator[CutWindow]:
     """Yield the windows by names of slides: unlike ids of explorations, these are unique over all bags."""
     for slide, events in dataset.windows(plan):
@@ -258,10 +220,15 @@ def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> search.Cut:
 
 
 def optimise_from_bags(
-    wanted: Wanted,
+    recipe: str,
+    bags: Sequence[str | Path],
     params: search.SearchParams,
     out: str | Path,
     *,
+    search_space: str = '',
+    slides: str = '',
+    grades: str = '',
+    per_pair: bool = False,
     resume: bool = False,
     tell: Tell = lambda *_: None,
 ) -> tuple[tuple[Path, ...], tuple[str, ...]]:
@@ -269,12 +236,22 @@ def optimise_from_bags(
 
     Parameters
     ----------
-    wanted
-        Recipe and slides.
+    recipe
+        Name of a shipped recipe, or path of any; of a roughness recipe if there are `grades`.
+    bags
+        Bags, or folders of bags.
     params
         Population, generations and so on.
     out
         Path of the recipe that is written, such as 'best.yaml'.
+    search_space
+        Name or path of the search space; '' for that of the recipe or its learner.
+    slides
+        Which slides of each surface, such as '1-30'; '' for all.
+    grades
+        CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
+    per_pair
+        Tune the variables of each pair of surfaces by themselves; one recipe joins them.
     resume
         Go on from the checkpoint beside `out`.
     tell
@@ -299,51 +276,42 @@ def optimise_from_bags(
     target = Path(out).expanduser()
     if not target.parent.is_dir():
         raise InvalidParameter(f"there is no folder '{target.parent}' for '{target.name}'; name another place")
-    space = _space(wanted)
-    feature_set = space.base.feature_set
-    dataset = SlideDataset.from_bags(wanted.bags, wanted.slides, topics=feature_set.topics)
+    if grades and per_pair:
+        raise InvalidParameter('grades are not decided pair by pair; leave --per-pair or --grades out')
+    base = load_roughness_recipe(recipe) if grades else load_recipe(recipe)
+    feature_set = base.feature_set
+    space = search.RecipeSpace.load(search_space or _space_of(base, per_pair=per_pair), base)
+    dataset = SlideDataset.from_bags(bags, slides, topics=feature_set.topics)
     search_slides = search.SearchSlides(cut_of(dataset, feature_set), params.halves, params.seed)
     checkpoint = checkpoint_of(target)
     if resume and not written_checkpoints(target):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
-    found: search.SearchResult | PairSearchResult
-    if wanted.per_pair:
-        found = optimise_pairs(
+    found: Found
+    if per_pair:
+        found, together = optimise_pairs(
             space, search_slides, params, tell=lambda pair, said: tell(' – '.join(pair), said), **options
         )
     else:
-        task = search.RoughnessTask(read_grades(wanted.grades)) if wanted.grades else search.ClassificationTask()
-        found = search.optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
-    files, lines = write_recipes(found, space.base, wanted.recipe, params, target)
-    return (*files, _draw(found, wanted.recipe, target.with_suffix('.png'))), lines
+        task = search.RoughnessTask(read_grades(grades)) if grades else search.ClassificationTask()
+        found = {(): search.optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)}
+        together = ()
+    files, lines = write_recipes(found, together, base, params, target)
+    histories = {' – '.join(pair) or recipe: one.history for pair, one in found.items()}
+    title = f'{recipe}: a search for each pair' if per_pair else f'{recipe}: the search'
+    return (*files, convergence_chart(histories, title, target.with_suffix('.png'))), lines
 
 
-def _draw(found: search.SearchResult | PairSearchResult, recipe: str, chart: Path) -> Path:
-    if isinstance(found, PairSearchResult):
-        histories = {' – '.join(pair): one.history for pair, one in found.by_pair.items()}
-        return convergence_chart(histories, f'{recipe}: a search for each pair', chart)
-    return convergence_chart({recipe: found.history}, f'{recipe}: the search', chart)
-
-
-def _space(wanted: Wanted) -> search.RecipeSpace:
-    recipe: Recipe | RoughnessRecipe
-    if wanted.grades:
-        recipe = load_roughness_recipe(wanted.recipe)
-        learner = recipe.regressor_name
-    else:
-        recipe = load_recipe(wanted.recipe)
-        learner = recipe.learner_name
-    of_pairs = search.space_for('pairs_of', recipe.name) if wanted.per_pair else None
-    name = (
-        wanted.search or of_pairs or search.space_for('recipes', recipe.name) or search.space_for('learners', learner)
-    )
+def _space_of(recipe: Recipe | RoughnessRecipe, *, per_pair: bool) -> str:
+    learner = recipe.learner_name if isinstance(recipe, Recipe) else recipe.regressor_name
+    of_pairs = search.space_for('pairs_of', recipe.name) if per_pair else None
+    name = of_pairs or search.space_for('recipes', recipe.name) or search.space_for('learners', learner)
     if not name:
         raise InvalidParameter(
             f"recipe '{recipe.name}' has no search space of its own, nor has '{learner}'; "
             'say with --search FILE what is to be varied'
         )
-    return search.RecipeSpace.load(name, recipe)
+    return name
 
 
 # --------------------
@@ -363,7 +331,7 @@ def written_checkpoints(out: str | Path) -> list[Path]:
 
 
 def write_recipes(
-    found: search.SearchResult | PairSearchResult, base: Any, tuned: str, params: search.SearchParams, target: Path
+    found: Found, together: Sequence[search.HalfScore], base: Any, params: search.SearchParams, target: Path
 ) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Write the best recipe; of pairs, theirs and the one that joins them.
 
@@ -373,10 +341,10 @@ def write_recipes(
     ----------
     found
         What was found.
+    together
+        Scores of all pairs together; () of a search that is not by pairs.
     base
         Recipe from which the search began.
-    tuned
-        How it was named.
     params
         Parameters of the search.
     target
@@ -395,26 +363,22 @@ def write_recipes(
         If a file cannot be written.
     """
     origin = (
-        f'Found by `texture optimise {tuned}`: {params.population} individuals, {params.generations} '
+        f'Found by `texture optimise {base.name}`: {params.population} individuals, {params.generations} '
         f'generations, {params.halves} halves, seed {params.seed}.'
     )
-    files = (
-        {beside(target, pair): one.best for pair, one in found.by_pair.items()}
-        if isinstance(found, PairSearchResult)
-        else {target: found.best}
-    )
+    files = {beside(target, pair) if pair else target: one.best for pair, one in found.items()}
     for path, finalist in files.items():
         _write(finalist.recipe, path, origin, _scores(finalist))
     lines = tuple(f'{path}: {_scores(finalist)}' for path, finalist in files.items())
-    if not isinstance(found, PairSearchResult):
+    if not together:
         return (*files, checkpoint_of(target)), lines
-    together = f'all pairs together, most pairs won: {_shares(found.scores)}'
+    shares = f'all pairs together, most pairs won: {_shares(together)}'
     try:
-        joined = joined_recipe({pair: one.best.recipe for pair, one in found.by_pair.items()}, base)
+        joined = joined_recipe({pair: one.best.recipe for pair, one in found.items()}, base)
     except InvalidParameter as error:
-        return tuple(files), (*lines, together, f'no recipe of all pairs was written: {error}')
-    _write(joined, target, origin, together)
-    return (target, *files), (*lines, f'{target}: {together}')
+        return tuple(files), (*lines, shares, f'no recipe of all pairs was written: {error}')
+    _write(joined, target, origin, shares)
+    return (target, *files), (*lines, f'{target}: {shares}')
 
 
 def _write(recipe: Any, path: Path, origin: str, scores: str) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.config import writing
+from texture_core.config import write_json, writing
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import AnyArray, Array
 from texture_estimation.roughness import ROUGH, SMOOTH, checked_grade, read_rows
@@ -200,76 +199,51 @@ TEXTURES_PER_GRADE = (4, 6)  # of the paper's 25; other numbers of textures in p
 PAPERS_TEXTURES = 25
 
 
-@dataclass(frozen=True, eq=False)
-class PanelReport:
-    """What a panel says, and how far it can be believed.
+def agreement(grades: Array) -> dict[str, float]:
+    """Return how far people agree whose grades are (n_raters, n_textures): the figures of the report; NaN if unknown.
 
-    Parameters
-    ----------
-    ratings
-        What was examined.
-    alpha
-        Krippendorff's alpha for intervals: 1 is full agreement, 0 that of chance.
-    icc_single, icc_mean
-        Intraclass correlation of one person, and of the mean of all, over the textures that everybody graded.
-    error, correlation
-        One person against the mean of the others, in the mean over the people: absolute difference in grades, and
-        Pearson's r. An estimate closer to the panel than this error is as consistent as a person.
-    violations
-        Where the protocol was not kept, in sentences.
+    Krippendorff's alpha is 1 for full agreement, 0 for that of chance. The intraclass correlations are of one person,
+    and of the mean of all, over the textures that everybody graded. One person is compared with the mean of the others:
+    an estimate closer to the panel than this error is as consistent as a person.
     """
-
-    ratings: Ratings
-    alpha: float
-    icc_single: float
-    icc_mean: float
-    error: float
-    correlation: float
-    violations: tuple[str, ...]
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the figures; null for what cannot be said."""
-        ratings = self.ratings
-        figures = {
-            'krippendorff_alpha': self.alpha,
-            'icc_single': self.icc_single,
-            'icc_mean': self.icc_mean,
-            'one_against_rest_error': self.error,
-            'one_against_rest_r': self.correlation,
-        }
-        rows = zip(ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True)
-        return {
-            'raters': len(ratings.raters),
-            'textures': {
-                name: {'mean': float(mean), 'std': _or_none(float(std)), 'votes': votes.tolist()}
-                for name, mean, std, votes in rows
-            },
-            **{name: _or_none(value) for name, value in figures.items()},
-            'protocol_violations': list(self.violations),
-            'note': ratings.note,
-        }
-
-    def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write panel.json, and grades.csv that training takes; InvalidParameter if one cannot be written."""
-        ratings = self.ratings
-        with writing(folder, 'folder'):
-            folder.mkdir(parents=True, exist_ok=True)
-            report, table = folder / 'panel.json', folder / 'grades.csv'
-            report.write_text(json.dumps(self.as_json(), indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
-            with table.open('w', newline='', encoding='utf-8') as file:
-                writer = csv.writer(file)
-                writer.writerow(('texture', 'grade', 'std'))
-                rows = zip(ratings.textures, ratings.means, ratings.deviations, strict=True)
-                writer.writerows((name, f'{mean:.3f}', f'{std:.3f}') for name, mean, std in rows)
-        return report, table
+    single, mean = intraclass_correlation(grades.T)
+    error, correlation = one_against_rest(grades)
+    return {
+        'krippendorff_alpha': krippendorff_alpha(grades),
+        'icc_single': single,
+        'icc_mean': mean,
+        'one_against_rest_error': error,
+        'one_against_rest_r': correlation,
+    }
 
 
-def examine(ratings: Ratings) -> PanelReport:
-    """Return what a panel says and how far its people agree."""
-    alpha = krippendorff_alpha(ratings.grades)
-    single, mean = intraclass_correlation(ratings.grades.T)
-    error, correlation = one_against_rest(ratings.grades)
-    return PanelReport(ratings, alpha, single, mean, error, correlation, tuple(protocol_violations(ratings)))
+def report_of(ratings: Ratings) -> dict[str, Any]:
+    """Return what a panel says and how far its people agree, as panel.json holds it; null for what cannot be said."""
+    rows = zip(ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True)
+    return {
+        'raters': len(ratings.raters),
+        'textures': {
+            name: {'mean': float(mean), 'std': _or_none(float(std)), 'votes': votes.tolist()}
+            for name, mean, std, votes in rows
+        },
+        **{name: _or_none(value) for name, value in agreement(ratings.grades).items()},
+        'protocol_violations': protocol_violations(ratings),
+        'note': ratings.note,
+    }
+
+
+def write_panel(ratings: Ratings, folder: Path) -> list[Path]:
+    """Write panel.json, grades.csv that training takes, and the charts; InvalidParameter if one cannot be written."""
+    with writing(folder, 'folder'):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_json(report_of(ratings), folder / 'panel.json')
+        with (folder / 'grades.csv').open('w', newline='', encoding='utf-8') as file:
+            writer = csv.writer(file)
+            writer.writerow(('texture', 'grade', 'std'))
+            rows = zip(ratings.textures, ratings.means, ratings.deviations, strict=True)
+            writer.writerows((name, f'{mean:.3f}', f'{std:.3f}') for name, mean, std in rows)
+    charts = votes_chart(ratings, folder / 'votes.png'), deviations_chart(ratings, folder / 'grades.png')
+    return [folder / 'panel.json', folder / 'grades.csv', *charts]
 
 
 def protocol_violations(ratings: Ratings) -> list[str]:

@@ -2,8 +2,8 @@
 """The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
 
 import math
-import threading
 import re
+import threading
 from dataclasses import replace
 
 import numpy as np

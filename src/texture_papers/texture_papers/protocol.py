@@ -43,7 +43,7 @@ from texture_estimation.search import (
     optimise,
     space_for,
 )
-from texture_evaluation.workers import workers
+from texture_evaluation.cross_validation import workers
 from texture_features.feature_set import FeatureSet, InputFeatures
 from texture_features.features.temporal import Stretched
 from texture_features.windows import SEPARATOR, WindowBatch, WindowParams, axis_along

@@ -183,7 +183,9 @@ def _end_of_chunks(file: BinaryIO) -> int:
     size = file.seek(0, io.SEEK_END)
     chunks = []
     at = end = len(MAGIC)
-    for kind, length, _ in _records(file, size):
+    while at + RECORD_HEAD.size <= size:
+        file.seek(at)
+        kind, length = RECORD_HEAD.unpack(file.read(RECORD_HEAD.size))
         at += RECORD_HEAD.size + length
         if at > size or not kind:
             break
@@ -207,19 +209,6 @@ def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
     except (ReaderError, ValueError, struct.error, RuntimeError, zstd.ZstdError):
         return False
     return True
-
-
-def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
-    """Yield the kind, the length and the first bytes of each record; what is damaged is left to who reads on."""
-    at = len(MAGIC)
-    while at + RECORD_HEAD.size <= size:
-        file.seek(at)
-        head = file.read(RECORD_HEAD.size + CHUNK_HEAD.size)
-        if len(head) < RECORD_HEAD.size:
-            return
-        kind, length = RECORD_HEAD.unpack_from(head)
-        yield kind, length, head[RECORD_HEAD.size :]
-        at += RECORD_HEAD.size + length
 
 
 # --------------------

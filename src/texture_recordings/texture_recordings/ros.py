@@ -1,50 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Topics to record, and the check that nobody else publishes them."""
+"""Topics of the suite that are recorded and replayed."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
-from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from texture_msgs import msg
 
 from texture_core.errors import InvalidData
 from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, SENSOR_QOS, STATE_QOS, quality_of_service
-
-# --------------------
-# See that nobody else publishes what a replay publishes: two streams on one topic would be mixed in every window.
-
-
-def refuse_other_publishers(node: Node, outputs: Iterable[Publisher], bag: str) -> None:
-    """Refuse to replay where another node publishes on one of the topics.
-
-    Parameters
-    ----------
-    node
-        Node that has the publishers.
-    outputs
-        The publishers of the replay.
-    bag
-        Path of the bag, for the sentence.
-
-    Raises
-    ------
-    InvalidData
-        If a topic has another publisher.
-    """
-    taken = [output.topic_name for output in outputs if node.count_publishers(output.topic_name) > 1]
-    if taken:
-        raise InvalidData(
-            f"another node publishes '{taken[0]}', and the samples of both would be mixed; stop it and start `texture "
-            f'launch replay bag:={bag}`, or play the bag next to it with `texture launch replay bag:={bag} '
-            'namespace:=replay`'
-        )
-
 
 # --------------------
 # Type and quality of service of each topic of the suite, by the last part of its name.

@@ -357,16 +357,21 @@ class Columns:
         Number in the file of each row, from 1, for sentences; None if rows count from 0.
     malformed
         What is wrong with the first malformed rows, by their numbers in the file.
-    facts
-        What holds for the whole table: `place`, `fields`, `rate_hz`, `clocks` as in `Table`, and `chosen`, the names of
-        the columns of each stream.
+    place, fields, rate_hz, clocks
+        Of the table, see `Table`; the fields in the name of the file are among them.
+    chosen
+        Names of the columns of each stream.
     """
 
     numbers: Mapping[str, Array]
     texts: Mapping[str, NDArray[np.str_]]
     rows: AnyArray | None = None
     malformed: Mapping[int, str] = field(default_factory=dict)
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    place: str = ''
+    fields: Mapping[str, str] = field(default_factory=dict)
+    rate_hz: float = 0.0
+    clocks: Mapping[str, str] = field(default_factory=dict)
+    chosen: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def row(self, index: int) -> int:
         """Return the number in the file of a row."""
@@ -443,8 +448,7 @@ class Table:
         numbers = dict.fromkeys((*wanted, *clocks.values()))
         both = (numbers, dict.fromkeys(texts))
         read = self.read(*([name for name in names if name and name not in fields] for names in both))
-        facts = {'place': self.place, 'fields': fields, 'rate_hz': self.rate_hz, 'clocks': clocks, 'chosen': chosen}
-        return replace(read, facts=facts)
+        return replace(read, place=self.place, fields=fields, rate_hz=self.rate_hz, clocks=clocks, chosen=chosen)
 
 
 def _meant(name: str, names: Sequence[str]) -> list[str]:
@@ -491,7 +495,7 @@ class TableFiles:
         Yields
         ------
         Columns
-            With the `facts` of the table.
+            With what holds for the whole table.
 
         Raises
         ------
@@ -1533,9 +1537,7 @@ class _TableSlides:
 
     def __init__(self, mapping: TableMapping, columns: Columns, report: ImportReport) -> None:
         self._mapping, self._columns, self._report = mapping, columns, report
-        facts = columns.facts
-        self._place, self._fields, self._chosen = facts['place'], facts['fields'], facts['chosen']
-        self._own_hz, self._clocks = facts['rate_hz'], facts['clocks']
+        self._place, self._fields, self._clocks = columns.place, columns.fields, columns.clocks
         self._check_rows()
         self._streams = {name: self._stream(name, params) for name, params in mapping.streams.items()}
 
@@ -1598,7 +1600,7 @@ class _TableSlides:
         return stream, samples, index
 
     def _stream(self, name: str, params: StreamColumns) -> Stream:
-        names = self._chosen[name]
+        names = self._columns.chosen[name]
         columns = [self._columns.numbers[column] for column in names]
         # Arrays of a file need not be of one length: those of one stream must.
         if len({len(column) for column in columns}) > 1:
@@ -1613,24 +1615,23 @@ class _TableSlides:
             )
         samples = np.stack(columns, axis=1)
         samples *= params.scale
-        time_column = self._time_column(name)
-        rate_hz = self._rate_hz(name, params, time_column)
-        if time_column:
-            time_s = self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)]
+        time_column = params.time.column or self._clocks.get(names[0], '')
+        if not time_column:
+            rate_hz = self._rate_hz(name, params, self._columns.rate_hz)
+            time_s = np.arange(len(samples)) / rate_hz
+        else:
+            unit = params.time.unit if params.time.column else 's'
+            time_s = self._columns.numbers[time_column] * TIME_UNITS[unit]
+            rate_hz = self._rate_hz(name, params, estimated_rate_hz(time_s))
             if len(time_s) != len(samples):
                 raise InvalidData(
                     f"'{self._place}': column '{time_column}' has {len(time_s)} rows, '{name}' {len(samples)}"
                 )
-        else:
-            time_s = np.arange(len(samples)) / rate_hz
         channels = tuple(params.channels) or tuple(names)
         return Stream(params, channels, samples, time_s, bool(time_column), rate_hz, self._clocks.get(names[0], ''))
 
-    def _rate_hz(self, name: str, params: StreamColumns, time_column: str) -> float:
+    def _rate_hz(self, name: str, params: StreamColumns, own: float) -> float:
         """Return the rate of a stream: as stated, else that of the first file, from which later ones differ little."""
-        own = self._own_hz
-        if time_column:
-            own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
         # Of the first file: windows of all are to have as many samples.
         rate_hz = self._report.rates_hz.setdefault(name, params.rate_hz or own)
         if not MIN_HZ <= rate_hz <= MAX_HZ:
@@ -1641,16 +1642,9 @@ class _TableSlides:
         if own and not 1 / SAME_RATE <= own / rate_hz <= SAME_RATE:
             raise InvalidData(
                 f"'{self._place}': '{name}' has {own:g} Hz by its times, {rate_hz:g} Hz are expected; "
-                f"look at the unit of column '{time_column}' and at `rate_hz` in the mapping"
+                f"look at the unit of column '{params.time.column}' and at `rate_hz` in the mapping"
             )
         return rate_hz
-
-    def _time_column(self, name: str) -> str:
-        return self._mapping.streams[name].time.column or self._clocks.get(self._chosen[name][0], '')
-
-    def _time_unit(self, name: str) -> str:
-        stated = self._mapping.streams[name].time
-        return stated.unit if stated.column else 's'
 
     def _check_rows(self) -> None:
         """Count the rows with a bad number; InvalidData if they are too many."""
@@ -1666,16 +1660,12 @@ class _TableSlides:
                 told = [f"'{self._place}', row {row}, {reason}" for row, reason in self._columns.malformed.items()]
                 self._report.examples += told[: EXAMPLES - len(self._report.examples)]
             if not rows or count > self._mapping.max_malformed * rows:
-                raise InvalidData(self._malformed_sentence(count, rows))
-
-    def _malformed_sentence(self, count: int, rows: int) -> str:
-        named = (f'row {row}, {reason}' for row, reason in self._columns.malformed.items())
-        first = next(named, 'no row at all')
-        return (
-            f"'{self._place}' has {count} malformed rows of {rows}, first {first}; "
-            f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
-            'and at `format` in the mapping'
-        )
+                first = next((f'row {row}, {why}' for row, why in self._columns.malformed.items()), 'no row at all')
+                raise InvalidData(
+                    f"'{self._place}' has {count} malformed rows of {rows}, first {first}; "
+                    f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
+                    'and at `format` in the mapping'
+                )
 
     def _text(self, name: str) -> AnyArray | None:
         return None if name in self._fields else self._columns.texts[name]

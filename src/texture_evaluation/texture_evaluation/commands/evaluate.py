@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +18,13 @@ from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
     CrossValidation,
     PairedComparison,
-    Split,
     compare_all,
     comparison_chart,
     cross_validate,
+    dask_backend,
     parse_split,
 )
 from texture_evaluation.evaluate import evaluate, sentence, summary, table
-from texture_evaluation.workers import dask_backend
 from texture_recordings.dataset import SlideDataset, cut_slide
 
 
@@ -74,17 +72,15 @@ def _cross_validate(options: argparse.Namespace) -> int:
     _check_outputs(options, [*names, *bags])
     recipes = [load_recipe(name) for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
-    source = partial(_read, [str(Path(bag).absolute()) for bag in bags], options.slides, tuple(topics), split)
-    dataset = source()
+    dataset = split.cut(SlideDataset.from_bags(bags, options.slides, topics=tuple(topics)))
     for recipe in recipes:  # one that lacks a stream is refused before the others are computed
         cut_slide(dataset[0], recipe.feature_set)
     with dask_backend(options.dask) if options.dask else nullcontext():
-        # The workers of a cluster read the bags themselves, which all its computers find at the same paths.
-        jobs, there = (None, source) if options.dask else (options.jobs, None)
+        jobs = None if options.dask else options.jobs
         results = []
         for recipe in recipes:
             with task(f"cross-validate '{recipe.name}'"):
-                results.append(cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups, source=there))
+                results.append(cross_validate(recipe, dataset, split.splitter, jobs, groups=split.groups))
     for line in (line for result in results for line in table(result, split.name)):
         print(line)
     compared = compare_all(results)
@@ -97,10 +93,6 @@ def _cross_validate(options: argparse.Namespace) -> int:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
         print(comparison_chart(results, title, options.chart))
     return 0
-
-
-def _read(bags: Sequence[str], slides: str, topics: Sequence[str], split: Split) -> SlideDataset:
-    return split.cut(SlideDataset.from_bags(bags, slides, topics=topics))
 
 
 def _check_outputs(options: argparse.Namespace, inputs: Sequence[str]) -> None:

@@ -5,16 +5,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-from dataclasses import dataclass, field
 
 from texture_core.cli import add_dask, add_seed, add_slides, core_count
 from texture_core.config import from_mapping
 from texture_estimation.search import Generation, SearchParams
-from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
-from texture_evaluation.workers import workers
-
-BAR = 20  # letters
+from texture_evaluation.cross_validation import workers
+from texture_evaluation.optimise import checkpoint_of, optimise_from_bags
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -39,65 +35,27 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Search, write the recipe, and say how good it is."""
-    given = {name: getattr(options, name) for name in ('recipe', 'search', 'slides', 'grades', 'per_pair')}
-    wanted = Wanted(bags=tuple(options.bags), **given)
     chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed')}
     if options.all_halves:
         chosen['search_halves'] = options.halves
     params = from_mapping(SearchParams, chosen, 'texture optimise')
-    progress = Progress()
     try:
         with workers(options.jobs, options.dask):
-            files, lines = optimise_from_bags(wanted, params, options.out, resume=options.resume, tell=progress.tell)
+            files, lines = optimise_from_bags(
+                options.recipe, options.bags, params, options.out, search_space=options.search, slides=options.slides,
+                grades=options.grades, per_pair=options.per_pair, resume=options.resume, tell=_tell,
+            )  # fmt: skip
     except KeyboardInterrupt:
-        progress.end()
         print(f"scores are kept in '{checkpoint_of(options.out)}': go on with --resume", file=sys.stderr)
         raise
-    progress.end()
     print('\n'.join(lines))
     for path in files:
         print(f'  {path}')
     return 0
 
 
-@dataclass
-class Progress:
-    """A bar that grows with the generations: on a terminal in place, else a line each."""
-
-    terminal: bool = field(default_factory=lambda: sys.stderr.isatty())  # noqa: PLW0108  # the stream of now
-    _began_s: float = field(default_factory=time.monotonic)
-
-    def tell(self, pair: str, generation: Generation) -> None:
-        """Show where the search is."""
-        text = bar(generation, time.monotonic() - self._began_s, pair)
-        ending = '\r' if self.terminal and generation.number < generation.of else '\n'
-        print(f'\x1b[2K{text}' if self.terminal else text, end=ending, file=sys.stderr, flush=True)
-
-    def end(self) -> None:
-        """Leave the line of the bar."""
-        if self.terminal:
-            print(file=sys.stderr)
-
-
-def bar(generation: Generation, taken_s: float, pair: str = '') -> str:
-    """Return one line: how far, how good, how many tried, how long.
-
-    Parameters
-    ----------
-    generation
-        What the last generation brought.
-    taken_s
-        Time since the search began.
-    pair
-        Names of the pair of surfaces; '' for all.
-
-    Returns
-    -------
-    str
-        Without an end of line.
-    """
-    done = BAR * generation.number // generation.of
-    return (
-        f'{pair}{": " if pair else ""}[{"#" * done}{"." * (BAR - done)}] {generation.number}/{generation.of}  '
-        f'best {100 * generation.fitness:.2f} %  {generation.tried} tried  {taken_s:.0f} s'
-    )
+def _tell(pair: str, generation: Generation) -> None:
+    of_pair = f'{pair}, ' if pair else ''
+    far = f'generation {generation.number} of {generation.of}'
+    said = f'{of_pair}{far}: best {100 * generation.fitness:.2f} %, {generation.tried} tried'
+    print(said, file=sys.stderr, flush=True)

@@ -4,13 +4,21 @@
 from __future__ import annotations
 
 import argparse
-import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from texture_estimation.roughness import ROUGH, SMOOTH
-from texture_evaluation.panel import PanelReport, deviations_chart, examine, read_ratings, votes_chart
+from texture_evaluation.panel import read_ratings, report_of, write_panel
 
 SHOWN_VIOLATIONS = 5
+NAMED = {
+    'krippendorff_alpha': "agreement, Krippendorff's alpha",
+    'icc_single': 'ICC of one person',
+    'icc_mean': 'ICC of the mean',
+    'one_against_rest_error': 'one person against the mean of the others, grades',
+    'one_against_rest_r': 'one person against the mean of the others, r',
+}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -29,42 +37,29 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Examine the panel, print what it says, and write it if asked to."""
-    low, high = options.scale
-    report = examine(read_ratings(options.ratings, (low, high)))
-    for line in summary(report):
-        print(line)
-    if options.out:
-        ratings = report.ratings
-        files = report.write(options.out)
-        charts = votes_chart(ratings, options.out / 'votes.png'), deviations_chart(ratings, options.out / 'grades.png')
-        for file in (*files, *charts):
-            print(f'  {file}')
+    ratings = read_ratings(options.ratings, options.scale)
+    print('\n'.join(summary(report_of(ratings))))
+    for file in write_panel(ratings, options.out) if options.out else ():
+        print(f'  {file}')
     return 0
 
 
-def summary(report: PanelReport) -> list[str]:
+def summary(report: Mapping[str, Any]) -> list[str]:
     """Return the figures in lines for people."""
-    ratings = report.ratings
-    lines = [
-        f'{len(ratings.raters)} people, {len(ratings.textures)} textures; {ratings.note or "grades as they stand"}'
-    ]
-    rows = zip(ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True)
-    width = max(map(len, ratings.textures))
+    textures, violations = report['textures'], report['protocol_violations']
+    lines = [f'{report["raters"]} people, {len(textures)} textures; {report["note"] or "grades as they stand"}']
+    width = max(map(len, textures))
     lines += [
-        f'  {name:<{width}}  {mean:.2f} ± {_number(float(std))}   votes {" ".join(f"{count:3d}" for count in votes)}'
-        for name, mean, std, votes in rows
+        f'  {name:<{width}}  {one["mean"]:.2f} ± {_number(one["std"])}   '
+        f'votes {" ".join(f"{count:3d}" for count in one["votes"])}'
+        for name, one in textures.items()
     ]
-    lines += [
-        f"agreement: Krippendorff's alpha {_number(report.alpha)}, ICC of one person {_number(report.icc_single)}, "
-        f'of the mean {_number(report.icc_mean)}',
-        f'one person against the mean of the others: {_number(report.error)} grades apart, '
-        f'r = {_number(report.correlation)}',
-        f'protocol: {"kept" if not report.violations else f"not kept in {len(report.violations)} points"}',
-    ]
-    lines += [f'  {sentence}' for sentence in report.violations[:SHOWN_VIOLATIONS]]
-    more = len(report.violations) - SHOWN_VIOLATIONS
+    lines += [f'{told}: {_number(report[name])}' for name, told in NAMED.items()]
+    lines.append(f'protocol: {"kept" if not violations else f"not kept in {len(violations)} points"}')
+    lines += [f'  {sentence}' for sentence in violations[:SHOWN_VIOLATIONS]]
+    more = len(violations) - SHOWN_VIOLATIONS
     return lines + ([f'  and {more} more'] if more > 0 else [])
 
 
-def _number(value: float) -> str:
-    return '–' if math.isnan(value) else f'{value:.2f}'
+def _number(value: float | None) -> str:
+    return '–' if value is None else f'{value:.2f}'

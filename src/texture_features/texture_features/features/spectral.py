@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_features.features.temporal import signal_differences
+from texture_features.features.temporal import squares
 from texture_features.windows import WindowBatch, floor_param, mean_weights, power
 
 # --------------------
@@ -697,7 +697,7 @@ class PowerAutocorrelation:
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; 0 for all if the window is not two samples longer than the longest lag."""
-        powers = signal_differences(windows)[..., 1, :2, :]
+        powers = squares(windows)[..., :2, :]
         n_steps = powers.shape[-1] - 1  # one less than samples
         count = n_steps - self._lags[-1]
         if count < 1:

@@ -18,12 +18,12 @@ from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockTime
 
 from texture_core.config import param
-from texture_core.errors import DeviceError, InvalidParameter, TextureError
+from texture_core.errors import DeviceError, InvalidData, InvalidParameter, TextureError
 from texture_core.ros import declare, run, to_stamp
 from texture_core.types import NANOSECONDS
 from texture_recordings.bags import RawMessage, find_bags, read_named, short_name, topics_in
 from texture_recordings.dataset import find_slides
-from texture_recordings.ros import TOPICS, refuse_other_publishers
+from texture_recordings.ros import TOPICS
 
 # --------------------
 # When each message of a recording is due in a replay.
@@ -179,7 +179,15 @@ class ReplayNode(Node):
             self._refuse_others()
 
     def _refuse_others(self) -> None:
-        refuse_other_publishers(self, self._outputs.values(), self._params.bag)
+        """Refuse topics that another node publishes: two streams on one would be mixed in every window."""
+        taken = [one.topic_name for one in self._outputs.values() if self.count_publishers(one.topic_name) > 1]
+        if taken:
+            bag = self._params.bag
+            raise InvalidData(
+                f"another node publishes '{taken[0]}', and the samples of both would be mixed; stop it and start "
+                f'`texture launch replay bag:={bag}`, or play the bag next to it with `texture launch replay '
+                f'bag:={bag} namespace:=replay`'
+            )
 
     def _begin_clock(self) -> None:
         """Publish the time of the first message, so that no node is at time 0 when it comes."""
