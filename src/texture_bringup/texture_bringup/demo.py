@@ -134,67 +134,38 @@ class DemoPlan:
     def untrained_request(self) -> ExplorationRequest:
         """Return a slide over the shown surface, as in the training but for its speed, and as long in time."""
         [usual] = self.requests(self.shown, 1, early_stopping=True)
-        share = self.untrained_speed_m_s / self.speed_m_s
-        return replace(usual, speed_m_s=self.untrained_speed_m_s, distance_m=share * self.distance_m)
+        slower = self.untrained_speed_m_s / self.speed_m_s
+        return replace(usual, speed_m_s=self.untrained_speed_m_s, distance_m=slower * self.distance_m)
 
 
 # --------------------
 # What the demonstration says while it runs, for a reader who sees the suite for the first time.
 
-PROGRESS_LOG_MARGIN = ' ' * 8
-
 
 class ProgressLog:
-    """Tell what happens, each chapter with the time since the start; in a `with` block no line is left open.
+    """Tell what happens, each chapter with the time since the start.
 
     Parameters
     ----------
-    clock
-        Seconds, from any start.
     out
         Where to.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic, out: TextIO = sys.stdout) -> None:
-        self._clock = clock
+    def __init__(self, out: TextIO = sys.stdout) -> None:
         self._out = out
-        self._start_s = clock()
-        self._line_is_open = False
-
-    def __enter__(self) -> ProgressLog:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._line_is_open:
-            self._write('\n')
+        self._start_s = time.monotonic()
 
     def section(self, text: str) -> None:
         """Begin something new."""
-        self._write(f'\n[{self._clock() - self._start_s:3.0f} s]  {text}\n')
+        print(f'\n[{time.monotonic() - self._start_s:3.0f} s]  {text}', file=self._out, flush=True)
 
     def line(self, text: str) -> None:
         """Say something within the chapter."""
-        self._write(f'{PROGRESS_LOG_MARGIN}{text}\n')
-
-    def part(self, text: str, *, first: bool = False, last: bool = False) -> None:
-        """Say a part of a line, for what takes its time.
-
-        Parameters
-        ----------
-        text
-            What is printed.
-        first, last
-            Whether it begins a line, and whether it ends one.
-        """
-        self._write(f'{PROGRESS_LOG_MARGIN * first}{text}{chr(10) * last}')
-
-    def _write(self, text: str) -> None:
-        print(text, end='', file=self._out, flush=True)
-        self._line_is_open = not text.endswith('\n')
+        print(f'{" " * 8}{text}', file=self._out, flush=True)
 
 
 # --------------------
-# What came out of the recognising slides, as a table.
+# What came out of the recognising slides.
 
 
 Row = tuple[str, TextureEstimate]  # what lay under the finger, and what was said of it
@@ -218,21 +189,6 @@ def latencies_s(bag: Path) -> Mapping[str, float]:
         if estimate.windows and not estimate.final:
             found[estimate.exploration_id].append((log_ns - estimate.stamp_ns) / NANOSECONDS)
     return {name: statistics.median(values) for name, values in found.items()}
-
-
-def table(rows: Sequence[Row], latencies: Mapping[str, float]) -> list[str]:
-    """Return the lines of the table of results; latencies in s by exploration."""
-    width = max(13, *(len(surface) for surface, _ in rows))
-    lines = [f'{"surface":<{width}}  {"recognised as":<{width}}    confidence  sliding used  latency']
-    for surface, estimate in rows:
-        latency_s = latencies.get(estimate.exploration_id)
-        mark = '✓' if is_right((surface, estimate)) else '✗'
-        lines.append(
-            f'{surface:<{width}}  {estimate.label or "nothing":<{width}}  {mark} '
-            f'{estimate.confidence:10.3f}  {estimate.evidence_s:10.1f} s  '
-            + (f'{1000 * latency_s:4.0f} ms' if latency_s is not None else '   –')
-        )
-    return lines
 
 
 # --------------------
@@ -309,7 +265,7 @@ def explore_patiently(
     request
         What is asked of it.
     tell
-        Takes a part of a line on each exploration that is made again.
+        Takes a line on each exploration that is made again.
 
     Raises
     ------
@@ -322,7 +278,7 @@ def explore_patiently(
             break
         if not left:
             raise MotionAborted(f'the exploration of {request.surface} failed: {explored.message}')
-        tell(f'(aborted: {explored.message}; once more) ')
+        tell(f'aborted: {explored.message}; once more')
     return explored
 
 
@@ -479,11 +435,8 @@ def _learn(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> No
     progress.section(f'Learning: {plan.learning_slides} slides over each of {len(plan.surfaces)} simulated surfaces')
     with rig.recording(out / LEARNING_BAG):
         for surface in plan.surfaces:
-            progress.part(f'{surface:<18}', first=True)
-            requests = plan.requests(surface, plan.learning_slides)
-            for number, _ in enumerate(rig.explore(surface, requests, progress.part), start=1):
-                progress.part(f'{", " * (number > 1)}slide {number}')
-            progress.part(' recorded', last=True)
+            explored = list(rig.explore(surface, plan.requests(surface, plan.learning_slides), progress.line))
+            progress.line(f'{surface:<18}{len(explored)} slides recorded')
 
 
 def _train(out: Path, recipe: str, progress: ProgressLog) -> None:
@@ -498,12 +451,10 @@ def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -
     rows = []
     with rig.recording(out / RECOGNITION_BAG):
         for surface in plan.surfaces:
-            progress.part(f'{surface:<18}', first=True)
             requests = plan.requests(surface, plan.recognition_slides, early_stopping=True)
-            for number, explored in enumerate(rig.explore(surface, requests, progress.part)):
+            for explored in rig.explore(surface, requests, progress.line):
                 rows.append((surface, explored.texture))
-                progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
-            progress.part('', last=True)
+                progress.line(f'{surface:<18}recognised as {explored.texture.label or "nothing"}')
     return rows
 
 
@@ -521,9 +472,13 @@ def _report(
     rows: list[Row], untrained: TextureEstimate, out: Path, plan: DemoPlan, progress: ProgressLog
 ) -> EvaluationReport:
     progress.section('Result')
-    latencies: Mapping[str, float] = latencies_s(out / RECOGNITION_BAG)
-    for line in table(rows, latencies):
-        progress.line(line)
+    latencies = latencies_s(out / RECOGNITION_BAG)
+    for surface, estimate in rows:
+        progress.line(
+            f'{surface:<18}{"✓" if is_right((surface, estimate)) else "✗"} {estimate.label or "nothing"}, confidence '
+            f'{estimate.confidence:.3f} after {estimate.evidence_s:.1f} s of sliding, latency '
+            f'{1000 * latencies.get(estimate.exploration_id, math.nan):.0f} ms'
+        )
     progress.line(f'{sum(map(is_right, rows))} of {len(rows)} slides over simulated surfaces recognised')
     progress.line('latency: from the last sample of a window to its estimate at another process')
     model = load_model(out / MODEL)

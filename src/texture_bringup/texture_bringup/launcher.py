@@ -10,6 +10,7 @@ import math
 import os
 import re
 import selectors
+import shlex
 import signal
 import subprocess
 import sys
@@ -448,54 +449,36 @@ class Supervisor:
 # --------------------
 # Texts with substitutions such as `$(var speed)`, as ROS 2 launch files write them.
 
-NAME = re.compile(r'[A-Za-z][\w-]*')
+# An innermost call: its name, and its arguments one space apart; one with spaces is quoted.
+CALL = re.compile(r"""\$\(([A-Za-z][\w-]*)((?: (?:"[^"$()]*"|'[^'$()]*'|[^\s"'$()]+))*)\)""")
+PERFORMED = re.compile(r'\0(\d+)\0')
 Perform = Callable[[str, Sequence[str]], str]
 
 
 def expand(text: str, perform: Perform) -> str:
     """Return a text with its calls performed: `perform(name, arguments)` gives the text of each, innermost first.
 
-    Inside a call, arguments stand one space apart; an argument with spaces is quoted.
-
     Raises
     ------
     InvalidLaunch
         If a call is not closed or not well formed.
     """
-    return _expand(text, 0, '', perform)[0]
+    done: list[str] = []  # what calls have given; marks stand for it, as nothing in it is a call or a quote
 
+    def resolved(part: str) -> str:
+        return PERFORMED.sub(lambda mark: done[int(mark[1])], part)
 
-def _expand(text: str, at: int, stop: str, perform: Perform) -> tuple[str, int]:
-    """Return the expanded text up to the end or the first plain character of `stop`, and the place of that."""
-    parts = []
-    while at < len(text) and text[at] not in stop:
-        if text.startswith('$(', at):
-            part, at = _call(text, at, perform)
-        else:
-            part, at = text[at], at + 1
-        parts.append(part)
-    return ''.join(parts), at
+    def call(found: re.Match[str]) -> str:
+        done.append(perform(found[1], [resolved(part) for part in shlex.split(found[2])]))
+        return f'\0{len(done) - 1}\0'
 
-
-def _call(text: str, start: int, perform: Perform) -> tuple[str, int]:
-    malformed = InvalidLaunch(
-        f"'{text[start:]}' is no substitution; write $(name argument …), closed and with single spaces"
-    )
-    name = NAME.match(text, start + len('$('))
-    if not name:
-        raise malformed
-    at, arguments = name.end(), []
-    while text.startswith(' ', at):
-        quote = text[at + 1 : at + 2]
-        quoted = quote in ('"', "'")
-        argument, end = _expand(text, at + 1 + quoted, quote if quoted else ' )', perform)
-        if (quoted and not text.startswith(quote, end)) or (not quoted and end == at + 1):
-            raise malformed
-        at = end + quoted
-        arguments.append(argument)
-    if not text.startswith(')', at):
-        raise malformed
-    return perform(name.group(), arguments), at + 1
+    while (expanded := CALL.sub(call, text)) != text:
+        text = expanded
+    if '$(' in text:
+        raise InvalidLaunch(
+            f"'{resolved(text)}' holds no substitution; write $(name argument …), closed and with single spaces"
+        )
+    return resolved(text)
 
 
 # --------------------

@@ -217,6 +217,18 @@ class Operator:
         self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulator '
                     'with `texture launch emulator`')  # fmt: skip
 
+    def wait_for_node(self, name: str, deadline_s: float) -> None:
+        """Wait until a node of the namespace is there.
+
+        Raises
+        ------
+        LaunchFailed
+            If it does not appear in time.
+        """
+        namespace = self._node.get_namespace()
+        missing = f"node '{namespace.rstrip('/')}/{name}' is not there; look at its output"
+        self._until(lambda: (name, namespace) in self._node.get_node_names_and_namespaces(), deadline_s, missing)
+
     def wait_for_signal(self, deadline_s: float) -> None:
         """Wait until the sensor delivers samples."""
         batches: list[msg.TactileSignal] = []

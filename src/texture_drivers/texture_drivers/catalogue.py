@@ -13,7 +13,7 @@ from texture_drivers.biotac import BioTac
 from texture_drivers.daq import daq
 from texture_drivers.file import FilePlayer
 from texture_drivers.papillarray import PapillArray
-from texture_drivers.pvdf import Pvdf
+from texture_drivers.pvdf import pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.sound_card import SoundCard
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
@@ -31,7 +31,7 @@ SENSORS: Mapping[str, MakeSensor] = {
     'biotac_sp': partial(BioTac, layout=BIOTACS['biotac_sp']),  # 24 electrodes
     'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
-    'pvdf': Pvdf,  # PVDF film and force sensor, Hu et al. 2014
+    'pvdf': pvdf,  # PVDF film and force sensor, Hu et al. 2014
     'anyskin': anyskin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
     'papillarray': PapillArray,  # Contactile PapillArray, 9 pillars
     'papillarray_pair': partial(PapillArray, arrays=(0, 1)),  # both of a hub; topics finger0/signal and so on

@@ -13,7 +13,7 @@ import pytest
 
 from texture_core.errors import UnknownName
 from texture_core.types import NANOSECONDS, FingerSender, FingerState, TactileSignal, lost_samples
-from texture_drivers.pvdf import Pvdf
+from texture_drivers.pvdf import pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.tsf85 import Tsf85
 from texture_simulation.devices.fingers import Tsf85Encoder
@@ -136,7 +136,7 @@ FORCE_N = 2.0
 
 @pytest.mark.parametrize('emulator', ['pvdf'], indirect=True)
 def test_a_pvdf_finger_senses_ridges_and_force(emulator: Emulator, arm: Arm, tmp_path: Path) -> None:
-    sensor = Pvdf(SensorParams(device=str(tmp_path / 'pvdf')))
+    sensor = pvdf(SensorParams(device=str(tmp_path / 'pvdf')))
     sensor.open()
     found: dict[str, list[TactileSignal]] = {}
     deadline_s = time.monotonic() + DEADLINE_S

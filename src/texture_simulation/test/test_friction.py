@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidParameter
 from texture_simulation.friction import (
     CREEP_M_S,
     PASSIVE,
@@ -164,19 +164,6 @@ def test_friction_and_steps_that_make_no_sense_are_refused() -> None:
     for kind in (HANGS, GLIDES):
         with pytest.raises(InvalidParameter, match='below the kinetic one'):
             table({**kind, 'static': 0.3, 'kinetic': 0.4})
-
-
-@pytest.mark.parametrize(
-    ('speed', 'force', 'sentence'),
-    [
-        (np.zeros(3), np.zeros(4), 'one of each'),
-        (np.array([0.0, np.nan]), np.zeros(2), 'not finite'),
-        (np.zeros(2), np.array([1.0, -0.1]), '0 or more'),
-    ],
-)
-def test_what_no_finger_does_is_refused(speed: np.ndarray, force: np.ndarray, sentence: str) -> None:
-    with pytest.raises(InvalidData, match=sentence):
-        drag(USUAL, speed, force, 2.5e-4)
 
 
 # -- along a path, and through a whole sensor

@@ -214,13 +214,6 @@ def test_film_and_force_come_as_two_streams_in_their_units(make_sampler: Make) -
     assert np.diff(np.concatenate([batch.samples for batch in force]), axis=0) == pytest.approx(0.005, abs=1e-6)
 
 
-def test_the_force_on_the_film_is_restored_if_wanted(make_sampler: Make) -> None:
-    batches = make_sampler('pvdf', config='{restore_from_hz: 0.5}', **SWING).signal_s(2.0)
-    assert batches[-1].units == ('N',)
-    late = np.concatenate([batch.samples for batch in batches])[4096:]
-    assert np.ptp(late) / 2 == pytest.approx(2.0 / 21.0, rel=0.05)  # far above the corner nothing leaks
-
-
 TEN_MS = np.arange(10, dtype=np.int16)
 NO_IMAGE = np.empty((0, 28), dtype=np.uint16)
 START, STOP = bytes.fromhex('9A 00 58 01 01'), bytes.fromhex('9A 00 58 01 00')

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.config import param
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_simulation.path import Trajectory, before_first
 
@@ -312,10 +312,7 @@ def drag(
     ------
     InvalidParameter
         If the step is beyond the border of the integrator.
-    InvalidData
-        If a speed or force is not finite, or a force is below 0.
     """
-    check_drive(speed_m_s, force_n)
     if not speed_m_s.size:
         return Tip(*(np.zeros_like(speed_m_s) for _ in range(3)))
     check_step(friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
@@ -345,27 +342,6 @@ def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
         Force in N.
     """
     return np.asarray(friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s))
-
-
-def check_drive(speed_m_s: Array, force_n: Array) -> None:
-    """Raise InvalidData for speeds and forces that no finger has.
-
-    Parameters
-    ----------
-    speed_m_s, force_n : (..., n)
-        For each step.
-
-    Raises
-    ------
-    InvalidData
-        If the shapes differ, a number is not finite, or a force is below 0.
-    """
-    if speed_m_s.shape != force_n.shape:
-        raise InvalidData(f'speeds {speed_m_s.shape} and forces {force_n.shape}; give one of each for every step')
-    if not (np.isfinite(speed_m_s).all() and np.isfinite(force_n).all()):
-        raise InvalidData('a speed or force that is not finite; give numbers only')
-    if (force_n < 0).any():
-        raise InvalidData(f'a force of {force_n.min():.3g} N; a finger presses with 0 or more')
 
 
 def _few(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array) -> Tip:

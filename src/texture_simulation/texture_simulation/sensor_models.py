@@ -16,7 +16,6 @@ from texture_core.types import Array, Samples
 from texture_drivers import anyskin, biotac, daq, papillarray, pvdf, tsf85
 from texture_drivers.biotac import FULL_SCALE, PAC, SLOT_RATE_HZ, BioTacLayout
 from texture_drivers.biotac import LAYOUTS as BIOTACS
-from texture_drivers.pvdf import ChargeLeak
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
 from texture_drivers.tsf85 import RATE_HZ, TSF85, Tsf85Layout
 from texture_simulation.contact import SkinContact
@@ -658,10 +657,8 @@ PAPILLARRAY_KIND = SensorKind(
 
 # A point a sample: at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more.
 PVDF_PATH_RATE_HZ = pvdf.FILM_RATE_HZ
-PC_PER_C = 1e12
-PVDF_LEAK = ChargeLeak(pvdf.RESISTANCE_OHM, pvdf.CAPACITANCE_F, pvdf.D33_PC_N / PC_PER_C)
 # Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
-KEPT = math.exp(-1 / (PVDF_LEAK.time_constant_s * PVDF_PATH_RATE_HZ))
+KEPT = math.exp(-1 / (pvdf.LEAK_S * PVDF_PATH_RATE_HZ))
 LEAK_SECTIONS = np.array([[1.0, -1.0, 0.0, 1.0, -KEPT, 0.0]])
 FILM_BAND = np.concatenate([filters.butter(2, 800.0, 'lowpass', fs=PVDF_PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
 FORCE_BAND = filters.butter(2, 20.0, 'lowpass', fs=PVDF_PATH_RATE_HZ, output='sos')

@@ -93,11 +93,11 @@ def _demo(options: argparse.Namespace) -> int:
     from texture_estimation.recipe import load_recipe  # noqa: PLC0415
 
     load_recipe(options.recipe)  # refused before the nodes start
-    with ProgressLog() as progress:
-        progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-        all_right = demonstrate(options.out, options.recipe, options.seed, DemoPlan(), progress)
-        if not all_right:
-            progress.line('Not every slide was recognised.')
+    progress = ProgressLog()
+    progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
+    all_right = demonstrate(options.out, options.recipe, options.seed, DemoPlan(), progress)
+    if not all_right:
+        progress.line('Not every slide was recognised.')
     return 0 if all_right else 1
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import struct
 import time
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.types import DEVICES, Array, FingerState
+from texture_core.types import Array, FingerState
 from texture_simulation.devices.rails import EmulatedSerialRobot
 
 # --------------------
@@ -414,15 +413,3 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
         packet += struct.pack('<H', crc16(packet))
         # Two motors with one id answer at once, and what they send is neither's.
         return packet[:-2] + bytes(2) if motor in self.motors.twice else packet
-
-
-def main() -> None:
-    """Run an emulated LEAP hand until Ctrl-C, as in `python -m texture_simulation.devices.dynamixel`."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument('link', type=Path, nargs='?', default=Path(DEVICES, 'dynamixel'), help='device path to make')
-    options = parser.parse_args()
-    EmulatedDynamixelBus(options.link, leap_hand()).serve_forever()
-
-
-if __name__ == '__main__':
-    main()

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import argparse
 import binascii
-import signal
 import struct
 import threading
 import time
@@ -17,7 +15,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.framing import cobs_decode
-from texture_core.types import DEVICES, FingerSender, FingerState
+from texture_core.types import FingerSender, FingerState
 from texture_simulation.devices.fingers import ByteFaults, PtyPort, framed
 
 # --------------------
@@ -253,15 +251,6 @@ class EmulatedSerialRobot:
         with self.port_lock:
             self.port.unplug()
 
-    def serve_forever(self) -> None:
-        """Live until SIGINT or SIGTERM."""
-        stopped = threading.Event()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda _number, _frame: stopped.set())
-        with self:
-            print(f'it is at {self.port.link}', flush=True)
-            stopped.wait()
-
 
 # --------------------
 # The rails of a PVDF finger on a pseudo-terminal.
@@ -321,16 +310,3 @@ class EmulatedRails(EmulatedSerialRobot):
         vx, vy, vz = self.firmware.velocity.tolist()
         height, force = z - self.firmware.surface_m, self.firmware.force_n
         self.emulator.send(FingerState(time.monotonic_ns(), x, y, height, vx, vy, vz, force))
-
-
-def main() -> None:
-    """Run the emulated rails until Ctrl-C, as in `python -m texture_simulation.devices.rails`."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument('link', type=Path, nargs='?', default=Path(DEVICES, 'rails'), help='device path to make')
-    parser.add_argument('--finger-pipe', default='', help='named pipe of the emulator; default: none')
-    options = parser.parse_args()
-    EmulatedRails(options.link, finger_pipe=options.finger_pipe).serve_forever()
-
-
-if __name__ == '__main__':
-    main()

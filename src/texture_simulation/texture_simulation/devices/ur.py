@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import enum
 import itertools
+import json
 import math
 import os
 import re
@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from texture_core.config import from_mapping, param, parameters_of
+from texture_core.config import param
 from texture_core.errors import DeviceError, TextureError
 from texture_core.types import Array, FingerSender, FingerState, loopback_address, rotation_matrix
 from texture_simulation.devices.rails import FingerPipeParams
@@ -341,8 +341,7 @@ class ControllerProcess:
         DeviceError
             If they cannot be opened.
         """
-        options = [f'--{name.replace("_", "-")}={value}' for name, value in dataclasses.asdict(self.params).items()]
-        command = [sys.executable, '-m', 'texture_simulation.devices.ur', *options]
+        command = [sys.executable, '-m', 'texture_simulation.devices.ur', json.dumps(dataclasses.asdict(self.params))]
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -1329,18 +1328,18 @@ class Server:
 
 
 # --------------------
-# Run the emulated controller, as in `python -m texture_simulation.devices.ur --ip 127.0.0.2`.
+# Run the emulated controller as a process, whose argument is the JSON of its parameters.
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Serve until SIGINT, SIGTERM or the end of the parent process; 'ready' is printed once the ports are open."""
     signals: list[int] = []
     parent = os.getppid()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _frame: signals.append(number))
+    params = UrControllerParams(**json.loads(sys.argv[1]))
+    controller = EmulatedController(params, np.random.default_rng(params.seed))
     try:
-        params = read_params(arguments)
-        controller = EmulatedController(params, np.random.default_rng(params.seed))
         server = Server(controller, params.ip, params.finger_pipe)
     except TextureError as error:
         print(f'emulated UR controller: {error}', file=sys.stderr)
@@ -1349,16 +1348,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     server.run(lambda: bool(signals) or os.getppid() != parent)
     server.close()
     return 0
-
-
-def read_params(arguments: Sequence[str] | None) -> UrControllerParams:
-    """Return the parameters from the command line: each has an option of its own."""
-    parser = argparse.ArgumentParser(prog='python -m texture_simulation.devices.ur', description=__doc__)
-    for item in parameters_of(UrControllerParams):
-        option = '--' + item.name.replace('_', '-')
-        text = f'{item.description} {item.range_text} (default {item.default})'.replace('%', '%%')
-        parser.add_argument(option, type=item.type, default=item.default, help=text)
-    return from_mapping(UrControllerParams, vars(parser.parse_args(arguments)))
 
 
 if __name__ == '__main__':
