@@ -152,7 +152,7 @@ def test_a_program_tells_every_end_of_an_exploration_by_its_code(graph):
             result, ended = happens()
             assert (result.error_code, ended, act(result)) == (code, status, action), result.message
         timeout = ExplorationRequest(**SLOW).timeout
-        timeout.sec = 4
+        timeout.sec = 2
         assert explore(**SLOW, timeout=timeout)[0].error_code == R.ERROR_TIMEOUT
         busy = []
         explore(lambda _: busy.append(second(graph, world.program)), **SLOW)
