@@ -14,7 +14,7 @@ from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, im
 from texture_core.config import find
 from texture_core.types import AnyArray, Array, SlideMotion, Window
 from texture_estimation.learners.learner import log_softmax
-from texture_estimation.next_motion import NextTouchModel
+from texture_estimation.next_motion import NextTouchModel, log_likelihoods
 from texture_estimation.recipe import load_recipe
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowBatch
@@ -41,9 +41,9 @@ def _planned(known: NextTouchModel, motions: Sequence[SlideMotion], rng: np.rand
     for _ in range(PLANNED):
         reported = {motion: sum(known.information(own, motion) for own in posteriors) for motion in motions}
         order.append(max(motions, key=reported.__getitem__))
-        measured = known.gaussians[order[-1]]
-        places = measured.means[truth] + rng.standard_normal((len(truth), measured.means.shape[1]))
-        posteriors = log_softmax(posteriors + measured.log_likelihoods(places))
+        means = known.means[known.motions.index(order[-1])]
+        places = means[truth] + rng.standard_normal((len(truth), means.shape[1]))
+        posteriors = log_softmax(posteriors + log_likelihoods(places, means))
     return lambda posterior, slide: order[slide % PLANNED]
 
 

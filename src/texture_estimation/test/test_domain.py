@@ -4,7 +4,7 @@ import math
 import pytest
 
 from texture_estimation.decisions import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
-from texture_features.feature_set import SignalLevel, SlideConditions
+from texture_features.feature_set import SlideConditions
 
 
 def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85', directions_rad=(0.0,)):
@@ -79,7 +79,7 @@ def test_to_and_fro_is_trained_if_both_directions_are():
 
 
 def at_level(rms, channel='signal/pac', **known):
-    return SlideConditions(levels=(SignalLevel(channel, rms, rms, rms),), **known)
+    return SlideConditions(levels=((channel, rms, rms, rms),), **known)
 
 
 @pytest.mark.parametrize(('rms', 'within'), [(2.1, True), (1.9, False), (15.9, True), (16.1, False)])

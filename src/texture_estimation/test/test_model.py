@@ -15,11 +15,12 @@ from texture_core.config import folder
 from texture_core.errors import ModelMismatch
 from texture_core.types import SlideMotion
 from texture_estimation.decisions import ConfidenceFloor
-from texture_estimation.model import load_model
+from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import Grades, load_roughness_recipe, train_grades
 from texture_estimation.training import train
+from texture_features.feature_set import SlideConditions
 
 OWN = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 # Loads the models named first and asks each for an answer, in a Python without these libraries.
@@ -33,7 +34,7 @@ sys.meta_path.insert(0, Absent())
 import numpy as np
 from texture_core.types import FeatureVector
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.model import load_model
+from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide
 from texture_estimation.roughness import RoughnessAccumulator, load_roughness_model
 for kind, path in (given.split('=', 1) for given in sys.argv[1:]):
     roughness = kind == 'roughness'
@@ -225,3 +226,11 @@ def test_a_domain_with_an_impossible_range_is_refused(saved, name, value):
     card['decisions']['domain'][name] = value
     path.write_text(json.dumps(card))
     refused(saved, 'train it again')
+
+
+def test_the_conditions_of_an_added_slide_survive_its_file(tmp_path):
+    known = SlideConditions('circular', speed_m_s=0.05, directions_rad=(0.5,), levels=(('signal/a', 2.0, 1.0, 3.0),))
+    for number, conditions in enumerate((known, SlideConditions()), start=1):
+        write_added_slide(tmp_path / 'm', number, AddedSlide('oak', 'slide', np.ones((3, 1)), conditions), 'a1')
+    found = [slide.conditions for slide in read_added_slides(tmp_path / 'm', 'a1', ('mean',))]
+    assert repr(found) == repr([known, SlideConditions()])  # NaN is not equal to itself

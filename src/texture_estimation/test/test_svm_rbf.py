@@ -6,7 +6,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
-from texture_estimation.learners.svm import PairCoupling, SvmRbf, fit_coupling
+from texture_estimation.learners.svm import PairCoupling, RbfMachines, SvmRbf, fit_coupling
 
 
 def max_wins(decisions, n_labels):
@@ -24,7 +24,7 @@ def test_the_array_form_decides_every_window_as_scikit_learn(make_examples, n_la
     examples = make_examples(labels=labels, spread=2.0)
     codes = np.unique(examples.labels, return_inverse=True)[1]
     groups = np.unique(examples.groups, return_inverse=True)[1]
-    machines = SvmRbf.predictor(SvmRbf().fit(examples.values, codes, groups).parameters).machines
+    machines = RbfMachines(**SvmRbf().fit(examples.values, codes, groups).parameters['machines'])
     # gamma='scale' is 1 / (n_features · variance), of features that are standardised
     theirs = make_pipeline(StandardScaler(), SVC(C=10.0, gamma='scale', decision_function_shape='ovo'))
     theirs.fit(examples.values, codes)
@@ -38,10 +38,10 @@ def test_the_array_form_decides_every_window_as_scikit_learn(make_examples, n_la
 def test_with_a_common_scale_what_hardly_varies_stays_small():
     values = np.random.default_rng(0).normal(size=(40, 2)) * (1.0, 1e-3)
     codes = np.arange(40) % 2
-    scale = SvmRbf.predictor(SvmRbf(common_scale=True).fit(values, codes, codes).parameters).machines.scale
-    assert scale == pytest.approx(np.sqrt(values.var(axis=0).mean()))
+    fitted = SvmRbf(common_scale=True).fit(values, codes, codes)
+    assert fitted.parameters['machines']['scale'] == pytest.approx(np.sqrt(values.var(axis=0).mean()))
     constant = SvmRbf(common_scale=True).fit(np.ones((4, 2)), np.arange(4) % 2, np.arange(4))
-    assert SvmRbf.predictor(constant.parameters).machines.scale.tolist() == [1.0, 1.0]
+    assert constant.parameters['machines']['scale'].tolist() == [1.0, 1.0]
 
 
 def sheared(seed, shear, slides=8, windows=6):

@@ -616,10 +616,10 @@ class Domain:
             yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
         for direction in self._untrained_directions(conditions)[:1]:
             yield f'direction {direction:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
-        for level in conditions.levels:
-            trained = self.levels.get(level.channel)
-            if is_beyond(level.rms, trained, self.margins.level):
-                yield f'signal level {level.rms:.3g} of {level.channel}, trained {_range(trained)}'
+        for channel, rms, *_ in conditions.levels:
+            trained = self.levels.get(channel)
+            if is_beyond(rms, trained, self.margins.level):
+                yield f'signal level {rms:.3g} of {channel}, trained {_range(trained)}'
 
     def _untrained_directions(self, conditions: SlideConditions | RunningConditions) -> list[float]:
         """Return the directions of a slide outside the arcs; none where directions are not compared."""
@@ -654,10 +654,10 @@ def _reach(slides: Sequence[SlideConditions], labels: Sequence[str]) -> dict[str
 
 def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
     """Return the range of the signal level of each channel."""
-    by_channel: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+    by_channel: defaultdict[str, list[list[float]]] = defaultdict(list)
     for slide in slides:
-        for level in slide.levels:
-            by_channel[level.channel].append((level.rms, level.lowest, level.highest))
+        for channel, *means in slide.levels:
+            by_channel[channel].append(means)
     found = {channel: interval_of(means) for channel, means in by_channel.items()}
     return {channel: interval for channel, interval in found.items() if interval is not None}
 

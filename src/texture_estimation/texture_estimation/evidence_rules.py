@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class EvidenceRule:
         """
         return log_probabilities
 
-    def window_weights(self, effective_windows: float | Array) -> Array:
+    def window_weight(self, effective_windows: float | Array) -> Any:
         """Return the weight of windows in the mean evidence.
 
         Parameters
@@ -58,12 +59,8 @@ class EvidenceRule:
         Returns
         -------
         (n_windows,) or a number
-            1 for a window that counts fully.
+            1 for a window that counts fully; one number may hold for all.
         """
-        return np.ones(np.shape(effective_windows))
-
-    def window_weight(self, effective_windows: float) -> float:
-        """Return the weight of one window, as `window_weights` does; without an array it costs a tenth."""
         return 1.0
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
@@ -111,13 +108,9 @@ class SoftVote(EvidenceRule):
         high=1.0,
     )
 
-    def window_weights(self, effective_windows: float | Array) -> Array:
+    def window_weight(self, effective_windows: float | Array) -> Any:
         """Return 1 for the first FULL_WINDOWS effective windows, and `late_weight` for those after them."""
-        return np.where(np.asarray(effective_windows) > FULL_WINDOWS + ROUNDING, self.late_weight, 1.0)
-
-    def window_weight(self, effective_windows: float) -> float:
-        """Return 1 for one of the first FULL_WINDOWS effective windows, and `late_weight` for one after them."""
-        return self.late_weight if effective_windows > FULL_WINDOWS + ROUNDING else 1.0
+        return self.late_weight ** (effective_windows > FULL_WINDOWS + ROUNDING)
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""
@@ -200,6 +193,13 @@ class GroupedEvidence:
     group
         Windows of a group; 0 sums over all.
 
+    Attributes
+    ----------
+    mean : (n_labels,)
+        Weighted mean evidence of the windows that decide.
+    time_s
+        Sliding time of the windows that decide.
+
     Examples
     --------
     >>> grouped = GroupedEvidence(n_labels=2, group=2)
@@ -211,7 +211,10 @@ class GroupedEvidence:
 
     def __init__(self, n_labels: int, group: int = 0) -> None:
         self._group = group
-        self._newest = self._decides = _Sum(np.zeros(n_labels))
+        self._sum, self._count, self._weight, self._time_s = np.zeros(n_labels), 0, 0.0, 0.0  # of the newest group
+        self._complete = False
+        self.mean: Array = self._sum
+        self.time_s = 0.0
 
     def add(self, evidence: Array, new_s: float, weight: float = 1.0) -> None:
         """Add the evidence of a window, (n_labels,), which adds so much new sliding time.
@@ -225,32 +228,15 @@ class GroupedEvidence:
         weight
             Weight of the window in the mean, above 0 for the first one.
         """
-        if self._group and self._newest.count == self._group:
-            self._newest = _Sum(np.zeros(len(evidence)))
-        self._newest.evidence += evidence if weight == 1.0 else weight * evidence
-        self._newest.weight += weight
-        self._newest.count += 1
-        self._newest.time_s += new_s
-        if not self._group or self._newest.count == self._group:
-            self._decides = self._newest
-
-    @property
-    def mean(self) -> Array:
-        """Weighted mean evidence of the windows that decide, (n_labels,)."""
-        return self._decides.evidence / self._decides.weight
-
-    @property
-    def time_s(self) -> float:
-        """Sliding time of the windows that decide."""
-        return self._decides.time_s
-
-
-@dataclass
-class _Sum:
-    evidence: Array
-    count: int = 0
-    weight: float = 0.0
-    time_s: float = 0.0
+        if self._count == self._group and self._complete:
+            self._sum, self._count, self._weight, self._time_s = np.zeros(len(evidence)), 0, 0.0, 0.0
+        self._sum += evidence if weight == 1.0 else weight * evidence
+        self._weight += weight
+        self._count += 1
+        self._time_s += new_s
+        self._complete |= self._count == self._group
+        if not self._complete or self._count == self._group:
+            self.mean, self.time_s = self._sum / self._weight, self._time_s
 
 
 def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array, trusted: Array | float = 1.0) -> Array:
@@ -278,7 +264,7 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array,
     >>> running_means(SoftVote(), np.array([[0.0], [1.0]]), np.array([1.0, 2.0])).tolist()
     [[0.0], [0.5]]
     """
-    weights = (trusted * rule.window_weights(effective_windows))[:, None]
+    weights = np.broadcast_to(trusted * rule.window_weight(effective_windows), len(evidence))[:, None]
     means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
     if np.ndim(trusted):
         added = np.cumsum(trusted * np.diff(effective_windows, prepend=0.0))
@@ -286,10 +272,37 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array,
     return means
 
 
-def deciding_rows(count: int, group: int) -> slice:
-    """Return which of so many windows of a slide decide: the newest complete group, or all before the first is."""
-    complete = count // group if group else 0
-    return slice(group * (complete - 1), group * complete) if complete else slice(0, count)
+def followed(
+    rule: EvidenceRule, evidence: Array, hop_share: float, trusted: Array | float = 1.0
+) -> tuple[Array, Array]:
+    """Return the mean evidence of a slide after each window, and the effective window count that it rests on.
+
+    Parameters
+    ----------
+    rule
+        Combines the windows.
+    evidence : (n_windows, n_labels)
+        Of each window.
+    hop_share
+        Time between the starts of two windows over their length, at most 1.
+    trusted : (n_windows,) or a number
+        As in `running_means`.
+
+    Returns
+    -------
+    (n_windows, n_labels)
+        Mean of the evidence: of all windows so far, or of the newest group that is complete.
+    (n_windows,)
+        Length of this evidence.
+    """
+    counts = 1 + np.arange(len(evidence))
+    if not rule.group:
+        effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share
+        return running_means(rule, evidence, effective_windows, trusted), effective_windows
+    first = np.maximum(counts // rule.group - 1, 0) * rule.group
+    stop = np.where(counts < rule.group, counts, first + rule.group)
+    means = np.stack([evidence[one:other].mean(axis=0) for one, other in zip(first, stop, strict=True)])
+    return means, 1.0 + (stop - first - 1.0) * hop_share
 
 
 EVIDENCE_RULES: Mapping[str, type[EvidenceRule]] = {

@@ -430,12 +430,12 @@ def _read(path: Path, feature_set: str, n_features: int) -> AddedSlide:
     try:
         content = load_json(path, ADDED_SLIDES_MAX_BYTES)
         values = np.array(content['values'], dtype=np.float64)
-        conditions = SlideConditions.from_mapping(content.get('conditions', {}))
+        conditions = part_of(SlideConditions, content['conditions'], 'conditions')
         added_slide = AddedSlide(str(content['label']), str(content['exploration_id']), values, conditions)
         of = str(content['feature_set'])
         if not np.isfinite(values).all():
             raise ValueError('it holds values that are not finite')
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, InvalidData) as error:
         raise ModelMismatch(
             f"added slide '{path}' cannot be read: {type(error).__name__}: {error}; remove it and add it again"
         ) from error

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -31,59 +30,53 @@ class NextTouch(NamedTuple):
     information: float
 
 
-@dataclass(frozen=True, eq=False)
-class ClassConditionalGaussian:
-    """Class-conditional Gaussians under one motion, on axes that make the shared covariance the identity.
+def log_likelihoods(places: Array, means: Array) -> Array:
+    """Return those of slides under one motion by texture, (..., n_textures), less what all textures share.
+
+    Parameters
+    ----------
+    places : (..., n_axes)
+        Features of slides on axes that make the shared covariance the identity.
+    means : (..., n_textures, n_axes)
+        Of the textures under the motion of each.
+
+    Returns
+    -------
+    (..., n_textures)
+        In nats, up to a constant of each slide.
+    """
+    off = places[..., None, :] - means
+    return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
+
+
+def least_information(means: Array, log_prior: Array) -> float:
+    """Return a lower bound of the information about the texture that one slide gives, in nats.
+
+    From the distances between textures alone: nothing for equal ones, the entropy of the prior for ones far apart.
+
+    Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the Bhattacharyya
+    distance, which of all Chernoff distances bounds best where the covariance is shared.
 
     Parameters
     ----------
     means : (n_textures, n_axes)
+        Of the textures under the motion, on axes that make the shared covariance the identity.
+    log_prior : (n_textures,)
+        What is known before the slide.
 
     Examples
     --------
-    >>> alike, apart = (ClassConditionalGaussian(np.array([[0.0], [distance]])) for distance in (0.0, 100.0))
+    >>> alike, apart = (np.array([[0.0], [distance]]) for distance in (0.0, 100.0))
     >>> prior = np.log([0.5, 0.5])
-    >>> round(alike.least_information(prior), 3), round(apart.least_information(prior), 3)  # nothing, and log 2
+    >>> round(least_information(alike, prior), 3), round(least_information(apart, prior), 3)  # nothing, and log 2
     (0.0, 0.693)
     """
-
-    means: Array
-
-    def log_likelihoods(self, places: Array) -> Array:
-        """Return those of slides (..., n_axes) by texture, (..., n_textures), less what all textures share.
-
-        Parameters
-        ----------
-        places : (..., n_axes)
-            Features of slides on the axes that separate textures.
-
-        Returns
-        -------
-        (..., n_textures)
-            In nats, up to a constant of each slide.
-        """
-        off = places[..., None, :] - self.means
-        return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
-
-    def least_information(self, log_prior: Array) -> float:
-        """Return a lower bound of the information about the texture that one slide gives, in nats.
-
-        From the distances between textures alone: nothing for equal ones, the entropy of the prior for ones far apart.
-
-        Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the
-        Bhattacharyya distance, which of all Chernoff distances bounds best where the covariance is shared.
-
-        Parameters
-        ----------
-        log_prior : (n_textures,)
-            What is known before the slide.
-        """
-        off = self.means[:, None, :] - self.means
-        distance = np.einsum('ijk,ijk->ij', off, off) / 8.0
-        prior = np.exp(log_prior)
-        possible = prior > 0.0
-        near = np.exp(-distance[possible][:, possible]) @ prior[possible]
-        return max(0.0, -float(prior[possible] @ np.log(near)))
+    off = means[:, None, :] - means
+    distance = np.einsum('ijk,ijk->ij', off, off) / 8.0
+    prior = np.exp(log_prior)
+    possible = prior > 0.0
+    near = np.exp(-distance[possible][:, possible]) @ prior[possible]
+    return max(0.0, -float(prior[possible] @ np.log(near)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +127,6 @@ class NextTouchModel:
                 f'means of shape {self.means.shape} do not fit {len(self.motions)} motions and {len(self.textures)} '
                 'textures'
             )
-
-    @cached_property
-    def gaussians(self) -> Mapping[SlideMotion, ClassConditionalGaussian]:
-        """Class-conditional Gaussians of each motion."""
-        return {motion: ClassConditionalGaussian(own) for motion, own in zip(self.motions, self.means, strict=True)}
 
     @classmethod
     def fit(cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion]) -> NextTouchModel:
@@ -233,14 +221,14 @@ class NextTouchModel:
         InvalidData
             If the values have another shape or are not finite.
         """
-        gaussians = self._gaussian(motion)
+        means = self._means(motion)
         values = np.asarray(values, dtype=np.float64)
         if values.shape != self.projection.shape[:1] or not np.isfinite(values).all():
             raise InvalidData(
                 f'features of shape {values.shape} do not tell about a slide; give {len(self.projection)} finite '
                 'values, as the slides that were trained on have'
             )
-        return log_softmax(self._checked(log_prior) + gaussians.log_likelihoods(values @ self.projection))
+        return log_softmax(self._checked(log_prior) + log_likelihoods(values @ self.projection, means))
 
     def information(self, log_posterior: Array, motion: SlideMotion) -> float:
         """Return the information in nats that a slide is expected to give, by its lower bound in closed form.
@@ -257,7 +245,7 @@ class NextTouchModel:
         float
             At least 0, at most the entropy of what is known so far.
         """
-        return self._gaussian(motion).least_information(self._checked(log_posterior))
+        return least_information(self._means(motion), self._checked(log_posterior))
 
     def best_motion(self, log_posterior: Array, motions: Sequence[SlideMotion]) -> NextTouch:
         """Return the motion with the largest expected information gain; of equal ones the shortest.
@@ -298,15 +286,17 @@ class NextTouchModel:
         InvalidData
             If it is not.
         """
-        for motion in self.gaussians:
+        for motion in self.motions:
             if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
                 raise InvalidData(f'what textures look like under {motion} is not finite')
 
-    def _gaussian(self, motion: SlideMotion) -> ClassConditionalGaussian:
-        if motion not in self.gaussians:
-            known = '; '.join(str(other) for other in self.gaussians)
-            raise InvalidParameter(f'{motion} is not in the training set; choose one of: {known}')
-        return self.gaussians[motion]
+    def _means(self, motion: SlideMotion) -> Array:
+        if motion not in self.motions:
+            raise InvalidParameter(
+                f'{motion} is not in the training set; choose one of: {"; ".join(map(str, self.motions))}'
+            )
+        means: Array = self.means[self.motions.index(motion)]
+        return means
 
     def _checked(self, log_prior: Array) -> Array:
         log_prior = np.asarray(log_prior, dtype=np.float64)
@@ -429,14 +419,13 @@ def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
         own, others = parts == part, parts != part
         if own.any() and np.count_nonzero(others) > least:
             projection, means = _fit(values[others], cells[others], n_textures)
-            expected = ClassConditionalGaussian(means[cells[own] // n_textures])  # of each slide, under its motion
-            likelihoods.append(expected.log_likelihoods(values[own] @ projection))
+            likelihoods.append(log_likelihoods(values[own] @ projection, means[cells[own] // n_textures]))
             truths.append(cells[own] % n_textures)
-    log_likelihoods, truth = np.concatenate(likelihoods), np.concatenate(truths)
+    untempered, truth = np.concatenate(likelihoods), np.concatenate(truths)
     if not len(truth):
         return 1.0
 
     def loss(logarithm: float) -> float:
-        return log_loss(log_softmax(math.exp(logarithm) * log_likelihoods), truth)
+        return log_loss(log_softmax(math.exp(logarithm) * untempered), truth)
 
     return math.exp(minimize_scalar(loss, bounds=(math.log(MIN_TEMPER), 0.0), method='bounded').x)

@@ -92,49 +92,6 @@ def limits_of(names: Sequence[str], values: Array) -> dict[str, float]:
     return limits
 
 
-@dataclass(frozen=True, eq=False)
-class Checks:
-    """The checks of a model, on windows one by one.
-
-    Parameters
-    ----------
-    names
-        Of the features.
-    limits
-        As `limits_of` returns them.
-
-    Examples
-    --------
-    >>> checks = Checks(('mean',), {})
-    >>> 'force' in checks.refusal(FeatureVector(0, 'a', 0.5, 0.1, ('mean',), np.zeros(1), force_n=0.01))
-    True
-    """
-
-    names: tuple[str, ...]
-    limits: Mapping[str, float]
-    _columns: dict[str, NDArray[np.intp]] = field(default_factory=dict, repr=False)
-
-    def __post_init__(self) -> None:
-        self._columns.update({feature: checked_columns(self.names, feature) for feature in (STICK_SLIP, LEVEL)})
-
-    def refusal(self, vector: FeatureVector) -> str:
-        """Return why a window cannot be graded; '' if it can."""
-        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and says nothing
-            return f'no contact: the force is {vector.force_n:.2f} N'
-        finite = np.isfinite(vector.values)
-        if not finite.all():
-            bad = vector.names[int(finite.argmin())]
-            return f"its feature '{bad}' is not finite; is the speed known?"
-        if LEVEL in self.limits and self._highest(vector, LEVEL) < self.limits[LEVEL]:
-            return 'no contact: the signal is weaker than on the smoothest training surface'
-        if STICK_SLIP in self.limits and self._highest(vector, STICK_SLIP) > self.limits[STICK_SLIP]:
-            return 'the finger skids: stick-slip dominates the signal'
-        return ''
-
-    def _highest(self, vector: FeatureVector, name: str) -> float:
-        return float(vector.values[self._columns[name]].max())
-
-
 # --------------------
 # Protocol of roughness regressors: parameters that fit graded windows and export a predictor.
 
@@ -203,8 +160,8 @@ class GaussianProcess:
     >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
     >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
     >>> predictor = GaussianProcess.predictor(GaussianProcess().fit(values, grades, textures))
-    >>> isinstance(predictor, GaussianProcessPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    (True, True)
+    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    True
     """
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
@@ -244,38 +201,16 @@ class GaussianProcess:
         return {'mean': mean, 'scale': scale, 'line': slope**2 * weighed @ targets, 'spread': spread, 'noise': noise}
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> GaussianProcessPredictor:
-        """Return the predictor made from the stored parameters."""
-        return GaussianProcessPredictor(**parameters)
+    def predictor(parameters: Mapping[str, Any]) -> RegressorPredictor:
+        """Return what gives the posterior at a window's features: grade, and deviation with noise between textures."""
+        mean, scale, line, spread, noise = (parameters[name] for name in ('mean', 'scale', 'line', 'spread', 'noise'))
 
+        def predict(X: Array) -> tuple[Array, Array]:
+            place = (X - mean) / scale
+            variance = np.add.reduce((place @ spread) * place, axis=-1) + noise**2
+            return np.minimum(np.maximum(MIDDLE + place @ line, SMOOTH), ROUGH), np.sqrt(np.maximum(variance, 0.0))
 
-@dataclass(frozen=True, eq=False)
-class GaussianProcessPredictor:
-    """The posterior at a window's features.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    line : (n_features,)
-        Mean of the slopes, grades.
-    spread : (n_features, n_features)
-        Covariance of the slopes.
-    noise
-        Standard deviation of people's grades of a texture.
-    """
-
-    mean: Array
-    scale: Array
-    line: Array
-    spread: Array
-    noise: float
-
-    def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Return grade, within 1 and 5, and standard deviation, noise between textures included."""
-        place = (X - self.mean) / self.scale
-        variance = np.add.reduce((place @ self.spread) * place, axis=-1) + self.noise**2
-        return np.minimum(np.maximum(MIDDLE + place @ self.line, SMOOTH), ROUGH), np.sqrt(np.maximum(variance, 0.0))
+        return predict
 
 
 # --------------------
@@ -604,13 +539,27 @@ class RoughnessModel(StoredModel):
         return self.recipe.regressor.predictor(self.parameters)
 
     @cached_property
-    def checks(self) -> Checks:
-        """What tells whether a window can be graded."""
-        return Checks(self.names, self.limits)
+    def _columns(self) -> Mapping[str, NDArray[np.intp]]:
+        return {feature: checked_columns(self.names, feature) for feature in (STICK_SLIP, LEVEL)}
 
     @cached_property
-    def _columns(self) -> NDArray[np.intp]:
+    def _graded(self) -> NDArray[np.intp]:
         return graded_columns(self.names)
+
+    def refusal(self, vector: FeatureVector) -> str:
+        """Return why a window cannot be graded; '' if it can."""
+        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and says nothing
+            return f'no contact: the force is {vector.force_n:.2f} N'
+        finite = np.isfinite(vector.values)
+        if not finite.all():
+            bad = vector.names[int(finite.argmin())]
+            return f"its feature '{bad}' is not finite; is the speed known?"
+        highest = {name: float(vector.values[own].max()) for name, own in self._columns.items() if name in self.limits}
+        if LEVEL in highest and highest[LEVEL] < self.limits[LEVEL]:
+            return 'no contact: the signal is weaker than on the smoothest training surface'
+        if STICK_SLIP in highest and highest[STICK_SLIP] > self.limits[STICK_SLIP]:
+            return 'the finger skids: stick-slip dominates the signal'
+        return ''
 
     def grade(self, X: Array) -> tuple[Array, Array]:
         """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features).
@@ -626,7 +575,7 @@ class RoughnessModel(StoredModel):
         (...)
             Standard deviation, grades.
         """
-        return self.predictor(X.take(self._columns, axis=-1))
+        return self.predictor(X.take(self._graded, axis=-1))
 
     @property
     def tree(self) -> dict[str, Any]:
@@ -741,7 +690,7 @@ class RoughnessAccumulator:
                 f"model '{model.name}' does not fit: {fingerprint_difference(vector.feature_set, model.feature_set)}"
             )
             return
-        refusal = model.checks.refusal(vector)
+        refusal = model.refusal(vector)
         if refusal:
             self.unusable += 1
             self._message = f'a window was left out: {refusal}'

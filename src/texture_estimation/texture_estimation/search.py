@@ -37,7 +37,7 @@ from texture_core.config import (
 )
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import Array
-from texture_estimation.evidence_rules import EvidenceRule, MajorityVote, deciding_rows
+from texture_estimation.evidence_rules import EvidenceRule, MajorityVote, followed
 from texture_estimation.learners.learner import Codes, log_softmax
 from texture_estimation.model import replace_file
 from texture_estimation.recipe import Recipe, check_keys
@@ -262,25 +262,11 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
     hop_share
         Distance of the windows over their length: of what overlaps, only the new part counts.
     """
-    _, first, member = np.unique(slides, return_index=True, return_inverse=True)
-    member = member.reshape(-1)
-    if rule.group:
-        kept = np.zeros(len(member), dtype=bool)
-        for number in range(len(first)):
-            rows = np.flatnonzero(member == number)
-            kept[rows[deciding_rows(len(rows), rule.group)]] = True
-        member, scores = member[kept], scores[kept]
-    counts = np.bincount(member)
-    hop_share = min(hop_share, 1.0)
-    order = np.argsort(member, kind='stable')
-    place = np.empty(len(member))
-    place[order] = np.arange(len(member)) - np.repeat(np.cumsum(counts) - counts, counts)
-    weights = rule.window_weights(1.0 + hop_share * place)
-    evidence = weights[:, None] * rule.window_evidence(log_softmax(scores))
-    sums = np.stack([np.bincount(member, weights=column) for column in evidence.T], axis=1)
-    means = sums / np.bincount(member, weights=weights)[:, None]
-    effective_windows = 1.0 + hop_share * (counts[:, None].astype(np.float64) - 1.0)
-    return decisions(rule.log_posterior(means, effective_windows, 1.0)), first
+    evidence = rule.window_evidence(log_softmax(scores))
+    first = np.unique(slides, return_index=True)[1]
+    ends = [followed(rule, evidence[slides == slides[row]], min(hop_share, 1.0)) for row in first]
+    posteriors = [rule.log_posterior(means[-1], counts[-1], 1.0) for means, counts in ends]
+    return decisions(np.stack(posteriors)), first
 
 
 def nearness(grades: Array, true: Array) -> Array:
@@ -367,41 +353,35 @@ KEYS = ('description', 'include', 'variables', 'recipes', 'pairs_of', 'learners'
 PACKAGE, FOLDER = 'texture_estimation', 'config/search'
 
 
-@dataclass(frozen=True)
-class Edit:
-    """One change of a recipe: `path` ('inputs/signal/features/force') is set to a value, used, or dropped.
+Change = tuple[str, tuple[str, ...], Any]  # what is done, where, and with which value
+
+
+def change_recipe(recipe: dict[str, Any], action: str, path: tuple[str, ...], value: Any = None) -> None:
+    """Change a recipe written as mappings and lists: 'set' a value at a path, or 'use' or 'drop' a feature there.
+
+    Raises
+    ------
+    InvalidParameter
+        If the recipe has no such place.
 
     Examples
     --------
     >>> recipe = {'windows': {'length_s': 0.5}}
-    >>> Edit('set', ('windows', 'length_s'), 1.0).apply(recipe)
+    >>> change_recipe(recipe, 'set', ('windows', 'length_s'), 1.0)
     >>> recipe
     {'windows': {'length_s': 1.0}}
     """
-
-    action: str
-    path: tuple[str, ...]
-    value: Any = None
-
-    def apply(self, recipe: dict[str, Any]) -> None:
-        """Change a recipe written as mappings and lists.
-
-        Raises
-        ------
-        InvalidParameter
-            If the recipe has no such place.
-        """
-        place: Any = _place_in(recipe, self.path[:-1], self.path)
-        last = self.path[-1]
-        if self.action == 'set':
-            whole = isinstance(place.get(last), float) and isinstance(self.value, int)
-            place[last] = float(self.value) if whole else self.value
-            return
-        position = next((index for index, entry in enumerate(place) if last in entry), None)
-        if self.action == 'use' and position is None:
-            place.append({last: dict(self.value or {})})
-        elif self.action == 'drop' and position is not None:
-            del place[position]
+    place: Any = _place_in(recipe, path[:-1], path)
+    last = path[-1]
+    if action == 'set':
+        whole = isinstance(place.get(last), float) and isinstance(value, int)
+        place[last] = float(value) if whole else value
+        return
+    position = next((index for index, entry in enumerate(place) if last in entry), None)
+    if action == 'use' and position is None:
+        place.append({last: dict(value or {})})
+    elif action == 'drop' and position is not None:
+        del place[position]
 
 
 def _place_in(content: Any, way: Sequence[str], path: Sequence[str]) -> Any:
@@ -434,11 +414,11 @@ class Axis:
 
     values: tuple[Value, ...]
     path: tuple[str, ...] = ()
-    edits: Mapping[str, tuple[Edit, ...]] | None = None
+    edits: Mapping[str, tuple[Change, ...]] | None = None
 
-    def edits_for(self, value: Value) -> tuple[Edit, ...]:
+    def edits_for(self, value: Value) -> tuple[Change, ...]:
         """Return the changes that a value stands for."""
-        return (Edit('set', self.path, value),) if self.edits is None else self.edits[str(value)]
+        return (('set', self.path, value),) if self.edits is None else self.edits[str(value)]
 
 
 @dataclass(frozen=True)
@@ -479,8 +459,8 @@ class RecipeSpace:
         """Return the recipe that an individual stands for."""
         content = copy.deepcopy(self.base.as_mapping())
         for axis, value in zip(self.axes.values(), individual, strict=True):
-            for edit in axis.edits_for(value):
-                edit.apply(content)
+            for change in axis.edits_for(value):
+                change_recipe(content, *change)
         return self.base.from_mapping(content, self.base.name)
 
     def of_base(self) -> list[int]:
@@ -498,10 +478,10 @@ class RecipeSpace:
         numbers = all(isinstance(one, int | float) for one in (value, *axis.values))
         return int(np.abs(np.array(axis.values) - value).argmin()) if numbers else 0
 
-    def _changes_nothing(self, edits: Sequence[Edit], content: Mapping[str, Any]) -> bool:
+    def _changes_nothing(self, edits: Sequence[Change], content: Mapping[str, Any]) -> bool:
         changed = copy.deepcopy(dict(content))
-        for edit in edits:
-            edit.apply(changed)
+        for change in edits:
+            change_recipe(changed, *change)
         return bool(self.base.from_mapping(changed, '').as_mapping() == content)
 
 
@@ -579,13 +559,13 @@ def _choice(entry: Mapping[str, Any]) -> Axis:
 
 def _use(entry: Mapping[str, Any]) -> Axis:
     path = _path(entry['feature'])
-    return Axis(('no', 'yes'), edits={'no': (Edit('drop', path),), 'yes': (Edit('use', path),)})
+    return Axis(('no', 'yes'), edits={'no': (('drop', path, None),), 'yes': (('use', path, None),)})
 
 
-def _edit(step: Mapping[str, Any]) -> Edit:
+def _edit(step: Mapping[str, Any]) -> Change:
     [(action, path)] = [(key, value) for key, value in step.items() if key != 'to']
     find(dict.fromkeys(('set', 'use', 'drop')), str(action), 'change of a recipe')
-    return Edit(str(action), _path(path), step.get('to'))
+    return str(action), _path(path), step.get('to')
 
 
 def _path(text: Any) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ from texture_estimation.decisions import (
     space_means,
     window_count,
 )
-from texture_estimation.evidence_rules import EvidenceRule, deciding_rows, running_means
+from texture_estimation.evidence_rules import EvidenceRule, followed, running_means
 from texture_estimation.learners.discriminant import FORCE, ForceDiscriminant
 from texture_estimation.learners.learner import (
     Codes,
@@ -388,7 +388,8 @@ def fit_novelty(
             else:
                 continue
             evidence = rule.window_evidence(log_probabilities)
-            means, effective_windows = _follow(rule, evidence, hop_share, trusted)
+            effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share
+            means = running_means(rule, evidence, effective_windows, trusted)
             activations = hidden(values) if hidden else None
             found = slide_scores(
                 distances, values, activations, evidence, means=means, effective_windows=effective_windows
@@ -408,8 +409,8 @@ def _folds(
 ) -> Iterator[tuple[frozenset[int], Predictor | None]]:
     """Yield the slides that are held out together, and what was fitted without them, if the learner keeps it."""
     if fitted.folds:
-        for fold in fitted.folds:
-            yield frozenset(fold.held_out.tolist()), learner.predictor(fold.parameters)
+        for held_out, parameters in fitted.folds:
+            yield frozenset(held_out.tolist()), learner.predictor(parameters)
         return
     split = assign_folds(classes, groups, FOLDS, parts)
     parts = split[0] if split else np.zeros(len(groups), np.intp)
@@ -515,30 +516,13 @@ def held_out_slides(
     """
     if fitted.held_out is None:
         return []
-    window_evidence_rows = rule.window_evidence(fitted.held_out)
+    evidence = rule.window_evidence(fitted.held_out)
     slides = []
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
-        if rule.group:
-            followed = _follow_group(rule, window_evidence_rows[rows], hop_share)
-        else:
-            trusted = 1.0 if fitted.trusted is None else fitted.trusted[rows]
-            followed = _follow(rule, window_evidence_rows[rows], hop_share, trusted)
-        slides.append(HeldOutSlide(int(codes[rows[0]]), *followed))
+        trusted = 1.0 if fitted.trusted is None else fitted.trusted[rows]
+        slides.append(HeldOutSlide(int(codes[rows[0]]), *followed(rule, evidence[rows], hop_share, trusted)))
     return slides
-
-
-def _follow(rule: EvidenceRule, evidence: Array, hop_share: float, trusted: Array | float) -> tuple[Array, Array]:
-    """Return mean log-evidence and effective window count after each window of a slide."""
-    effective_window_counts = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share
-    return running_means(rule, evidence, effective_window_counts, trusted), effective_window_counts
-
-
-def _follow_group(rule: EvidenceRule, evidence: Array, hop_share: float) -> tuple[Array, Array]:
-    """Return the same for a rule by which only some of the windows decide."""
-    parts = [deciding_rows(number, rule.group) for number in range(1, len(evidence) + 1)]
-    deciding = np.array([len(evidence[part]) for part in parts], dtype=np.float64)
-    return np.stack([evidence[part].mean(axis=0) for part in parts]), 1.0 + (deciding - 1.0) * hop_share
 
 
 def fit_tempering_exponent(slides: Sequence[HeldOutSlide], rule: EvidenceRule) -> float:

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 
 import numpy as np
@@ -217,14 +216,4 @@ def test_the_level_of_a_channel_is_the_geometric_mean_of_the_rms_of_its_windows(
         running.update(window(names=names, values=np.array([7.0, log_power, log_power + 2.0 * math.log(10.0)])))
     first, second = running.get().levels
     assert first == ('signal/a', pytest.approx(2.0), pytest.approx(1.0), pytest.approx(2.0))
-    assert (second.channel, second.rms) == ('signal/b', pytest.approx(20.0))
-
-
-def test_conditions_survive_a_file() -> None:
-    running = RunningConditions()
-    names = ('signal/moments/signal_log_power/a',)
-    running.update(window(names=names, values=np.zeros(1), speed_m_s=0.05, motion='circular', direction_rad=0.5))
-    stored = json.loads(json.dumps(dataclasses.asdict(running.get())))
-    found = SlideConditions.from_mapping(stored)
-    assert repr(found) == repr(running.get())  # NaN is not equal to itself
-    assert repr(SlideConditions.from_mapping({})) == repr(SlideConditions())
+    assert second[:2] == ('signal/b', pytest.approx(20.0))

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations, groupby
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -554,29 +554,9 @@ LOG_POWER = '/moments/signal_log_power/'
 LOAD = '/load_level'  # ends the name of the feature that tells the level of a whole array
 
 
-class SignalLevel(NamedTuple):
-    """Level of one channel over a slide: geometric mean of the root mean square of its windows.
-
-    Parameters
-    ----------
-    channel
-        Topic and channel, such as 'signal/dynamic'.
-    rms
-        Mean over all windows, in the unit of the signal.
-    lowest, highest
-        Of the means over the first windows, however many.
-
-    Examples
-    --------
-    >>> level = SignalLevel('signal/dynamic', rms=12.0, lowest=11.5, highest=13.0)
-    >>> level.lowest <= level.rms <= level.highest
-    True
-    """
-
-    channel: str
-    rms: float
-    lowest: float
-    highest: float
+# Of a channel, such as 'signal/dynamic', over a slide: geometric mean of the root mean square of its windows, in the
+# unit of the signal, and the lowest and highest of the means over the first windows, however many.
+SignalLevel = tuple[str, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -616,29 +596,6 @@ class SlideConditions:
     levels: tuple[SignalLevel, ...] = ()
     session: str = ''
     place: str = ''
-
-    @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> SlideConditions:
-        """Return the conditions that `dataclasses.asdict` has written as JSON; what is missing is unknown.
-
-        Raises
-        ------
-        KeyError, TypeError, ValueError
-            If a value cannot be one.
-        """
-        known = cls()
-        return cls(
-            motion=str(values.get('motion', '')),
-            sensor=str(values.get('sensor', '')),
-            speed_m_s=float(values.get('speed_m_s', known.speed_m_s)),
-            force_n=float(values.get('force_n', known.force_n)),
-            directions_rad=tuple(map(float, values.get('directions_rad', ()))),
-            speed_range_m_s=_pair(values.get('speed_range_m_s', UNKNOWN)),
-            force_range_n=_pair(values.get('force_range_n', UNKNOWN)),
-            levels=tuple(_level(*level) for level in values.get('levels', ())),
-            session=str(values.get('session', '')),
-            place=str(values.get('place', '')),
-        )
 
 
 class RunningConditions:
@@ -686,7 +643,10 @@ class RunningConditions:
     @property
     def levels(self) -> Sequence[SignalLevel]:
         """Levels of the channels so far."""
-        return [_signal_level(channel, log_power) for channel, _, log_power in self._levels or ()]
+        return [
+            (channel, _rms(power.value), _rms(power.range[0]), _rms(power.range[1]))
+            for channel, _, power in self._levels or ()
+        ]
 
     def get(self) -> SlideConditions:
         """Return the conditions of the windows so far."""
@@ -702,13 +662,8 @@ class RunningConditions:
         )
 
 
-def _level(channel: Any, rms: Any, *interval: Any) -> SignalLevel:
-    return SignalLevel(str(channel), float(rms), *_pair(interval))
-
-
-def _pair(values: Sequence[Any]) -> Interval:
-    low, high = values
-    return float(low), float(high)
+def _rms(log_power: float) -> float:
+    return math.exp(0.5 * log_power)
 
 
 def _log_powers(names: Sequence[str]) -> list[tuple[str, int]]:
@@ -718,10 +673,6 @@ def _log_powers(names: Sequence[str]) -> list[tuple[str, int]]:
         for place, name in enumerate(names)
         if LOG_POWER in name or name.endswith(LOAD)
     ]
-
-
-def _signal_level(channel: str, log_power: RunningMean) -> SignalLevel:
-    return SignalLevel(channel, *(math.exp(0.5 * value) for value in (log_power.value, *log_power.range)))
 
 
 # --------------------

@@ -507,7 +507,8 @@ class SampleBuffer:
 class BufferedStream:
     """The runs of one topic: a new one begins when the numbering restarts or the rate or channels change.
 
-    One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are.
+    One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are. It also holds what a cutter waits
+    for: `due`, the index before whose arrival nothing can happen, and where slides begin in the buffers, `anchors`.
 
     Examples
     --------
@@ -523,6 +524,10 @@ class BufferedStream:
         self.buffers: deque[SampleBuffer] = deque(maxlen=self.MAX_BUFFERS)
         self.lost_samples = 0
         self.restarts = 0
+        self.due = -math.inf
+        self.received = False
+        self.received_s = math.nan
+        self.anchors: dict[SampleBuffer, tuple[int, int]] = {}
         self._keep_s = keep_s
 
     def add(self, signal: TactileSignal) -> bool:
@@ -819,17 +824,6 @@ class _Missing(enum.Enum):
     LOST = enum.auto()  # samples that were lost or are not finite
 
 
-@dataclass
-class _Input:
-    """A stream and what the cutter waits for in it."""
-
-    stream: BufferedStream
-    due: float = -math.inf  # index before whose arrival nothing can happen
-    received: bool = False
-    received_s: float = math.nan
-    anchors: dict[SampleBuffer, tuple[int, int]] = field(default_factory=dict)
-
-
 class WindowCutter:
     """Turn signal batches and exploration states into windows, in whatever order they arrive.
 
@@ -867,7 +861,7 @@ class WindowCutter:
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
         self._params = params
-        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in dict.fromkeys(map(topic_of, inputs))}
+        self._inputs = {topic: BufferedStream(keep_s) for topic in dict.fromkeys(map(topic_of, inputs))}
         self._joiner = AxisJoiner(inputs)
         self._unpaired = 0
         self._slides: deque[SlideCoverage] = deque()
@@ -882,7 +876,7 @@ class WindowCutter:
         source = self._inputs.get(topic)
         if source is None or not len(signal.samples):
             return
-        restarted = source.stream.add(signal)
+        restarted = source.add(signal)
         source.received = True
         if restarted or signal.next_sample >= source.due:
             self._ready = True
@@ -933,14 +927,14 @@ class WindowCutter:
     @property
     def waiting_for(self) -> tuple[str, ...]:
         """Inputs of which nothing has come yet."""
-        return tuple(topic for topic, source in self._inputs.items() if not source.stream.buffers)
+        return tuple(topic for topic, source in self._inputs.items() if not source.buffers)
 
     def dropped(self, now_s: float) -> tuple[str, ...]:
         """Return the inputs that came once and are silent while another still comes, by the clock of `time_out`."""
         ages_s = {
             topic: 0.0 if source.received else now_s - source.received_s
             for topic, source in self._inputs.items()
-            if source.stream.buffers
+            if source.buffers
         }
         fresh = any(age_s < DROPPED_S for age_s in ages_s.values())
         return tuple(topic for topic, age_s in ages_s.items() if fresh and age_s >= DROPPED_S)
@@ -948,7 +942,7 @@ class WindowCutter:
     @property
     def counts(self) -> dict[str, int]:
         """Running totals: windows cut, skipped, without a partner; lost samples, restarts, states out of order."""
-        streams = [source.stream for source in self._inputs.values()]
+        streams = self._inputs.values()
         return {
             'windows': self._windows,
             'skipped': self._skipped,
@@ -988,11 +982,11 @@ class WindowCutter:
             windows[topic] = found
         return windows
 
-    def _find_in(self, source: _Input, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
+    def _find_in(self, source: BufferedStream, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
         """Look for a window in the runs of a stream; only the newest can still grow."""
         source.due = -math.inf
         state, lost = _Missing.LATE, ALL
-        for buffer in source.stream.buffers:
+        for buffer in source.buffers:
             anchor = source.anchors.get(buffer) or buffer.anchor(slide.start_ns)
             if anchor is None:
                 state, source.due = _Missing.LATE, -math.inf

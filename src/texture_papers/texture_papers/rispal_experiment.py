@@ -584,7 +584,7 @@ def _skids(simulated: SimulatedTextures, model: RoughnessModel, textures: Sequen
         vectors = model.recipe.feature_set.extract_many(
             event for texture in textures for event in one.events(texture, one.scans, SPEED_M_S, FORCE_N)
         )
-        refused = np.array([bool(model.checks.refusal(vector)) for vector in vectors])
+        refused = np.array([bool(model.refusal(vector)) for vector in vectors])
         errors = np.abs(answers.grades - answers.true)
         said[name] = {
             'refused': float(refused.mean()),

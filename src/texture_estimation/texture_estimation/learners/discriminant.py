@@ -111,31 +111,6 @@ def _sums(X: Array, y: Codes, weights: Array, n_labels: int) -> Array:
 # The discriminant as a learner: Gaussian classes of one covariance, calibrated on what was held out.
 
 
-@dataclass(frozen=True, eq=False)
-class DiscriminantPredictor:
-    """One linear layer.
-
-    Parameters
-    ----------
-    weights : (n_features, n_labels)
-    offsets : (n_labels,)
-
-    Examples
-    --------
-    >>> DiscriminantPredictor(np.array([[1.0, -1.0]]), np.zeros(2))(np.array([2.0])).tolist()
-    [2.0, -2.0]
-    """
-
-    weights: Array
-    offsets: Array
-
-    def __call__(self, X: Array) -> Array:
-        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores: Array = X @ self.weights
-        scores += self.offsets
-        return scores
-
-
 @dataclass(frozen=True)
 class Discriminant:
     """Gaussian classes with one covariance, which is shrunk towards its diagonal; one temperature from held-out slides.
@@ -202,10 +177,9 @@ class Discriminant:
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        return DiscriminantPredictor(
-            np.asarray(parameters['weights'], dtype=np.float64, order='F'),
-            np.asarray(parameters['offsets'], dtype=np.float64),
-        )
+        weights = np.asarray(parameters['weights'], dtype=np.float64, order='F')
+        offsets = np.asarray(parameters['offsets'], dtype=np.float64)
+        return lambda X: X @ weights + offsets
 
     def _fit(self, X: Array, y: Codes, _: Codes, n_labels: int) -> dict[str, Array]:
         weights, offsets = linear_discriminant(X, y, n_labels, self.shrinkage)
@@ -222,39 +196,32 @@ FURTHEST = 30.0  # times the reach: a slide made wholly outside still has a labe
 OUTERMOST = 0.05  # of the windows lie below the trained range, and as many above it
 
 
-@dataclass(frozen=True, eq=False)
 class ForceDiscriminantPredictor:
     """The layer of the nearest force; what lies outside the trained forces counts less.
 
     Parameters
     ----------
-    weights : (n_ranges, n_features, n_labels)
-    offsets : (n_ranges, n_labels)
-    log_forces : (n_ranges,)
-        Middle of each range, logarithm of N.
-    trained : (2,)
-        Lowest and highest trained force, logarithms.
-    reach
-        Difference of the logarithms beyond these by which a window counts 1 / e.
-    column
-        Number of the feature that is the force; UNBOUND if none is.
+    parameters
+        As `ForceDiscriminant` fits them: weights (n_ranges, n_features, n_labels) and offsets (n_ranges, n_labels);
+        log_forces (n_ranges,), the middle of each range, logarithm of N; trained (2,), the lowest and highest force;
+        reach, the difference of logarithms beyond these by which a window counts 1 / e; column, the number of the
+        feature that is the force, UNBOUND if none is.
 
     Examples
     --------
     >>> layers = np.array([[[1.0, -1.0], [0.0, 0.0]], [[-1.0, 1.0], [0.0, 0.0]]])  # what 1 N and 10 N say
-    >>> log_forces = np.log([1.0, 10.0])
-    >>> predictor = ForceDiscriminantPredictor(layers, np.zeros((2, 2)), log_forces, log_forces, 0.1, column=1)
+    >>> forces = {'log_forces': np.log([1.0, 10.0]), 'trained': np.log([1.0, 10.0]), 'reach': 0.1, 'column': 1}
+    >>> predictor = ForceDiscriminantPredictor({'weights': layers, 'offsets': np.zeros((2, 2)), **forces})
     >>> windows = np.array([[2.0, 1.0], [2.0, 9.0], [2.0, 20.0]])
     >>> predictor(windows).tolist(), predictor.trust(windows).round(3).tolist()
     ([[2.0, -2.0], [-2.0, 2.0], [-2.0, 2.0]], [1.0, 1.0, 0.001])
     """
 
-    weights: Array
-    offsets: Array
-    log_forces: Array
-    trained: Array
-    reach: float
-    column: int
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        self.weights, self.offsets, self.log_forces, self.trained = (
+            np.asarray(parameters[name], dtype=np.float64) for name in ('weights', 'offsets', 'log_forces', 'trained')
+        )
+        self.reach, self.column = float(parameters['reach']), int(parameters['column'])
 
     def __call__(self, X: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
@@ -341,14 +308,7 @@ class ForceDiscriminant(Discriminant):
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        return ForceDiscriminantPredictor(
-            weights=np.asarray(parameters['weights'], dtype=np.float64),
-            offsets=np.asarray(parameters['offsets'], dtype=np.float64),
-            log_forces=np.asarray(parameters['log_forces'], dtype=np.float64),
-            trained=np.asarray(parameters['trained'], dtype=np.float64),
-            reach=float(parameters['reach']),
-            column=int(parameters['column']),
-        )
+        return ForceDiscriminantPredictor(parameters)
 
     def _fit(self, X: Array, y: Codes, groups: Codes, n_labels: int) -> dict[str, Array]:
         forces = _log_force(X, self.column)

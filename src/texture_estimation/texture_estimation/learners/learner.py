@@ -44,29 +44,6 @@ def trust(predictor: Predictor, X: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class FoldFit:
-    """What a learner has fitted without some slides.
-
-    Parameters
-    ----------
-    held_out
-        Numbers of the slides that it has not seen.
-    parameters
-        As in the model file, calibrated like the final ones.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> fold = FoldFit(held_out=np.array([3]), parameters={'mean': 0.0})  # fitted without slide 3
-    >>> fold.held_out.tolist()
-    [3]
-    """
-
-    held_out: Codes
-    parameters: Mapping[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
 class Fitted:
     """Fitted parameters of a learner.
 
@@ -79,7 +56,8 @@ class Fitted:
     note
         How the probabilities were calibrated, in words for the model's card.
     folds
-        What the learner has fitted without each part of the slides; () if it does not say.
+        Of each part of the slides their numbers, and the parameters fitted without them, calibrated like the final
+        ones; () if the learner does not say.
     trusted : (n,) or None
         How much each example counts in its slide, by the learner that has not seen it; all the same if None.
 
@@ -93,7 +71,7 @@ class Fitted:
     parameters: Mapping[str, Any]
     held_out: Array | None
     note: str
-    folds: Sequence[FoldFit] = ()
+    folds: Sequence[tuple[Codes, Mapping[str, Any]]] = ()
     trusted: Array | None = None
 
 
@@ -291,8 +269,8 @@ def fit_in_folds(
     fits = []
     for part in np.unique(folds_of):
         held = folds_of == part
-        fits.append(FoldFit(np.unique(groups[held]), fit(held)))
-        fitted = predictor(fits[-1].parameters)
+        fits.append((np.unique(groups[held]), fit(held)))
+        fitted = predictor(fits[-1][1])
         scores[held] = fitted(X[held])
         if hasattr(fitted, 'trust'):
             trusted = np.ones(len(y)) if trusted is None else trusted
@@ -304,7 +282,7 @@ def fit_in_folds(
 
     for rows in chunks(*scores.shape):
         scores[rows] = log_softmax(scores[rows] / temperature)
-    fits = [FoldFit(fold.held_out, calibrated(fold.parameters)) for fold in fits]
+    fits = [(held_out, calibrated(parameters)) for held_out, parameters in fits]
     return Fitted(calibrated(fit(nothing)), scores, note, fits, trusted)
 
 

@@ -171,33 +171,33 @@ class _Rows:
 # Predict with a fitted multi-layer perceptron.
 
 
-@dataclass(frozen=True, eq=False)
 class MlpPredictor:
     """The two layers, made for features as they come.
 
     Parameters
     ----------
-    hidden : (n_features, n_hidden)
-    hidden_offset : (n_hidden,)
-    output : (n_hidden, n_labels)
-    output_offset : (n_labels,)
+    parameters
+        `hidden` (n_features, n_hidden), `hidden_offset` (n_hidden,), `output` (n_hidden, n_labels) and `output_offset`
+        (n_labels,), as `Mlp` fits them.
 
     Examples
     --------
-    >>> predictor = MlpPredictor(np.eye(2), np.zeros(2), np.eye(2), np.zeros(2))
-    >>> predictor(np.array([3.0, -1.0])).tolist()
+    >>> layer = {'hidden': np.eye(2), 'hidden_offset': np.zeros(2), 'output': np.eye(2), 'output_offset': np.zeros(2)}
+    >>> MlpPredictor(layer)(np.array([3.0, -1.0])).tolist()
     [3.0, 0.0]
     """
 
-    hidden: Array
-    hidden_offset: Array
-    output: Array
-    output_offset: Array
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        # Column by column a product with one window is a quarter faster.
+        self._hidden, self._hidden_offset, self._output, self._output_offset = (
+            np.asarray(parameters[name], dtype=np.float64, order='F')
+            for name in ('hidden', 'hidden_offset', 'output', 'output_offset')
+        )
 
     def activations(self, X: Array) -> Array:
         """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
-        active: Array = X @ self.hidden
-        active += self.hidden_offset
+        active: Array = X @ self._hidden
+        active += self._hidden_offset
         np.maximum(active, 0.0, out=active)
         return active
 
@@ -216,8 +216,8 @@ class MlpPredictor:
         -------
         (..., n_labels)
         """
-        scores: Array = activations @ self.output
-        scores += self.output_offset
+        scores: Array = activations @ self._output
+        scores += self._output_offset
         return scores
 
 
@@ -335,9 +335,7 @@ class Mlp:
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> MlpPredictor:
         """Return the predictor made from the stored parameters."""
-        # Column by column a product with one window is a quarter faster.
-        names = MlpPredictor.__dataclass_fields__
-        return MlpPredictor(*(np.asarray(parameters[name], dtype=np.float64, order='F') for name in names))
+        return MlpPredictor(parameters)
 
     def _fit(
         self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
@@ -492,34 +490,34 @@ class MlpTraining:
 # Predict with a fitted multi-layer perceptron and a linear discriminant for first windows.
 
 
-@dataclass(frozen=True, eq=False)
 class OnsetMlpPredictor(MlpPredictor):
     """The layers of the network, and one that is added to its scores for first windows.
 
     Parameters
     ----------
-    onset : (n_features, n_labels)
-    onset_offset : (n_labels,)
-    column
-        Number of the feature that is 1 for first windows.
+    parameters
+        Those of the network; `onset` (n_features, n_labels) and `onset_offset` (n_labels,); and `onset_column`, the
+        number of the feature that is 1 for first windows.
 
     Examples
     --------
-    >>> import numpy as np
-    >>> predictor = OnsetMlpPredictor(np.eye(2), np.zeros(2), np.eye(2), np.zeros(2), np.eye(2), np.ones(2), column=1)
+    >>> layer = {'hidden': np.eye(2), 'hidden_offset': np.zeros(2), 'output': np.eye(2), 'output_offset': np.zeros(2)}
+    >>> predictor = OnsetMlpPredictor({**layer, 'onset': np.eye(2), 'onset_offset': np.ones(2), 'onset_column': 1})
     >>> predictor(np.array([[3.0, 0.0], [3.0, 1.0]])).tolist()
     [[3.0, 0.0], [7.0, 3.0]]
     """
 
-    onset: Array
-    onset_offset: Array
-    column: int
+    def __init__(self, parameters: Mapping[str, Any]) -> None:
+        super().__init__(parameters)
+        self._onset = np.asarray(parameters['onset'], dtype=np.float64, order='F')
+        self._onset_offset = np.asarray(parameters['onset_offset'], dtype=np.float64)
+        self._column = int(parameters['onset_column'])
 
     def __call__(self, X: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores, first = super().__call__(X), X[..., self.column, None]
+        scores, first = super().__call__(X), X[..., self._column, None]
         if first.any():
-            scores += first * (X @ self.onset + self.onset_offset)
+            scores += first * (X @ self._onset + self._onset_offset)
         return scores
 
 
@@ -574,16 +572,7 @@ class OnsetMlp(Mlp):
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> OnsetMlpPredictor:
         """Return the predictor made from the stored parameters."""
-        network = Mlp.predictor(parameters)
-        return OnsetMlpPredictor(
-            network.hidden,
-            network.hidden_offset,
-            network.output,
-            network.output_offset,
-            np.asarray(parameters['onset'], dtype=np.float64, order='F'),
-            np.asarray(parameters['onset_offset'], dtype=np.float64),
-            int(parameters['onset_column']),
-        )
+        return OnsetMlpPredictor(parameters)
 
     def _fit(
         self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0

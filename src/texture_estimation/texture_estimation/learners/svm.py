@@ -17,6 +17,7 @@ from texture_estimation.learners.learner import (
     UNCALIBRATED,
     Codes,
     Fitted,
+    Predictor,
     assign_folds,
     fit_temperature,
     group_means,
@@ -276,18 +277,6 @@ class RbfMachines:
         return np.exp(exponents, out=exponents)
 
 
-@dataclass(frozen=True, eq=False)
-class SvmPredictor:
-    """Machines of all pairs, and what makes probabilities of their decisions."""
-
-    machines: RbfMachines
-    coupling: PairCoupling
-
-    def __call__(self, X: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        return self.coupling(self.machines(X))
-
-
 # --------------------
 # Within-class whitening: shrink the directions in which slides of one texture differ among themselves.
 
@@ -440,9 +429,10 @@ class SvmRbf:
         return Fitted({'machines': asdict(machines), 'coupling': asdict(coupling)}, held_out, note)
 
     @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> SvmPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        return SvmPredictor(RbfMachines(**parameters['machines']), PairCoupling(**parameters['coupling']))
+        machines, coupling = RbfMachines(**parameters['machines']), PairCoupling(**parameters['coupling'])
+        return lambda X: coupling(machines(X))
 
     def _fit(self, X: Array, y: Codes, groups: Codes, differences: Array | None) -> RbfMachines:
         projection = within_class_whitening(X, y, groups, self.whitening, differences) if self.whitening else None
