@@ -26,7 +26,6 @@ from texture_core.config import (
     from_mapping,
     load_card,
     load_yaml,
-    markdown_table,
     open_regular,
     param,
     parameters_of,
@@ -160,8 +159,13 @@ def test_a_bad_value_is_refused_with_what_is_allowed(values: object, sentence: s
     assert str(refusal.value).startswith('recipe x: ')
 
 
-def test_the_table_names_default_unit_and_range() -> None:
-    assert '| `length_s` | `0.5` s | 0.01 to 10.0 s | Length of one window. |' in markdown_table(Params)
+def test_parameters_know_default_unit_and_range() -> None:
+    length_s, *_ = parameters_of(Params)
+    assert (length_s.default, length_s.range_text, length_s.description) == (
+        0.5,
+        '0.01 to 10.0 s',
+        'Length of one window.',
+    )
 
 
 LAUGHS = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(

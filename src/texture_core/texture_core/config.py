@@ -767,16 +767,6 @@ def _checked(parameter: Parameter, value: Any, where: str) -> Any:
         raise InvalidParameter(f'{where}: {error}' if where else str(error)) from error
 
 
-def markdown_table(cls: type) -> str:
-    """Return the parameters of a dataclass as a Markdown table for a README."""
-    rows = ['| parameter | default | range | meaning |', '|---|---|---|---|']
-    for item in parameters_of(cls):
-        unit = f' {item.unit}' if item.unit else ''
-        default = f'`{item.default!r}`{unit}'
-        rows.append(f'| `{item.name}` | {default} | {item.range_text or "any"} | {item.description} |')
-    return '\n'.join(rows) + '\n'
-
-
 # --------------------
 # Read a tree of parameter dataclasses from a mapping (a YAML file): fields that are dataclasses are its sections.
 

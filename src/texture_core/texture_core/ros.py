@@ -14,8 +14,8 @@ import threading
 import time
 import typing
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
-from typing import Any, NamedTuple, TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 import rclpy
@@ -44,23 +44,14 @@ from std_msgs.msg import Header
 from texture_msgs import msg
 
 from texture_core.config import Parameter, from_mapping, parameters_of, unknown_name
-from texture_core.errors import InvalidData, InvalidParameter, TextureError
+from texture_core.errors import InvalidParameter, TextureError
 from texture_core.types import (
-    DURATIONS,
+    DATA_CLASSES,
     NANOSECONDS,
-    POSITION,
     QUALITIES,
     AnyArray,
     Array,
-    ExplorationRequest,
-    ExplorationState,
-    FeatureVector,
-    ModelInfo,
-    Phase,
-    Rejection,
-    RoughnessEstimate,
-    TactileSignal,
-    TextureEstimate,
+    MessageCodec,
 )
 
 # --------------------
@@ -457,86 +448,7 @@ def to_stamp(time_ns: int) -> Time:
 
 
 # --------------------
-# Data classes of texture_core to messages and back: field by field of the same name, the time in the header.
-
-MESSAGES: Mapping[type, type] = {
-    ExplorationRequest: msg.ExplorationRequest,
-    ExplorationState: msg.ExplorationState,
-    FeatureVector: msg.FeatureVector,
-    TextureEstimate: msg.TextureEstimate,
-    RoughnessEstimate: msg.RoughnessEstimate,
-    ModelInfo: msg.ModelInfo,
-    TactileSignal: msg.TactileSignal,
-}
-DATA_CLASSES = {message: cls for cls, message in MESSAGES.items()}
-STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
-Convert = Callable[[Any], Any] | None  # None: the same on both sides
-
-
-def to_msg(value: Any) -> Any:
-    """Return the message of a data class of texture_core.
-
-    Raises
-    ------
-    InvalidData
-        If a time in s is more than the message can hold.
-    """
-    plan = _plan(type(value))
-    values = {there: wire(getattr(value, here)) if wire else getattr(value, here) for here, there, wire, _ in plan.rest}
-    if plan.stamp:
-        values['header'] = Header(stamp=to_stamp(getattr(value, plan.stamp)), frame_id=value.frame_id)
-    if plan.position:
-        values['position'] = Point(**{name[0]: float(getattr(value, name)) for name in POSITION})
-    return MESSAGES[type(value)](**values)
-
-
-def from_msg(message: Any) -> Any:
-    """Return the data class of a message of texture_msgs.
-
-    Raises
-    ------
-    InvalidData
-        If the message contradicts itself.
-    """
-    cls = DATA_CLASSES[type(message)]
-    plan = _plan(cls)
-    values = {
-        here: back(getattr(message, there)) if back else getattr(message, there) for here, there, _, back in plan.rest
-    }
-    if plan.stamp:
-        values[plan.stamp], values['frame_id'] = to_ns(message.header.stamp), message.header.frame_id
-    if plan.position:
-        values.update({name: getattr(message.position, name[0]) for name in POSITION})
-    if cls is TactileSignal:
-        values['samples'] = _samples(message)
-    return cls(**values)
-
-
-def _samples(message: msg.TactileSignal) -> NDArray[np.float32]:
-    """Return the samples of a signal, (n_samples, n_channels)."""
-    flat, channels = np.array(message.samples, dtype=np.float32), len(message.channels)
-    if not channels or len(flat) % channels:
-        raise InvalidData(
-            f"signal message of '{message.sensor}' has {len(flat)} samples for {channels} channels; "
-            'a multiple of the number of channels is needed'
-        )
-    return flat.reshape(-1, channels)
-
-
-def _phase(code: int) -> Phase:
-    phases = tuple(Phase)
-    if code >= len(phases):
-        allowed = ', '.join(f'{phase.code} ({phase.value})' for phase in phases)
-        raise InvalidData(f'exploration state has the phase {code}; allowed are {allowed}')
-    return phases[code]
-
-
-def _rejection(code: int) -> Rejection:
-    try:
-        return Rejection(code)
-    except ValueError as error:
-        allowed = ', '.join(f'{known.value} ({known.name.lower()})' for known in Rejection)
-        raise InvalidData(f'a texture estimate has the rejection {code}; allowed are {allowed}') from error
+# Data classes of texture_core to messages of rclpy and back, see `MessageCodec`.
 
 
 def _numbers(code: str, values: AnyArray) -> array.array[float]:
@@ -544,48 +456,32 @@ def _numbers(code: str, values: AnyArray) -> array.array[float]:
     return array.array(code, np.ascontiguousarray(values, dtype=code).tobytes())
 
 
-def _duration(seconds: float) -> DurationMessage:
-    if not abs(seconds) < MAX_DURATION_S:
-        raise InvalidData(f'a time is {seconds:g} s; less than {MAX_DURATION_S:g} s is allowed')
-    stamp = to_stamp(round(seconds * NANOSECONDS))
-    return DurationMessage(sec=stamp.sec, nanosec=stamp.nanosec)
-
-
-MAX_DURATION_S = 2.0**31
-# By the type of a field: to the message, and back.
-CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
-    float: (float, None),
-    tuple[str, ...]: (list, tuple),
-    tuple[float, ...]: (partial(array.array, 'd'), tuple),
-    Array: (partial(_numbers, 'd'), partial(np.array, dtype=np.float64)),
-    NDArray[np.float32]: (partial(_numbers, 'f'), None),
-    Phase: (lambda phase: phase.code, _phase),
-    Rejection: (int, _rejection),
+OF_MESSAGES = {getattr(msg, cls.__name__): cls for cls in DATA_CLASSES}
+KINDS = {
+    'std_msgs/msg/Header': Header,
+    'builtin_interfaces/msg/Time': Time,
+    'builtin_interfaces/msg/Duration': DurationMessage,
+    'geometry_msgs/msg/Point': Point,
+    **{f'texture_msgs/msg/{kind.__name__}': kind for kind in OF_MESSAGES},
 }
-DURATION = (_duration, lambda duration: to_ns(duration) / NANOSECONDS)
+CODEC = MessageCodec(
+    KINDS.__getitem__,
+    {
+        tuple[float, ...]: (partial(array.array, 'd'), tuple),
+        Array: (partial(_numbers, 'd'), partial(np.array, dtype=np.float64)),
+        NDArray[np.float32]: (partial(_numbers, 'f'), partial(np.array, dtype=np.float32)),
+    },
+)
 
 
-class _Plan(NamedTuple):
-    """How a data class and its message belong together."""
-
-    stamp: str  # the field that is the time in the header; '' without a header
-    position: bool  # whether coordinates are a point
-    rest: tuple[tuple[str, str, Convert, Convert], ...]  # names here and there, and what becomes of the value
+def to_msg(value: Any) -> Any:
+    """Return the message of a data class of texture_core; InvalidData if a time in s is more than it can hold."""
+    return CODEC.to_message(value)
 
 
-@cache
-def _plan(cls: type) -> _Plan:
-    types = typing.get_type_hints(cls)
-    stamp = next((name for name in STAMPS if types.pop(name, None)), '')
-    types.pop('frame_id', None)  # in the header, too
-    position = POSITION[0] in types
-    for name in POSITION:
-        types.pop(name, None)
-    rest = (
-        (name, DURATIONS.get(name, name), *(DURATION if name in DURATIONS else CONVERT.get(kind, (None, None))))
-        for name, kind in types.items()
-    )
-    return _Plan(stamp, position, tuple(rest))
+def from_msg(message: Any) -> Any:
+    """Return the data class of a message of texture_msgs; InvalidData if the message contradicts itself."""
+    return CODEC.from_message(message, OF_MESSAGES[type(message)])
 
 
 # --------------------

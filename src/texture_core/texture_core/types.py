@@ -12,12 +12,12 @@ import math
 import os
 import select
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +50,6 @@ QUALITIES: Mapping[str, Quality] = {
     # A node that starts late learns at once what is going on.
     'exploration': Quality(100, reliable=True, latched=True),
 }
-
-
-# Fields of the data classes below that messages hold in standard types: times in s as a builtin_interfaces/Duration,
-# and coordinates as the geometry_msgs/Point `position`.
-DURATIONS: Mapping[str, str] = {'steady_s': 'steady', 'timeout_s': 'timeout', 'duration_s': 'duration'}
-POSITION = ('x_m', 'y_m', 'z_m')
 
 # --------------------
 # Names for array types; the shape stands in the docstring of each function.
@@ -459,6 +453,126 @@ class ExplorationRequest:
             )
         if not 0.0 <= self.timeout_s < math.inf:
             raise InvalidData(f'timeout_s is {self.timeout_s}; 0, for none, or a positive number of seconds is needed')
+
+
+# --------------------
+# Data classes to messages and back, whoever made the classes of the messages: rclpy, or rosbags without ROS.
+
+DATA_CLASSES = (
+    TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate, ModelInfo, ExplorationRequest,
+)  # fmt: skip
+STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
+# Fields that messages hold in standard types: times in s as a builtin_interfaces/Duration, and coordinates as the
+# geometry_msgs/Point `position`.
+DURATIONS: Mapping[str, str] = {'steady_s': 'steady', 'timeout_s': 'timeout', 'duration_s': 'duration'}
+POSITION = ('x_m', 'y_m', 'z_m')
+MAX_DURATION_S = 2.0**31
+Convert = Callable[[Any], Any] | None  # None: the same on both sides
+
+
+class MessageCodec:
+    """Turn data classes into messages and back: field by field of the same name, the time in the header.
+
+    Parameters
+    ----------
+    kind
+        Returns the class of a message by its name, such as 'std_msgs/msg/Header'.
+    convert
+        By the type of a field that is not the same on both sides: to the message, and back.
+    """
+
+    def __init__(self, kind: Callable[[str], Any], convert: Mapping[Any, tuple[Convert, Convert]]) -> None:
+        self._kind = kind
+        self._convert = {
+            float: (float, None),
+            tuple[str, ...]: (list, tuple),
+            Phase: (lambda phase: phase.code, _phase),
+            Rejection: (int, _rejection),
+            **convert,
+        }
+        # By class: its field that is the time in the header, whether it has a position, and of each other field the
+        # names here and there, and what becomes of the value.
+        self._plans: dict[type, tuple[str, bool, list[tuple[str, str, Convert, Convert]]]] = {}
+
+    def to_message(self, value: Any) -> Any:
+        """Return the message of a data class; InvalidData if a time in s is more than the message can hold."""
+        cls = type(value)
+        stamp, has_position, rest = self._plans.get(cls) or self._plan(cls)
+        values = {there: wire(getattr(value, here)) if wire else getattr(value, here) for here, there, wire, _ in rest}
+        if stamp:
+            time = self._time('builtin_interfaces/msg/Time', getattr(value, stamp))
+            values['header'] = self._kind('std_msgs/msg/Header')(stamp=time, frame_id=value.frame_id)
+        if has_position:
+            numbers = {name[0]: float(getattr(value, name)) for name in POSITION}
+            values['position'] = self._kind('geometry_msgs/msg/Point')(**numbers)
+        return self._kind(f'texture_msgs/msg/{cls.__name__}')(**values)
+
+    def from_message(self, message: Any, cls: type) -> Any:
+        """Return the data class of a message; InvalidData if the message contradicts itself."""
+        stamp, has_position, rest = self._plans.get(cls) or self._plan(cls)
+        values = {
+            here: back(getattr(message, there)) if back else getattr(message, there) for here, there, _, back in rest
+        }
+        if stamp:
+            values[stamp], values['frame_id'] = _nanoseconds(message.header.stamp), message.header.frame_id
+        if has_position:
+            values.update({name: getattr(message.position, name[0]) for name in POSITION})
+        if cls is TactileSignal:
+            flat, channels = values['samples'], len(values['channels'])
+            if not channels or len(flat) % channels:
+                raise InvalidData(
+                    f"signal message of '{message.sensor}' has {len(flat)} samples for {channels} channels; "
+                    'a multiple of the number of channels is needed'
+                )
+            values['samples'] = flat.reshape(-1, channels)
+        return cls(**values)
+
+    def _plan(self, cls: type) -> tuple[str, bool, list[tuple[str, str, Convert, Convert]]]:
+        types = get_type_hints(cls)
+        stamp = next((name for name in STAMPS if types.pop(name, None)), '')
+        types.pop('frame_id', None)  # in the header, too
+        has_position = POSITION[0] in types
+        for name in POSITION:
+            types.pop(name, None)
+        duration = self._duration, lambda duration: _nanoseconds(duration) / NANOSECONDS
+        rest = [
+            (
+                name,
+                DURATIONS.get(name, name),
+                *(duration if name in DURATIONS else self._convert.get(kind, (None, None))),
+            )
+            for name, kind in types.items()
+        ]
+        return self._plans.setdefault(cls, (stamp, has_position, rest))
+
+    def _time(self, name: str, time_ns: int) -> Any:
+        seconds, nanoseconds = divmod(int(time_ns), NANOSECONDS)
+        return self._kind(name)(sec=seconds, nanosec=nanoseconds)
+
+    def _duration(self, seconds: float) -> Any:
+        if not abs(seconds) < MAX_DURATION_S:
+            raise InvalidData(f'a time is {seconds:g} s; less than {MAX_DURATION_S:g} s is allowed')
+        return self._time('builtin_interfaces/msg/Duration', round(seconds * NANOSECONDS))
+
+
+def _nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec * NANOSECONDS + stamp.nanosec)
+
+
+def _phase(code: int) -> Phase:
+    phases = tuple(Phase)
+    if code >= len(phases):
+        allowed = ', '.join(f'{phase.code} ({phase.value})' for phase in phases)
+        raise InvalidData(f'exploration state has the phase {code}; allowed are {allowed}')
+    return phases[code]
+
+
+def _rejection(code: int) -> Rejection:
+    try:
+        return Rejection(code)
+    except ValueError as error:
+        allowed = ', '.join(f'{known.value} ({known.name.lower()})' for known in Rejection)
+        raise InvalidData(f'a texture estimate has the rejection {code}; allowed are {allowed}') from error
 
 
 # --------------------

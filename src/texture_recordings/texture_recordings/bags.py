@@ -11,10 +11,10 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import IO, Any, BinaryIO, NamedTuple, get_type_hints
+from typing import IO, Any, BinaryIO, NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -24,20 +24,14 @@ from numpy.typing import NDArray
 from texture_core.config import MB, FileRefused, folder, open_regular, parse_yaml, read_text
 from texture_core.errors import InvalidData, MissingLibrary
 from texture_core.types import (
-    DURATIONS,
+    DATA_CLASSES,
     NANOSECONDS,
-    POSITION,
     QUALITIES,
     Array,
-    ExplorationState,
-    FeatureVector,
-    ModelInfo,
-    Phase,
+    ExplorationRequest,
+    MessageCodec,
     Quality,
-    Rejection,
-    RoughnessEstimate,
     TactileSignal,
-    TextureEstimate,
 )
 
 try:
@@ -217,23 +211,9 @@ def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
 # The message definitions are read from the .msg files of texture_msgs, so they exist once.
 
 MESSAGES: Mapping[str, type] = {
-    f'texture_msgs/msg/{cls.__name__}': cls
-    for cls in (TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate, ModelInfo)
+    f'texture_msgs/msg/{cls.__name__}': cls for cls in DATA_CLASSES if cls is not ExplorationRequest
 }
 TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
-PHASES = tuple(Phase)
-Convert = tuple[Callable[[Any], Any], Callable[[Any], Any]]
-# By the type of a field, where it is not the same on both sides: to the wire, and back.
-WIRE: Mapping[Any, Convert] = {
-    Phase: (lambda phase: phase.code, PHASES.__getitem__),
-    Rejection: (int, Rejection),
-    tuple[str, ...]: (list, tuple),
-    tuple[float, ...]: (lambda values: np.array(values, dtype=np.float64), lambda values: tuple(values.tolist())),
-    Array: (lambda values: np.ascontiguousarray(values, dtype=np.float64), lambda values: values),
-    NDArray[np.float32]: (lambda samples: np.ascontiguousarray(samples, dtype=np.float32).ravel(), lambda flat: flat),
-}
-SAME: Convert = (lambda value: value, lambda value: value)
-STAMPS = {'stamp_ns', 'start_ns'}
 
 
 @cache
@@ -255,25 +235,19 @@ def typestore() -> Typestore:
     return store
 
 
+CODEC = MessageCodec(
+    lambda name: typestore().types[name],
+    {
+        tuple[float, ...]: (partial(np.array, dtype=np.float64), lambda values: tuple(values.tolist())),
+        Array: (partial(np.ascontiguousarray, dtype=np.float64), None),
+        NDArray[np.float32]: (lambda samples: np.ascontiguousarray(samples, dtype=np.float32).ravel(), None),
+    },
+)
+
+
 def encode(value: Any) -> bytes:
     """Return a data class of texture_core as CDR."""
-    types = typestore().types
-    cls: type = type(value)
-    given = {name: to_wire(getattr(value, name)) for name, (to_wire, _) in _fields(cls).items()}
-    stamp_ns = next(given.pop(name) for name in STAMPS if name in given)
-    header = types['std_msgs/msg/Header'](
-        stamp=_two_numbers('builtin_interfaces/msg/Time', stamp_ns), frame_id=given.pop('frame_id', '')
-    )
-    for name in DURATIONS.keys() & given.keys():
-        given[DURATIONS[name]] = _two_numbers('builtin_interfaces/msg/Duration', given.pop(name) * NANOSECONDS)
-    if POSITION[0] in given:
-        given['position'] = types['geometry_msgs/msg/Point'](*(given.pop(name) for name in POSITION))
-    return bytes(typestore().serialize_cdr(types[TYPES[cls]](header=header, **given), TYPES[cls]))
-
-
-def _two_numbers(msgtype: str, time_ns: float) -> Any:
-    seconds, nanoseconds = divmod(round(time_ns), NANOSECONDS)
-    return typestore().types[msgtype](sec=seconds, nanosec=nanoseconds)
+    return bytes(typestore().serialize_cdr(CODEC.to_message(value), TYPES[type(value)]))
 
 
 def decode(raw: bytes, msgtype: str) -> Any:
@@ -285,35 +259,9 @@ def decode(raw: bytes, msgtype: str) -> Any:
         If the bytes are not such a message, or it contradicts itself.
     """
     try:
-        return _data_class(typestore().deserialize_cdr(raw, msgtype), MESSAGES[msgtype])
+        return CODEC.from_message(typestore().deserialize_cdr(raw, msgtype), MESSAGES[msgtype])
     except (SerdeError, struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError) as error:
         raise InvalidData(f'{len(raw)} bytes came as a {msgtype}, which they are not: {error}') from error
-
-
-def _data_class(message: Any, cls: type) -> Any:
-    stamp_ns = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
-    values: dict[str, Any] = {}
-    for name, (_, from_wire) in _fields(cls).items():
-        if name in STAMPS:
-            values[name] = stamp_ns
-        elif name == 'frame_id':
-            values[name] = message.header.frame_id
-        elif name in DURATIONS:
-            duration = getattr(message, DURATIONS[name])
-            values[name] = (duration.sec * NANOSECONDS + duration.nanosec) / NANOSECONDS
-        elif name in POSITION and hasattr(message, 'position'):
-            values[name] = getattr(message.position, name[0])
-        else:
-            values[name] = from_wire(getattr(message, name))
-    if cls is TactileSignal:
-        values['samples'] = values['samples'].reshape(-1, len(values['channels']))
-    return cls(**values)
-
-
-@cache
-def _fields(cls: type) -> Mapping[str, Convert]:
-    """Return what becomes of each field."""
-    return {name: WIRE.get(kind, SAME) for name, kind in get_type_hints(cls).items()}
 
 
 # --------------------
