@@ -12,7 +12,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from texture_msgs import msg
 
 from texture_core.errors import CollectionError, ExplorationError, InvalidData
-from texture_core.ros import from_msg, to_msg
+from texture_core.ros import frame_name, from_msg, to_msg
 from texture_core.types import (
     ExplorationRequest,
     ExplorationState,
@@ -134,3 +134,19 @@ def test_the_codes_are_the_constants_of_the_messages(codes, message, prefix) -> 
 def test_a_result_and_an_estimate_that_nobody_filled_claim_nothing() -> None:
     assert msg.ExplorationResult().error_code == msg.ExplorationResult.ERROR_INTERNAL
     assert msg.TextureEstimate().rejection == msg.TextureEstimate.REJECTION_TOO_LITTLE_EVIDENCE
+
+
+@pytest.mark.parametrize(
+    ('namespace', 'name', 'on_tf'),
+    [
+        ('/', 'fingertip', 'fingertip'),
+        ('//', 'fingertip', 'fingertip'),
+        ('/left', 'fingertip', 'left/fingertip'),
+        ('/left/', 'fingertip', 'left/fingertip'),
+        ('/left/finger0', 'fingertip', 'left/finger0/fingertip'),
+        ('/left', 'cell/table', 'cell/table'),
+        ('/left', '', ''),
+    ],
+)
+def test_a_frame_carries_the_namespace_unless_it_is_named_in_full(namespace, name, on_tf):
+    assert frame_name(namespace, name) == on_tf

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch
-from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
+from texture_core.types import NANOSECONDS, ExplorationState, Phase, SlideMotion, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
@@ -15,7 +15,7 @@ from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.bags import BagWriter, read_bag
-from texture_recordings.dataset import SlideDataset
+from texture_recordings.dataset import SlideDataset, motion_made
 from texture_simulation.offline import SlidePlan, write_simulated
 
 RATE_HZ = 1000.0
@@ -309,3 +309,38 @@ def test_the_touch_before_a_slide_belongs_to_its_first_part() -> None:
     first, second = SlideDataset((replace(slide, states=(touch, sliding)),)).in_parts(2).samples('signal')
     assert (len(first.before), len(second.before)) == (1000, 0)
     assert (first.samples[0, 0], second.samples[0, 0]) == (1.0, pytest.approx(2.5, abs=2e-3))
+
+
+TOUCH = ExplorationState(0, 'id', 'linear_slide', Phase.CONTACT)
+SLIDE = ExplorationState(NANOSECONDS, 'id', 'linear_slide', Phase.SLIDE, 0.5, 0.1, 2.0, 0.7)
+LATER = replace(SLIDE, stamp_ns=2 * NANOSECONDS)
+LIFT = ExplorationState(3 * NANOSECONDS, 'id', 'linear_slide', Phase.LIFT)
+
+
+def test_a_slide_lasts_from_its_first_state_to_the_lift_or_as_long_as_was_guaranteed() -> None:
+    assert motion_made([TOUCH, SLIDE, LATER, LIFT]) == SlideMotion('linear_slide', 0.7, 0.1, 2.0, 2.0)
+    assert motion_made([TOUCH, SLIDE, LATER]) == SlideMotion('linear_slide', 0.7, 0.1, 2.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    'states',
+    [
+        [TOUCH, LIFT],
+        [replace(SLIDE, motion='circular'), LIFT],
+        [replace(SLIDE, speed_m_s=math.nan), LIFT],
+        [replace(SLIDE, force_n=0.0), LIFT],
+        [replace(SLIDE, direction_rad=math.nan), LIFT],
+        [SLIDE, replace(LATER, direction_rad=1.5), LIFT],
+        [replace(SLIDE, steady_s=0.0)],
+    ],
+)
+def test_a_slide_of_which_too_little_is_known_or_that_turns_is_no_motion(states: list[ExplorationState]) -> None:
+    assert motion_made(states) is None
+
+
+def test_slides_in_bags_report_how_they_were_made(tmp_path) -> None:
+    plan = SlidePlan(slides=2, slide_s=0.6, speed_m_s=0.05, force_n=1.5, direction_rad=0.5)
+    bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=['glass'])
+    examples = SlideDataset.from_bags(bags).features(load_recipe('fast').feature_set)
+    made = SlideMotion('linear_slide', 0.5, 0.05, 1.5, pytest.approx(0.6))
+    assert examples.motions == {'glass/1': made, 'glass/2': made}

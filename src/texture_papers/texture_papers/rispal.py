@@ -164,7 +164,7 @@ class Ann1:
 
     hidden: int = param(
         10,
-        'Number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
+        'Number of neurons in the hidden layer of a network; more neurons separate finer and cost computing time.',
         low=1,
         high=200,
     )
@@ -191,7 +191,7 @@ VOTE_THRESHOLD = 0.5  # the networks are trained 0 and 1, and their output is ro
 
 
 @dataclass(frozen=True)
-class Ann5:
+class Ann5(Ann1):
     """A network for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
@@ -206,19 +206,7 @@ class Ann5:
     True
     """
 
-    hidden: int = param(
-        10,
-        'Number of neurons in the hidden layer of each network; more neurons fit finer and cost computing time.',
-        low=1,
-        high=200,
-    )
     iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
-    seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
-    transfer: str = param(
-        'sigmoid',
-        "Transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
-        choices=tuple(TRANSFERS),
-    )
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
         """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""

@@ -2,6 +2,7 @@
 """What was exported is read back, and by the libraries of others."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -138,14 +139,10 @@ def test_a_data_card_has_the_facts_that_hubs_read_and_the_border_for_people(data
 
 def test_a_slide_that_lost_samples_is_left_out_and_counted(dataset, tmp_path) -> None:
     [batch] = dataset[0].signals['signal']
-    parts = [batch.__class__(**{**vars(batch), 'samples': batch.samples[rows], 'first_sample': first})
-             for rows, first in ((slice(0, 500), 0), (slice(600, 1000), 600))]  # fmt: skip
-    holed = SlideDataset((vars_replaced(dataset[0], signals={**dataset[0].signals, 'signal': parts}), *dataset[1:]))
-    assert '1 slides with lost samples were left out' in export_slides(holed, tmp_path / 'out', 'parquet')
-
-
-def vars_replaced(slide, **changes):
-    return slide.__class__(**{**vars(slide), **changes})
+    parts = [replace(batch, samples=batch.samples[a:b], first_sample=a) for a, b in ((0, 500), (600, 1000))]
+    holed = replace(dataset[0], signals={**dataset[0].signals, 'signal': parts})
+    told = export_slides(SlideDataset((holed, *dataset[1:])), tmp_path / 'out', 'parquet')
+    assert '1 slides with lost samples were left out' in told
 
 
 def test_what_cannot_be_exported_is_refused_with_a_sentence(dataset, tmp_path) -> None:

@@ -68,40 +68,43 @@ def ended(reports: list[DiagnosticArray]) -> list[str]:
     return [status.name for report in reports for status in report.status if has_ended(status)]
 
 
-def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_of_the_suite(tmp_path: Path) -> None:
-    np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
-    bag, logs = tmp_path / 'bag', (tmp_path / 'record.log', tmp_path / 'sensor.log')
-    source = {'sensor': 'file', 'device': str(tmp_path / 'slide.npz'), 'config': "'{loop: true}'"}
+@contextmanager
+def recording(folder: Path) -> Iterator[tuple[LocalGraph, list[DiagnosticArray], subprocess.Popen, subprocess.Popen]]:
+    """Run a recorder and a sensor, and end them; give the graph, the diagnostics and both processes."""
+    np.savez(folder / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
+    source = {'sensor': 'file', 'device': str(folder / 'slide.npz'), 'config': "'{loop: true}'"}
     with LocalGraph(DOMAIN, deadline_s=60.0) as graph:
         reports = graph.listen(DiagnosticArray, '/diagnostics')
         with (
-            alone('texture_recordings.nodes.record', logs[0], out=str(bag)) as record,
-            alone('texture_drivers.nodes.sensor', logs[1], **source) as sensor,
+            alone('texture_recordings.nodes.record', folder / 'record.log', out=str(folder / 'bag')) as record,
+            alone('texture_drivers.nodes.sensor', folder / 'sensor.log', **source) as sensor,
         ):
-            graph.until(lambda: recorded(reports) > 300 or record.poll() is not None or sensor.poll() is not None)
-            assert not ended(reports)
-        graph.until(lambda: ended(reports) == ['/record'])
-        said = '\n'.join(log.read_text() for log in logs)
-    assert (record.returncode, sensor.returncode) == (0, 0), said
+            yield graph, reports, record, sensor
+        if record.returncode == 0:
+            graph.until(lambda: ended(reports) == ['/record'])
+
+
+def samples_in_order(bag: Path) -> int:
+    """Return how many samples a bag has, each of which has the value that its number says."""
     batches = [batch for _, _, batch in read_bag(bag, ('signal',))]
-    assert sum(len(batch.samples) for batch in batches) > 300
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
+    return sum(len(batch.samples) for batch in batches)
+
+
+def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_of_the_suite(tmp_path: Path) -> None:
+    with recording(tmp_path) as (graph, reports, record, sensor):
+        graph.until(lambda: recorded(reports) > 300 or record.poll() is not None or sensor.poll() is not None)
+        assert not ended(reports)
+    said = '\n'.join(log.read_text() for log in tmp_path.glob('*.log'))
+    assert (record.returncode, sensor.returncode) == (0, 0), said
+    assert samples_in_order(tmp_path / 'bag') > 300
 
 
 def test_what_a_recorder_has_until_a_second_before_it_is_killed_is_read(tmp_path: Path) -> None:
-    np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
-    source = {'sensor': 'file', 'device': str(tmp_path / 'slide.npz'), 'config': "'{loop: true}'"}
-    with LocalGraph(DOMAIN, deadline_s=60.0) as graph:
-        reports = graph.listen(DiagnosticArray, '/diagnostics')
-        with (
-            alone('texture_recordings.nodes.record', tmp_path / 'log', out=str(tmp_path / 'bag')) as record,
-            alone('texture_drivers.nodes.sensor', tmp_path / 'other_log', **source),
-        ):
-            graph.until(lambda: recorded(reports) > 2500)
-            record.kill()
-    batches = [batch for _, _, batch in read_bag(tmp_path / 'bag', ('signal',))]
-    assert sum(len(batch.samples) for batch in batches) > 1000
-    assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
+    with recording(tmp_path) as (graph, reports, record, _):
+        graph.until(lambda: recorded(reports) > 2500)
+        record.kill()
+    assert samples_in_order(tmp_path / 'bag') > 1000
 
 
 @pytest.mark.parametrize('module', ['texture_recordings.dataset', 'texture_features.features.spectral', 'scipy.signal'])

@@ -732,15 +732,15 @@ class SlideDataset:
         if cut := next((slide for slide in self.slides if slide.is_part or not slide.sliding), None):
             why = 'is a part already' if cut.is_part else 'tells no time of sliding'
             raise InvalidData(f"slide '{cut.name}' in '{cut.bag}' {why}; cut whole slides with their states")
-        stretches: dict[str, list[_Stretch]] = {}
+        stretches: dict[str, list[Stretch]] = {}
         for surface in dict.fromkeys(slide.surface for slide in self.slides):
             own = [slide for slide in self.slides if slide.surface == surface]
             stretches |= {slide.name: found for slide, found in zip(own, _stretches(own, count), strict=True)}
         return SlideDataset(
             tuple(
-                _part(slide, stretch, f'{stretch.cell + 1}/{count}')
+                _part(slide, begin_ns, end_ns, f'{cell + 1}/{count}')
                 for slide in self.slides
-                for stretch in stretches[slide.name]
+                for cell, begin_ns, end_ns in stretches[slide.name]
             )
         )
 
@@ -979,16 +979,10 @@ def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
 STEP_NS = 1_000_000  # to which a cut is placed
 
 
-@dataclass(frozen=True)
-class _Stretch:
-    """A stretch of a slide within one cell of the path."""
-
-    cell: int
-    begin_ns: int
-    end_ns: int
+Stretch = tuple[int, int, int]  # of a slide within one cell of the path: number of the cell, begin and end, ns
 
 
-def _stretches(slides: Sequence[LabelledSlide], count: int) -> list[list[_Stretch]]:
+def _stretches(slides: Sequence[LabelledSlide], count: int) -> list[list[Stretch]]:
     """Return for each slide of one surface its stretches in equal cells of the path, in the order of time."""
     spans = [_covered(slide.sliding) for slide in slides]
     grids = [np.arange(start_ns, end_ns, STEP_NS) for start_ns, end_ns in spans]
@@ -998,10 +992,10 @@ def _stretches(slides: Sequence[LabelledSlide], count: int) -> list[list[_Stretc
         cells = np.clip(np.floor((way - low) / max(high - low, 1e-12) * count), 0, count - 1).astype(int)
         edges = [0, *(np.flatnonzero(np.diff(cells)) + 1).tolist(), len(grid)]
         times = [*grid[edges[:-1]].tolist(), end_ns]
-        runs = [_Stretch(int(cells[edge]), *span) for edge, span in zip(edges[:-1], pairwise(times), strict=True)]
+        runs = [(int(cells[edge]), *span) for edge, span in zip(edges[:-1], pairwise(times), strict=True)]
         # Of a path that comes back to a cell, the longest stretch is kept.
-        longest = {run.cell: run for run in sorted(runs, key=lambda run: run.end_ns - run.begin_ns)}
-        found.append([run for run in runs if longest[run.cell] is run])
+        longest = {run[0]: run for run in sorted(runs, key=lambda run: run[2] - run[1])}
+        found.append([run for run in runs if longest[run[0]] is run])
     return found
 
 
@@ -1027,11 +1021,10 @@ def _ways(slides: Sequence[LabelledSlide], grids: Sequence[AnyArray]) -> tuple[l
     return [length - way if back else way for way, back in zip(ways, turned, strict=True)], 0.0, length
 
 
-def _part(slide: LabelledSlide, stretch: _Stretch, place: str) -> LabelledSlide:
+def _part(slide: LabelledSlide, begin_ns: int, end_ns: int, place: str) -> LabelledSlide:
     """Return a stretch as a slide; the first one keeps what came before the slide, the last one what came after."""
     start_ns, stop_ns = _covered(slide.sliding)
-    first, last = stretch.begin_ns <= start_ns, stretch.end_ns >= stop_ns
-    begin_ns, end_ns = stretch.begin_ns, stretch.end_ns
+    first, last = begin_ns <= start_ns, end_ns >= stop_ns
     sliding = slide.sliding
     states = [state for state in slide.states if first and state.stamp_ns < begin_ns]
     for state, after in zip(sliding, [*sliding[1:], None], strict=True):
