@@ -30,7 +30,6 @@ from texture_exploration.stages import (
     Planner,
     SettleForceStage,
     SlideStage,
-    Stage,
     TouchParams,
     lead_m,
     ramps_m,
