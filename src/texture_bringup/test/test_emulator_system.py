@@ -4,7 +4,6 @@
 import os
 import re
 import signal
-from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 from xml.etree import ElementTree
@@ -121,14 +120,6 @@ def test_a_model_of_simulated_slides_recognises_the_surface_of_the_emulator(oper
     assert 'outside' not in explored.texture.message
 
 
-def test_outside_what_was_trained_the_estimate_says_so_and_decides_nothing(operator, models) -> None:
-    operator.set_parameters('classifier', {'model': str(models['vibration'])})
-    explored = operator.explore(replace(SLIDE, speed_m_s=0.02, distance_m=0.02, early_stopping=True))
-    assert explored.texture.windows, explored.message
-    assert (explored.texture.known, explored.texture.decided) == (False, False)
-    assert explored.texture.message.startswith('outside what was trained: speed 0.02 m/s, trained')
-
-
 def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:
     operator.set_parameters('emulator', {'surface': 'glass'})
     assert operator.explore(SLIDE).texture.label == 'glass'
@@ -143,16 +134,6 @@ def test_a_model_of_another_recipe_is_not_used_and_the_estimate_says_so(operator
     assert 'signal_static' in estimate.message
     with pytest.raises(InvalidParameter, match='nowhere'):
         operator.set_parameters('classifier', {'model': '/nowhere'})
-
-
-@pytest.mark.parametrize(
-    ('asked', 'reason'),
-    [({'motion': 'linear_slid'}, "'linear_slide'"), ({'motion': 'linear_slide', 'speed_m_s': 9.0}, '0.25')],
-)
-def test_an_impossible_exploration_is_refused_with_what_is_allowed(operator, asked, reason) -> None:
-    explored = operator.explore(ExplorationRequest(**asked))
-    assert (explored.success, explored.exploration_id) == (False, '')
-    assert reason in explored.message
 
 
 def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, emulator) -> None:

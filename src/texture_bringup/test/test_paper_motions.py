@@ -22,53 +22,28 @@ START_NS = NANOSECONDS
 STEP_NS = 10_000_000  # of an exploration
 # How often an arm says where it is, and how old that is: Universal Robots, rails, hands.
 ARMS = {'every 2 ms': (2_000_000, 0), 'every 5 ms': (5_000_000, 0), 'every 10 ms, 15 ms late': (10_000_000, 15_000_000)}
-KABOLI = (
-    'kaboli-svm',
-    'kaboli-pa',
-    'kaboli-pa-ovr',
-    'kaboli-em',
-    'kaboli-svm-rbf',
-    'kaboli-svm-two-fingers',
-    'kaboli-pa-two-fingers',
-    'kaboli-em-two-fingers',
-)
+RECIPES = {
+    path.stem
+    for kind in ('recipes', 'roughness')
+    for path in shipped_by_all('texture_estimation', f'config/{kind}').values()
+    if path.stem.startswith(('ets-', 'jamali-', 'kaboli-', 'hu-'))
+}
+# With what the names of the recipes begin that each preset must serve; one along a single axis serves none of two.
+PRESETS = {
+    'ets-linear': 'ets-linear-',
+    'ets-linear-headings': 'ets-linear-',
+    'ets-circular': 'ets-circular-',
+    'ets-ten-textures': 'ets-fine-',
+    'ets-roughness': 'ets-roughness-',
+    'jamali': 'jamali-',
+    'kaboli': 'kaboli-',
+    'kaboli-random': 'kaboli-',
+    'hu': 'hu-',
+    'hu-cross': 'hu-',
+}
 PAIRS = {
-    'ets-linear': (
-        'ets-linear-svm',
-        'ets-linear-ann',
-        'ets-linear-svm-recorded',
-        'ets-linear-ann-recorded',
-        'ets-linear-svm-vote',
-        'ets-linear-ann-vote',
-        'ets-linear-svm-pairs',
-        'ets-linear-ann-pairs',
-        'ets-linear-svm-pairs-vote',
-    ),
-    'ets-linear-headings': ('ets-linear-svm', 'ets-linear-ann'),
-    'ets-circular': ('ets-circular-svm', 'ets-circular-ann', 'ets-circular-svm-pairs'),
-    'ets-ten-textures': ('ets-fine-svm', 'ets-fine-ann', 'ets-fine-svm-pairs'),
-    'ets-roughness': (
-        'ets-roughness-ann1',
-        'ets-roughness-ann5',
-        'ets-roughness-svm5',
-        'ets-roughness-ann1-sigmoid',
-        'ets-roughness-ann5-sigmoid',
-    ),
-    'jamali': (
-        'jamali-naive-bayes-3',
-        'jamali-naive-bayes-5',
-        'jamali-naive-bayes-3-heights',
-        'jamali-naive-bayes-5-heights',
-        'jamali-amplitude',
-        'jamali-amplitude-deviation',
-        'jamali-stft',
-        'jamali-wavelets',
-        'jamali-symbols',
-    ),
-    'kaboli': KABOLI,
-    'kaboli-random': KABOLI,
-    'hu': ('hu-pca-svm', 'hu-log-pca-svm'),
-    'hu-cross': ('hu-pca-svm-xy', 'hu-pca-svm', 'hu-log-pca-svm'),
+    preset: sorted(one for one in RECIPES if one.startswith(begin) and not (preset == 'hu' and one.endswith('-xy')))
+    for preset, begin in PRESETS.items()
 }
 
 
@@ -127,7 +102,4 @@ def test_every_motion_of_a_preset_gives_the_recipes_of_its_paper_a_window(name, 
 def test_every_shipped_preset_and_every_recipe_of_a_paper_is_asserted_above():
     shipped = shipped_by_all('texture_exploration', 'config/presets').values()
     assert {path.stem for path in shipped} == set(PAIRS)
-    recipes = [*shipped_by_all('texture_estimation', 'config/recipes').values()]
-    recipes += shipped_by_all('texture_estimation', 'config/roughness').values()
-    of_papers = {path.stem for path in recipes if path.stem.startswith(('ets-', 'jamali-', 'kaboli-', 'hu-'))}
-    assert of_papers == {recipe for names in PAIRS.values() for recipe in names}
+    assert {recipe for names in PAIRS.values() for recipe in names} == RECIPES

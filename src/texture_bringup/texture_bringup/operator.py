@@ -143,6 +143,7 @@ STEPS: Mapping[bool, Mapping[str, int]] = {
     True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
     False: {'active': Transition.TRANSITION_DEACTIVATE},
 }
+RESTARTED = 'the explorer was started again and knows of no such exploration; it was broken off'
 VANISHED = (
     'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
     'the output of the explorer'
@@ -311,7 +312,7 @@ class Operator:
                 f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
             )
         if answer.status == GoalStatus.STATUS_UNKNOWN:
-            raise MotionAborted('the explorer was started again and knows of no such exploration; it was broken off')
+            raise MotionAborted(RESTARTED)
         result = answer.result.result
         return ExplorationResult(
             ExplorationError(result.error_code),

@@ -384,6 +384,8 @@ class StandIn:
         self.opened = self.closed = 0
         self.status = 0
 
+    ch_target_power = ch_sleep_ms = ch_spi_queue_oe = lambda *_: 0
+
     def ch_find_devices_ext(self, ports: int, ids: int) -> tuple[int, list[int], list[int]]:
         return len(self.ports), self.ports, [0] * len(self.ports)
 
@@ -403,17 +405,8 @@ class StandIn:
         assert khz == 4400
         return khz
 
-    def ch_target_power(self, handle: int, on: int) -> int:
-        return on
-
-    def ch_sleep_ms(self, ms: int) -> int:
-        return ms
-
     def ch_spi_queue_clear(self, handle: int) -> int:
         self.queue, self.slept_ns = [], 0
-        return 0
-
-    def ch_spi_queue_oe(self, handle: int, on: int) -> int:
         return 0
 
     def ch_spi_queue_ss(self, handle: int, select: int) -> int:

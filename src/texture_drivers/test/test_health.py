@@ -237,6 +237,14 @@ def watch(**params: float) -> ChannelWatch:
     return ChannelWatch(TareParams(**params), ['signal'], {'signal': (-200.0, 10_000.0)})
 
 
+def unloaded() -> ChannelWatch:
+    """Return a watch of a sensor that nothing touches, whose tare begins."""
+    watched = watch()
+    watched.set_unloaded(True)
+    watched.start_tare()
+    return watched
+
+
 def feed(watched: ChannelWatch, stream: Stream, seconds: int, **added: float) -> list[str]:
     """Feed so many seconds, with a review at the end of each; return the sentences of the last one."""
     faults: list[str] = []
@@ -248,17 +256,13 @@ def feed(watched: ChannelWatch, stream: Stream, seconds: int, **added: float) ->
 
 
 def test_an_unloaded_sensor_that_stays_where_it_was_tared_has_no_fault() -> None:
-    watched, stream = watch(), Stream()
-    watched.set_unloaded(True)
-    watched.start_tare()
+    watched, stream = unloaded(), Stream()
     assert feed(watched, stream, 60) == []
     assert watched.review(1.0)[1]['signal drift [noise]'] < 1.0
 
 
 def test_a_slow_drift_is_reported_with_its_channel_and_ends_with_the_next_tare() -> None:
-    watched, stream = watch(), Stream()
-    watched.set_unloaded(True)
-    watched.start_tare()
+    watched, stream = unloaded(), Stream()
     feed(watched, stream, 3)
     drift = np.array([0.0, 0.0, 40.0, 0.0])
     assert feed(watched, stream, 1, added=drift) == []  # one second may be a touch
@@ -268,9 +272,7 @@ def test_a_slow_drift_is_reported_with_its_channel_and_ends_with_the_next_tare()
 
 
 def test_a_load_is_no_drift() -> None:
-    watched, stream = watch(), Stream()
-    watched.set_unloaded(True)
-    watched.start_tare()
+    watched, stream = unloaded(), Stream()
     feed(watched, stream, 3)
     watched.set_unloaded(False)
     assert feed(watched, stream, 10, added=40.0) == []

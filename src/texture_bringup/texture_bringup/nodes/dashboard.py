@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.action import ActionClient
 from rclpy.node import Node
@@ -23,7 +24,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_bringup.dashboard import FRAME_PERIOD_S, Access, Feed, Recorder, Serving, make_app, offered
-from texture_bringup.operator import GONE_S, VANISHED, answer_of, ready
+from texture_bringup.operator import GONE_S, RESTARTED, VANISHED, answer_of, ready
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.ros import (
@@ -111,13 +112,15 @@ class DashboardNode(Node):
         await ready(self._explorer.server_is_ready, 'explorer')
         wanted = action.Explore.Goal(request=to_msg(request))
         goal = await answer_of(self._explorer.send_goal_async(wanted), ANSWER_DEADLINE_S)
-        ending = goal.get_result_async()
         self._heard_s = time.monotonic()
         while time.monotonic() - self._heard_s < GONE_S:
             try:
-                result = (await answer_of(ending, RETRY_PERIOD_S)).result.result
+                answer = await answer_of(goal.get_result_async(), RETRY_PERIOD_S)
             except LaunchFailed:
                 continue
+            if answer.status == GoalStatus.STATUS_UNKNOWN:
+                raise MotionAborted(RESTARTED)
+            result = answer.result.result
             success = result.error_code == msg.ExplorationResult.ERROR_NONE
             return {'success': success, 'message': result.message, 'id': result.exploration_id}
         raise MotionAborted(VANISHED)
