@@ -4,11 +4,15 @@
 from __future__ import annotations
 
 import fcntl
+import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from texture_bringup.command import main
 from texture_evaluation.train import train_from_bags
 from texture_simulation.offline import SlidePlan, write_simulated
 
@@ -30,3 +34,18 @@ def two_surfaces(tmp_path_factory: pytest.TempPathFactory, request: pytest.Fixtu
             train_from_bags('default', bags, out=folder / 'model')
             (folder / 'finished').touch()
     return folder
+
+
+@pytest.fixture
+def asked() -> Callable[..., int]:
+    """Return a function: the exit code of a command, while the nodes of a graph answer it."""
+
+    def asked(graph: Any, *arguments: str) -> int:
+        codes: list[int] = []
+        asking = threading.Thread(target=lambda: codes.append(main(list(arguments))))
+        asking.start()
+        graph.until(lambda: bool(codes))
+        asking.join()
+        return codes[0]
+
+    return asked

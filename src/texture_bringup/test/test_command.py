@@ -3,7 +3,6 @@ import os
 import re
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -193,16 +192,6 @@ def test_a_service_that_no_node_offers_is_one_sentence_and_exit_code_2(monkeypat
     assert said.count('\n') == 1
 
 
-def asked(graph, *arguments):
-    """Return the exit code of a command, while the nodes of a graph answer it."""
-    codes = []
-    asking = threading.Thread(target=lambda: codes.append(main(list(arguments))))
-    asking.start()
-    graph.until(lambda: bool(codes))
-    asking.join()
-    return codes[0]
-
-
 class Fragile(LifecycleNode):
     """A lifecycle node that cannot be activated while it is broken."""
 
@@ -215,7 +204,9 @@ class Fragile(LifecycleNode):
 
 
 @pytest.mark.realtime
-def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refusal_is_reported(monkeypatch, capsys):
+def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refusal_is_reported(
+    asked, monkeypatch, capsys
+):
     monkeypatch.setenv('ROS_DOMAIN_ID', '97')
     with LocalGraph(97, deadline_s=60.0) as graph:
         node = graph.add(Fragile)
@@ -228,7 +219,7 @@ def test_nodes_are_activated_and_deactivated_over_the_states_between_and_a_refus
 
 
 @pytest.mark.realtime
-def test_the_answer_of_a_running_node_is_printed(monkeypatch, capsys):
+def test_the_answer_of_a_running_node_is_printed(asked, monkeypatch, capsys):
     monkeypatch.setenv('ROS_DOMAIN_ID', '97')
     with LocalGraph(97, deadline_s=60.0) as graph:
         graph.peer.create_service(
