@@ -182,7 +182,7 @@ PROTOCOL = PaperProtocol(
         parts={SAME: PAPER_SVM[0], DIFFERENT: PAPER_SVM[1]},
     ),
     findings=findings,
-    quick_count=4,
+    quick_count=8,
 )
 
 
