@@ -17,9 +17,9 @@ from texture_features.feature_set import SlideConditions
 def measured(slide_of):
     """Return a function that lets a classifier observe a slide of these windows."""
 
-    def observe(classifier, values, identity='e1', **more):
-        for vector in slide_of(classifier.model, values, identity, **more):
-            classifier.observe(vector)
+    def observe(of, values, identity='e1', **more):
+        for vector in slide_of(of.model, values, identity, **more):
+            of.observe(vector)
 
     return observe
 
@@ -31,40 +31,45 @@ def silk():
     return 4.0 + rng.normal(size=(12, 6))
 
 
+@pytest.fixture
+def stored(model, tmp_path):
+    """Return a classifier whose model lies in a file, and the path of that."""
+    path = model.save(tmp_path / 'surfaces')
+    return IncrementalClassifier(load_model(path), path), path
+
+
 def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, silk, measured):
-    incremental_classifier = IncrementalClassifier(model)
-    measured(incremental_classifier, silk)
-    assert incremental_classifier.add('silk') == 12
-    assert incremental_classifier.model.labels == (*model.labels, 'silk')
-    assert np.mean(np.array(incremental_classifier.model.decide(silk + 0.3)) == 'silk') > 0.9
+    classifier = IncrementalClassifier(model)
+    measured(classifier, silk)
+    assert classifier.add('silk') == 12
+    assert classifier.model.labels == (*model.labels, 'silk')
+    assert np.mean(np.array(classifier.model.decide(silk + 0.3)) == 'silk') > 0.9
     before, after = (
-        np.mean(np.array(one.decide(examples.values)) == examples.labels)
-        for one in (model, incremental_classifier.model)
+        np.mean(np.array(one.decide(examples.values)) == examples.labels) for one in (model, classifier.model)
     )
     assert after > before - 0.03
 
 
 def test_more_examples_of_a_known_texture_add_no_label(model, examples, measured):
-    incremental_classifier = IncrementalClassifier(model)
+    classifier = IncrementalClassifier(model)
     moved = examples.values[examples.labels == 'wood'][:8] + np.array([0, 0, 0, 0, 0, 9.0])
-    measured(incremental_classifier, moved)
-    assert incremental_classifier.add(' wood ') == (examples.labels == 'wood').sum() + 8
-    assert incremental_classifier.model.labels == model.labels
-    assert incremental_classifier.model.decide(moved) == ['wood'] * 8
+    measured(classifier, moved)
+    assert classifier.add(' wood ') == (examples.labels == 'wood').sum() + 8
+    assert classifier.model.labels == model.labels
+    assert classifier.model.decide(moved) == ['wood'] * 8
 
 
-def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, silk, tmp_path, measured):
-    path = model.save(tmp_path / 'surfaces')
-    incremental_classifier = IncrementalClassifier(load_model(path), path)
-    measured(incremental_classifier, silk)
-    measured(incremental_classifier, examples.values[:8], 'e2')
-    incremental_classifier.add('silk', 'e1')
-    incremental_classifier.add('cork')
+def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, silk, stored, measured):
+    classifier, path = stored
+    measured(classifier, silk)
+    measured(classifier, examples.values[:8], 'e2')
+    classifier.add('silk', 'e1')
+    classifier.add('cork')
     again = load_model(path)
-    assert again.labels == incremental_classifier.model.labels
+    assert again.labels == classifier.model.labels
     np.testing.assert_allclose(
         again.predict_log_proba(examples.values),
-        incremental_classifier.model.predict_log_proba(examples.values),
+        classifier.model.predict_log_proba(examples.values),
         atol=1e-5,
     )
     later = IncrementalClassifier(again, path)
@@ -77,14 +82,13 @@ def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, 
         later.remove_last()
 
 
-def test_a_model_saved_again_keeps_its_added_slides_but_not_those_of_other_features(model, silk, tmp_path, measured):
-    path = model.save(tmp_path / 'm')
-    incremental_classifier = IncrementalClassifier(load_model(path), path)
-    measured(incremental_classifier, silk)
-    incremental_classifier.add('silk')
-    incremental_classifier.model.save(path)
+def test_a_model_saved_again_keeps_its_added_slides_but_not_those_of_other_features(model, silk, stored, measured):
+    classifier, path = stored
+    measured(classifier, silk)
+    classifier.add('silk')
+    classifier.model.save(path)
     assert load_model(path).labels == (*model.labels, 'silk')
-    [added_slide] = (tmp_path / 'm.added').iterdir()
+    [added_slide] = (path.parent / 'surfaces.added').iterdir()
     content = json.loads(added_slide.read_text())
     added_slide.write_text(json.dumps({**content, 'feature_set': 'other'}))
     with pytest.raises(ModelMismatch, match='move the folder'):
@@ -95,55 +99,54 @@ def test_a_model_saved_again_keeps_its_added_slides_but_not_those_of_other_featu
 
 
 def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk, measured):
-    incremental_classifier = IncrementalClassifier(model)
+    classifier = IncrementalClassifier(model)
     with pytest.raises(InvalidData, match='no exploration was classified with this model; explore first'):
-        incremental_classifier.add('silk')
-    measured(incremental_classifier, silk, 'foreign', feature_set='other')
-    measured(incremental_classifier, np.full((3, 6), np.nan), 'broken')
+        classifier.add('silk')
+    measured(classifier, silk, 'foreign', feature_set='other')
+    measured(classifier, np.full((3, 6), np.nan), 'broken')
     for name in ('', 'broken', 'foreign'):
         with pytest.raises(InvalidData, match=f"'{name or 'broken'}' has no usable window: .* Can be added: none"):
-            incremental_classifier.add('silk', name)
-    measured(incremental_classifier, silk)
+            classifier.add('silk', name)
+    measured(classifier, silk)
     with pytest.raises(InvalidData, match=r"no exploration 'e9' is among the last 20. Can be added: e1$"):
-        incremental_classifier.add('silk', 'e9')
+        classifier.add('silk', 'e9')
     with pytest.raises(InvalidData, match='no label'):
-        incremental_classifier.add('  ')
+        classifier.add('  ')
 
 
 def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path, measured):
     (tmp_path / 'm.added').write_text('in the way')
-    incremental_classifier = IncrementalClassifier(model, tmp_path / 'm')
-    measured(incremental_classifier, silk)
+    classifier = IncrementalClassifier(model, tmp_path / 'm')
+    measured(classifier, silk)
     with pytest.raises(OSError):
-        incremental_classifier.add('silk')
-    assert incremental_classifier.model.labels == model.labels
+        classifier.add('silk')
+    assert classifier.model.labels == model.labels
 
 
 @pytest.mark.parametrize('label', ['../../etc/x', 'x' * 10_000, 'two\nlines'])
-def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, silk, tmp_path, label, measured):
-    path = model.save(tmp_path / 'surfaces')
-    incremental_classifier = IncrementalClassifier(load_model(path), path)
-    measured(incremental_classifier, silk)
+def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, silk, stored, label, measured):
+    classifier, path = stored
+    measured(classifier, silk)
     with pytest.raises(InvalidData, match='label'):
-        incremental_classifier.add(label)
+        classifier.add(label)
     assert load_model(path).labels == model.labels
 
 
 def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tmp_path, measured):
     path = model.save(tmp_path / 'surfaces')
     for _ in range(2):
-        incremental_classifier = IncrementalClassifier(load_model(path), path)
-        measured(incremental_classifier, silk)
-        if not incremental_classifier.model.added_slides:
-            incremental_classifier.add('silk')
+        classifier = IncrementalClassifier(load_model(path), path)
+        measured(classifier, silk)
+        if not classifier.model.added_slides:
+            classifier.add('silk')
         for name in ('', 'e1'):
             with pytest.raises(
                 InvalidData, match="'e1' was added as 'silk' already; explore again, and add that slide"
             ):
-                incremental_classifier.add('silk', name)
-        assert len(incremental_classifier.model.added_slides) == len(load_model(path).added_slides) == 1
-    incremental_classifier.remove_last()
-    assert incremental_classifier.add('silk') == 12
+                classifier.add('silk', name)
+        assert len(classifier.model.added_slides) == len(load_model(path).added_slides) == 1
+    classifier.remove_last()
+    assert classifier.add('silk') == 12
 
 
 def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_restart(model, silk, tmp_path):
@@ -151,15 +154,13 @@ def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_resta
     path = dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, domain=domain)).save(
         tmp_path / 'surfaces'
     )
-    incremental_classifier = IncrementalClassifier(load_model(path), path)
+    classifier = IncrementalClassifier(load_model(path), path)
     for row in silk:
-        incremental_classifier.observe(
-            FeatureVector(0, 'e1', 0.5, 0.1, model.names, row, 0.1, feature_set=model.feature_set)
-        )
+        classifier.observe(FeatureVector(0, 'e1', 0.5, 0.1, model.names, row, 0.1, feature_set=model.feature_set))
     fast = SlideConditions('linear_slide', speed_m_s=0.1)
-    assert incremental_classifier.model.active_decisions.domain.deviation(fast)
-    incremental_classifier.add('silk')
-    assert incremental_classifier.model.active_decisions.domain.deviation(fast) == ''
+    assert classifier.model.active_decisions.domain.deviation(fast)
+    classifier.add('silk')
+    assert classifier.model.active_decisions.domain.deviation(fast) == ''
     again = IncrementalClassifier(load_model(path), path)
     assert again.model.active_decisions.domain.deviation(fast) == ''
     again.remove_last()
@@ -167,36 +168,35 @@ def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_resta
 
 
 @pytest.fixture
-def three_added(model, examples, silk, tmp_path, measured):
+def three_added(examples, silk, stored, measured):
     """Return a classifier to which silk, oak, more wood and more silk were added in this order, and its path."""
-    path = model.save(tmp_path / 'surfaces')
-    incremental_classifier = IncrementalClassifier(load_model(path), path)
+    classifier, path = stored
     for number, (label, values) in enumerate(
         (('silk', silk), ('oak', -silk), ('wood', examples.values[examples.labels == 'wood'][:4]), ('silk', silk + 0.1))
     ):
-        measured(incremental_classifier, values, f'e{number}')
-        incremental_classifier.add(label)
-    return incremental_classifier, path
+        measured(classifier, values, f'e{number}')
+        classifier.add(label)
+    return classifier, path
 
 
 def test_a_texture_is_removed_by_its_label_with_all_its_slides_live_and_stored(three_added, model, silk, examples):
-    incremental_classifier, path = three_added
-    removed = incremental_classifier.remove('silk')
+    classifier, path = three_added
+    removed = classifier.remove('silk')
     assert [(slide.label, slide.exploration_id) for slide in removed] == [('silk', 'e0'), ('silk', 'e3')]
-    assert incremental_classifier.model.labels == load_model(path).labels == (*model.labels, 'oak')
-    assert incremental_classifier.model.decide(-silk) == ['oak'] * len(silk)
+    assert classifier.model.labels == load_model(path).labels == (*model.labels, 'oak')
+    assert classifier.model.decide(-silk) == ['oak'] * len(silk)
     np.testing.assert_allclose(
         load_model(path).predict_log_proba(examples.values),
-        incremental_classifier.model.predict_log_proba(examples.values),
+        classifier.model.predict_log_proba(examples.values),
         atol=1e-5,
     )
 
 
 def test_what_is_added_after_a_removal_replaces_no_stored_slide(three_added, model, silk, measured):
-    incremental_classifier, path = three_added
-    incremental_classifier.remove('silk')
-    measured(incremental_classifier, 2 * silk, 'e9')
-    incremental_classifier.add('cork')
+    classifier, path = three_added
+    classifier.remove('silk')
+    measured(classifier, 2 * silk, 'e9')
+    classifier.add('cork')
     again = load_model(path)
     assert [slide.exploration_id for slide in again.added_slides] == ['e1', 'e2', 'e9']
     later = IncrementalClassifier(again, path)
@@ -213,22 +213,22 @@ def test_what_is_added_after_a_removal_replaces_no_stored_slide(three_added, mod
     ],
 )
 def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, sentence):
-    incremental_classifier, path = three_added
-    before = incremental_classifier.model
+    classifier, path = three_added
+    before = classifier.model
     label = label if label != 'cloth' else next(name for name in model.labels if name != 'wood')
     with pytest.raises(TextureError, match=sentence.replace('cloth', label) if label.strip() else sentence):
-        incremental_classifier.remove(label)
-    assert incremental_classifier.model is before
+        classifier.remove(label)
+    assert classifier.model is before
     assert len(load_model(path).added_slides) == 4
 
 
 def with_slides(measured, model, values, count):
     """Return the model after so many slides with these windows were added as silk."""
-    incremental_classifier = IncrementalClassifier(model)
+    classifier = IncrementalClassifier(model)
     for number in range(count):
-        measured(incremental_classifier, values, f'e{number}')
-        incremental_classifier.add('silk', f'e{number}')
-    return incremental_classifier.model
+        measured(classifier, values, f'e{number}')
+        classifier.add('silk', f'e{number}')
+    return classifier.model
 
 
 @pytest.mark.parametrize('count', [1, 2, 5])

@@ -6,7 +6,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -193,20 +193,15 @@ class ContactInterval:
 
     Examples
     --------
-    >>> ContactInterval(1.0, 1.1, 3.0, 3.1).shifted(0.5)
-    ContactInterval(press_start_s=1.5, press_end_s=1.6, release_start_s=3.5, release_end_s=3.6)
+    >>> contact = ContactInterval(press_start_s=1.0, press_end_s=1.1, release_start_s=3.0, release_end_s=3.1)
+    >>> round(contact.release_start_s - contact.press_end_s, 1)  # pressed for
+    1.9
     """
 
     press_start_s: float
     press_end_s: float
     release_start_s: float
     release_end_s: float
-
-    def shifted(self, by_s: float) -> ContactInterval:
-        """Return the same contact, reckoned from a time before."""
-        return ContactInterval(
-            self.press_start_s + by_s, self.press_end_s + by_s, self.release_start_s + by_s, self.release_end_s + by_s
-        )
 
 
 def find_contacts(levels: Samples, rate_hz: float, vibration: Array) -> list[ContactInterval]:
@@ -487,6 +482,8 @@ def _fit(powers: Array, expected: Array) -> Array:
 # Rest and sliding are distinguished over 50 ms. A touch or a knock lasts a part of that, sliding most.
 SMOOTHED_PERCENTILE = 70
 KNOCK_S = 0.08
+CELL_S = 0.005  # in which the power is computed
+MAX_GAP_S = 0.2  # below the threshold, and still part of one slide
 # In a contact, its knocks left out, less is enough for longer: the mean of 0.25 s of rest scatters by some percent.
 LONG_S, LONG_ON, LONG_OFF = 0.25, 3.0, 1.5
 # How near a slide begins to where it is seen first.
@@ -507,17 +504,11 @@ class SegmentationParams:
     True
     """
 
-    cell_s: float = param(
-        0.005, 'Length of the frames in which the signal power is computed.', unit='s', low=0.001, high=0.1
-    )
     on: float = param(
         6.0, 'Start threshold: power over baseline power above which sliding is detected.', low=1.0, high=1e6
     )
     off: float = param(
         3.0, 'Stop threshold: power over baseline power below which sliding ends (hysteresis).', low=1.0, high=1e6
-    )
-    max_gap_s: float = param(
-        0.2, 'Longest gap below the stop threshold that is still part of one slide.', unit='s', low=0.0, high=10.0
     )
     min_duration_s: float = param(
         0.15, 'Shortest slide that is reported; shorter ones are discarded.', unit='s', low=0.0, high=60.0
@@ -614,7 +605,7 @@ def find_sliding(
             f'sliding is looked for in samples of shape {fast.shape} at {rate_hz} Hz; '
             '(n_samples, n_channels) at a rate above 0 is needed, of the slow channels too'
         )
-    cell_s, powers = cell_power(fast, rate_hz, params.cell_s, params.smooth_s)
+    cell_s, powers = cell_power(fast, rate_hz, CELL_S, params.smooth_s)
     if len(powers) < SMOOTHED_CELLS:
         return []
     if rest is None:
@@ -630,8 +621,9 @@ def find_sliding(
     found = []
     for run in active_runs(known, cell_s, contacts, params):
         contact, steady = _steady(run, contacts, cell_s)
-        vibration = _Vibration(fast, round(cell_s * rate_hz), np.isfinite(known), steady, model)
-        found.append(_refined(vibration, cell_s, run, contact, params))
+        found.append(
+            _refined(model, fast, np.isfinite(known), steady, cell_s=cell_s, run=run, contact=contact, params=params)
+        )
     return [interval for interval in _joined(found) if interval.end_s - interval.start_s >= params.min_duration_s]
 
 
@@ -717,7 +709,7 @@ def active_runs(
     for first, last in edges.reshape(-1, 2).tolist():
         if (last - first) * cell_s < KNOCK_S or not certain[first:last].any():
             continue
-        if runs and (first - runs[-1][1]) * cell_s <= params.max_gap_s:
+        if runs and (first - runs[-1][1]) * cell_s <= MAX_GAP_S:
             runs[-1] = (runs[-1][0], last)
         else:
             runs.append((first, last))
@@ -728,7 +720,10 @@ def _find_contacts(slow: Samples, rate_hz: float, from_s: float, power: Array, c
     """Return the contacts, in the time of the vibration."""
     smooth = uniform_filter1d(np.log(power + TINY**0.1), SMOOTHED_CELLS)
     vibration = np.interp(from_s + np.arange(len(slow)) / rate_hz, (np.arange(len(power)) + 0.5) * cell_s, smooth)
-    return [contact.shifted(from_s) for contact in find_contacts(slow, rate_hz, vibration)]
+    return [
+        ContactInterval(*(from_s + at_s for at_s in astuple(contact)))
+        for contact in find_contacts(slow, rate_hz, vibration)
+    ]
 
 
 def _in_contact(count: int, cell_s: float, contacts: Sequence[ContactInterval]) -> NDArray[np.bool_]:
@@ -765,57 +760,49 @@ def _steady(run: tuple[int, int], contacts: Sequence[ContactInterval], cell_s: f
     return contact, slice(begin + quarter, end - quarter)
 
 
-@dataclass(frozen=True)
-class _Vibration:
-    """Vibration channels in cells of `width` samples, of which some are known, and some at steady speed."""
-
-    fast: Samples
-    width: int
-    known: NDArray[np.bool_]
-    steady: slice
-    model: OnsetModel
-
-    def reversed(self) -> _Vibration:
-        """Return the same from its end to its beginning."""
-        count = len(self.known)
-        return replace(
-            self,
-            fast=self.fast[: count * self.width][::-1],
-            known=self.known[::-1],
-            steady=slice(count - self.steady.stop, count - self.steady.start),
-        )
-
-    def onset_s(self, near: int) -> float:
-        """Return when the finger sets off, if it is seen to slide from the cell `near` on."""
-        width, rate_hz, before_s = self.width, self.model.rate_hz, self.model.ramp_s + NEAR_S
-        far = math.ceil(before_s * rate_hz / width)
-        begin, end = max(0, near - far), near + far
-        near_s = (near - begin) * width / rate_hz
-        from_begin_s = self.model.find(
-            self.fast[begin * width : end * width],
-            np.repeat(self.known[begin:end], width),
-            self.fast[self.steady.start * width : self.steady.stop * width],
-            (near_s - before_s, near_s + NEAR_S),
-        )
-        return begin * width / rate_hz + from_begin_s
+def _onset_s(
+    model: OnsetModel, fast: Samples, known: NDArray[np.bool_], steady: slice, *, near: int, width: int
+) -> float:
+    """Return when the finger sets off, if it is seen to slide from the cell `near` on; cells have `width` samples."""
+    rate_hz, before_s = model.rate_hz, model.ramp_s + NEAR_S
+    far = math.ceil(before_s * rate_hz / width)
+    begin, end = max(0, near - far), near + far
+    near_s = (near - begin) * width / rate_hz
+    from_begin_s = model.find(
+        fast[begin * width : end * width],
+        np.repeat(known[begin:end], width),
+        fast[steady.start * width : steady.stop * width],
+        (near_s - before_s, near_s + NEAR_S),
+    )
+    return begin * width / rate_hz + from_begin_s
 
 
 def _refined(
-    vibration: _Vibration, cell_s: float, run: tuple[int, int], contact: ContactInterval, params: SegmentationParams
+    model: OnsetModel,
+    fast: Samples,
+    known: NDArray[np.bool_],
+    steady: slice,
+    *,
+    cell_s: float,
+    run: tuple[int, int],
+    contact: ContactInterval,
+    params: SegmentationParams,
 ) -> SlidingInterval:
     """Return the sliding whose power stands out in the cells of `run`."""
     first, last = run
-    known = vibration.known
+    count, width = len(known), round(cell_s * model.rate_hz)
     # A run may begin in the knock of the touch, of which nothing is known: it is seen first after that.
     pressed = max(first, math.floor(max(contact.press_end_s, 0.0) / cell_s))
-    motion_start_s = vibration.onset_s(pressed + int(known[pressed:].argmax()))
+    motion_start_s = _onset_s(model, fast, known, steady, near=pressed + int(known[pressed:].argmax()), width=width)
     start_s = max(motion_start_s + params.ramp_s, contact.press_end_s, 0.0)
-    if contact.release_start_s < last * cell_s + params.ramp_s + params.max_gap_s:
+    if contact.release_start_s < last * cell_s + params.ramp_s + MAX_GAP_S:
         end_s = contact.release_start_s
-    elif last >= len(known):
-        end_s = len(known) * cell_s
-    else:
-        end_s = len(known) * cell_s - vibration.reversed().onset_s(len(known) - last) - params.ramp_s
+    elif last >= count:
+        end_s = count * cell_s
+    else:  # as it sets off, from the end to the beginning
+        backwards, from_end = fast[: count * width][::-1], slice(count - steady.stop, count - steady.start)
+        onset_s = _onset_s(model, backwards, known[::-1], from_end, near=count - last, width=width)
+        end_s = count * cell_s - onset_s - params.ramp_s
     return SlidingInterval(motion_start_s, start_s, end_s)
 
 
@@ -863,7 +850,7 @@ def segment_recording(
     reported_ns = 0
     for fast, slow in _runs(signals):
         samples, begin_ns, over_ns = _whole_run(fast), fast.time_of(fast.first_sample), fast.time_of(fast.next_sample)
-        _, powers = cell_power(samples, fast.rate_hz, params.cell_s, params.smooth_s)
+        _, powers = cell_power(samples, fast.rate_hz, CELL_S, params.smooth_s)
         if len(powers):  # a channel is as quiet as in its quietest run: one may hold little rest
             quiet = baseline_power(powers)
             rest = np.minimum(rest, quiet) if quiet.shape == rest.shape else quiet

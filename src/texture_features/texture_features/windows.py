@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from operator import itemgetter
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,13 +146,12 @@ class Feature(Protocol):
     [[3.0]]
     """
 
-    @property
-    def per_channel(self) -> bool:
-        """Whether there are values for each channel."""
+    per_channel: ClassVar[bool] = True  # whether there are values for each channel
 
     @property
     def names(self) -> tuple[str, ...]:
         """Name of each value of one channel; '' for the only value of a feature."""
+        return ('',)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; finite for finite samples.

@@ -33,10 +33,19 @@ from texture_estimation.incremental import ChangeError, ChangeRefused, Increment
 from texture_estimation.model import TextureModel, load_model
 
 
+@dataclass(frozen=True)
+class EstimatorParams:
+    """Parameters of the classifier and of the roughness estimator."""
+
+    model: str = param(
+        '',
+        "Path of a trained model of its kind (NAME.npz or NAME.json); '': no model. It can be changed at any time.",
+    )
+
+
 class EstimatorNode(Node):
     """Turn feature vectors into estimates by the parameter `model`, which may change while it runs."""
 
-    params: ClassVar[type]  # has the field `model`, a path or ''
     estimate: ClassVar[tuple[type, str]]  # message and topic
     no_model: ClassVar[str]
     activity: ClassVar[str]
@@ -44,8 +53,8 @@ class EstimatorNode(Node):
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
-        self._evidence = self._load(declare(self, self.params, changeable=True).model)
-        on_change(self, self.params, self._change)
+        self._evidence = self._load(declare(self, EstimatorParams, changeable=True).model)
+        on_change(self, EstimatorParams, self._change)
         self._estimates = 0
         self._invalid = 0
         self._lost = 0
@@ -97,7 +106,7 @@ class EstimatorNode(Node):
             self._lost += number - (self._next_number if number >= self._next_number else 0)
         self._next_number = number + 1
 
-    def _change(self, params: Any) -> None:
+    def _change(self, params: EstimatorParams) -> None:
         try:
             self._evidence = self._load(params.model)
         except TextureError as error:
@@ -120,19 +129,9 @@ class EstimatorNode(Node):
         return ('WARN', self.vectors_unused, numbers) if new else ('OK', self.activity, numbers)
 
 
-@dataclass(frozen=True)
-class ClassifierParams:
-    """Parameters of the classifier."""
-
-    model: str = param(
-        '', "Path of a trained model (NAME.npz or NAME.json); '': no model. It can be changed at any time."
-    )
-
-
 class Classifier(EstimatorNode):
     """Turn feature vectors into texture estimates, and add explorations to the model."""
 
-    params = ClassifierParams
     estimate = (msg.TextureEstimate, 'texture')
     no_model = NO_MODEL
     activity = 'classifying'
@@ -157,7 +156,7 @@ class Classifier(EstimatorNode):
             self._incremental_classifier.observe(vector)
         return replace(super()._predict(vector), revision=self._revision)
 
-    def _change(self, params: Any) -> None:
+    def _change(self, params: EstimatorParams) -> None:
         super()._change(params)
         self._tell_model()
 

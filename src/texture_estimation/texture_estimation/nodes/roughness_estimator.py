@@ -3,30 +3,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from texture_msgs import msg
 
-from texture_core.config import param
 from texture_core.ros import run
 from texture_estimation.nodes.classifier import EstimatorNode
 from texture_estimation.roughness import NO_MODEL, RoughnessAccumulator, load_roughness_model
 
 
-@dataclass(frozen=True)
-class RoughnessParams:
-    """Parameters of the roughness estimator."""
-
-    model: str = param(
-        '', "Path of a roughness model (NAME.npz or NAME.json); '': no model. Can be changed at any time."
-    )
-
-
 class RoughnessEstimator(EstimatorNode):
     """Turn feature vectors into roughness estimates."""
 
-    params = RoughnessParams
     estimate = (msg.RoughnessEstimate, 'roughness')
     no_model = NO_MODEL
     activity = 'grading'

@@ -6,14 +6,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import chain
-from typing import ClassVar
 
 import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
 from texture_features.features.temporal import squares
-from texture_features.windows import WindowBatch, floor_param, mean_weights, power
+from texture_features.windows import Feature, WindowBatch, floor_param, mean_weights, power
 
 # --------------------
 # Short spectra along a window: what the spectral features are made of.
@@ -325,11 +324,8 @@ def _mean_between(density: Array, edges: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class WelchPower:
+class WelchPower(Feature):
     """What features have in common that weigh the power of the lines of the mean spectrum."""
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
@@ -443,7 +439,7 @@ def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class LogBands:
+class LogBands(Feature):
     """Logarithm of the mean power spectral density in equal bands from 0 Hz to half the sampling rate (Welch).
 
     Examples
@@ -453,8 +449,6 @@ class LogBands:
     >>> int(bands[0].argmax()) + 1
     2
     """
-
-    per_channel: ClassVar[bool] = True
 
     bands: int = param(32, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
     overlap: float = param(
@@ -485,7 +479,7 @@ class LogBands:
 
 
 @dataclass(frozen=True)
-class LowFftBins:
+class LowFftBins(Feature):
     """Logarithm of the power spectral density at the lowest lines of long segments: where ridges and grids show.
 
     `log_bands` with as many bands would be as fine everywhere, and noisier where fineness does not help.
@@ -497,8 +491,6 @@ class LowFftBins:
     >>> int(bins[0].argmax()) + 1
     3
     """
-
-    per_channel: ClassVar[bool] = True
 
     bins: int = param(
         32,
@@ -612,7 +604,7 @@ MEDIAN, MINIMUM = 'median', 'minimum'
 
 
 @dataclass(frozen=True)
-class PeakToMedianPower:
+class PeakToMedianPower(Feature):
     """Logarithm of the power of the strongest segment over that of the median or of the weakest one.
 
     A finger that sticks and slips is still and then jumps; over an even texture all events are alike. The weakest event
@@ -625,9 +617,6 @@ class PeakToMedianPower:
     >>> np.exp(PeakToMedianPower()(WindowBatch(jump, rate_hz=100.0))).round(6).item()
     9.0
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     segments: int = param(
         10, 'Number of equal segments of the window; fewer if it has fewer samples.', low=2, high=1000
@@ -660,7 +649,7 @@ POWER_AUTOCORRELATION_TINY = 1e-200
 
 
 @dataclass(frozen=True)
-class PowerAutocorrelation:
+class PowerAutocorrelation(Feature):
     """Log of the mean product of the squared signal and itself some samples later, over its mean squared; of steps too.
 
     0 where the one says nothing of the other, above where bursts last so long, below where they keep such a distance.
@@ -675,8 +664,6 @@ class PowerAutocorrelation:
     >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks are 12 samples apart, never 8
     True
     """
-
-    per_channel: ClassVar[bool] = True
 
     lags: int = param(12, 'Number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24)
     floor: float = param(
@@ -717,7 +704,7 @@ class PowerAutocorrelation:
 
 
 @dataclass(frozen=True)
-class ShortTimeFourier:
+class ShortTimeFourier(Feature):
     """Logarithm of the power spectral density in equal bands, for each of some equal parts of the window.
 
     The short-time Fourier transform, averaged within each part. Where a window has fewer segments than parts,
@@ -732,8 +719,6 @@ class ShortTimeFourier:
     >>> (values.argmax(axis=1) + 1).tolist()
     [2, 6]
     """
-
-    per_channel: ClassVar[bool] = True
 
     parts: int = param(
         4, 'Number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
@@ -779,7 +764,7 @@ SPECTRAL_EXPONENT_TINY = 1e-300
 
 
 @dataclass(frozen=True)
-class SpectralExponent:
+class SpectralExponent(Feature):
     """Exponent s of the power spectral density 1/f^s, by least squares in double logarithms.
 
     A power law keeps its exponent when the finger goes faster; where the spectrum of a surface is none, the same waves
@@ -793,9 +778,6 @@ class SpectralExponent:
     >>> round(SpectralExponent(low_hz=20.0, high_hz=100.0)(WindowBatch(walk, rate_hz=1000.0)).item(), 1)
     2.0
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384

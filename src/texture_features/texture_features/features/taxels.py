@@ -19,14 +19,14 @@ from texture_features.features.spectral import (
     spatial_log_bands,
     welch_spectrum,
 )
-from texture_features.windows import WindowBatch, centred, first_difference, floor_param, power
+from texture_features.windows import Feature, WindowBatch, centred, first_difference, floor_param, power
 
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
 
 
 @dataclass(frozen=True)
-class LogShares:
+class LogShares(Feature):
     """Signed logarithm of each channel's share of the total load, less the mean of these logarithms.
 
     The share s of a channel is its mean over the sum of the absolute means. Each gives sign(s) · log(max(|s|, floor) /
@@ -43,9 +43,6 @@ class LogShares:
     >>> np.allclose(LogShares()(WindowBatch(10 * levels, 100.0)), LogShares()(WindowBatch(levels, 100.0)))
     True
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = param(
         0.01,
@@ -71,7 +68,7 @@ class LogShares:
 
 
 @dataclass(frozen=True)
-class ChannelMeanStatistics:
+class ChannelMeanStatistics(Feature):
     """Waveform statistics of slow channels, independent of the taxel; no speed is needed.
 
     Means over the channels of: level; log variance; rise, the last quarter of the window less the first; its absolute
@@ -86,7 +83,11 @@ class ChannelMeanStatistics:
     """
 
     per_channel: ClassVar[bool] = False
-    names: ClassVar[tuple[str, ...]] = ('mean', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is averaged."""
+        return ('mean', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
 
     floor: float = param(
         1e-4, 'Power added to the variance before logarithm and split, in unit².', low=1e-300, high=1e300
@@ -112,7 +113,7 @@ class ChannelMeanStatistics:
 
 
 @dataclass(frozen=True)
-class RelativeChanges:
+class RelativeChanges(Feature):
     """Square roots of each channel's standard deviation and of that of its steps, over the load of all channels.
 
     Two moments of the slow spectrum (Hjorth's activity, and that of the slope) without the level: the deviation counts
@@ -148,7 +149,7 @@ MOST_CORRELATION = 0.98  # beyond, the transform of a correlation would grow wit
 
 
 @dataclass(frozen=True)
-class DifferenceCorrelation:
+class DifferenceCorrelation(Feature):
     """Correlations between the channels' differences over some lags, Fisher-transformed; one for each pair of channels.
 
     Levels and their shares tell how a finger is mounted and how it was tared that day. Which channels change together
@@ -214,7 +215,7 @@ class DifferenceCorrelation:
 
 
 @dataclass(frozen=True)
-class LoadLevel:
+class LoadLevel(Feature):
     """Logarithm of the mean square over all channels and samples: the load of a tared array, squared.
 
     For the domain of a model and for its novelty detector: a load that no session of the training showed is told from
@@ -228,7 +229,6 @@ class LoadLevel:
     """
 
     per_channel: ClassVar[bool] = False
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = floor_param()
 
@@ -278,7 +278,7 @@ class SpatialBandPower(WelchPower):
             )
 
     @property
-    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+    def names(self) -> tuple[str, ...]:
         """Number of the band, from 1."""
         return tuple(str(band + 1) for band in range(self.bands))
 
@@ -320,7 +320,7 @@ def _edges_1_m(feature: SpatialBandPower) -> Array:
 
 
 @dataclass(frozen=True)
-class SpatialBands:
+class SpatialBands(Feature):
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves, over the whole window: a grating of pitch λ stands in the band of 1/λ whatever
@@ -338,8 +338,6 @@ class SpatialBands:
     >>> [bool(feature.edges_per_m[band] < 500.0 < feature.edges_per_m[band + 1]) for band in strongest]
     [True, True]
     """
-
-    per_channel: ClassVar[bool] = True
 
     bands: int = param(32, 'Number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
     longest_m: float = param(

@@ -53,7 +53,7 @@ def _differences(rows: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Force:
+class Force(Feature):
     """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say.
 
     Examples
@@ -63,7 +63,6 @@ class Force:
     """
 
     per_channel: ClassVar[bool] = False
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the force."""
@@ -77,7 +76,7 @@ LEAST_N = 0.1  # normal force by which is divided at least
 
 
 @dataclass(frozen=True)
-class Friction:
+class Friction(Feature):
     """Mean tangential over mean normal force in the window; NaN if the arm does not measure the tangential force.
 
     The ratio of the means: noise of the force sensor averages out before the division.
@@ -91,7 +90,6 @@ class Friction:
     """
 
     per_channel: ClassVar[bool] = False
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the ratio."""
@@ -107,7 +105,7 @@ HJORTH_TINY = 1e-150
 
 
 @dataclass(frozen=True)
-class Hjorth:
+class Hjorth(Feature):
     """Activity (power), mobility (mean frequency) and complexity (bandwidth) of each channel.
 
     Examples
@@ -117,8 +115,6 @@ class Hjorth:
     >>> Hjorth(log_activity=False)(tone)[0, :2].round(2).tolist()  # ½, and 2 sin(π · 40 / 1000)
     [0.5, 0.25]
     """
-
-    per_channel: ClassVar[bool] = True
 
     log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
     floor: float = floor_param()
@@ -175,7 +171,7 @@ QUANTISED = 'unit²; 1/12 is right for signals quantised to integers'
 
 
 @dataclass(frozen=True)
-class LogDifferenceVariance:
+class LogDifferenceVariance(Feature):
     """Logarithm of the variance of the steps from sample to sample of each channel.
 
     Examples
@@ -184,9 +180,6 @@ class LogDifferenceVariance:
     >>> np.exp(LogDifferenceVariance()(WindowBatch(zigzag, rate_hz=100.0))).round(6).item()
     4.0
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = floor_param(unit=QUANTISED)
 
@@ -200,7 +193,7 @@ class LogDifferenceVariance:
 
 
 @dataclass(frozen=True)
-class LogVariance:
+class LogVariance(Feature):
     """Logarithm of the variance of each channel.
 
     Examples
@@ -208,9 +201,6 @@ class LogVariance:
     >>> np.exp(LogVariance()(WindowBatch(np.array([[1.0], [5.0]]), rate_hz=100.0))).round(6).item()
     4.0
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = floor_param(unit=QUANTISED)
 
@@ -224,7 +214,7 @@ class LogVariance:
 
 
 @dataclass(frozen=True)
-class ChannelMean:
+class ChannelMean(Feature):
     """Mean of each channel. It may depend on how a surface was mounted.
 
     Examples
@@ -232,9 +222,6 @@ class ChannelMean:
     >>> ChannelMean()(WindowBatch(np.array([[1.0, 10.0], [3.0, 30.0]]), rate_hz=100.0))[:, 0].tolist()
     [2.0, 20.0]
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean."""
@@ -252,7 +239,7 @@ MOMENTS_TINY = 1e-150
 
 
 @dataclass(frozen=True)
-class Moments:
+class Moments(Feature):
     """Log mean square, log mean amplitude, skewness and log kurtosis of the signal, its steps and their steps.
 
     A spectrum holds the mean squares and nothing of the rest: whether a surface pushes more than it pulls, and whether
@@ -266,8 +253,6 @@ class Moments:
     >>> values['signal_skewness']  # (1 - 2p) / √(p (1 - p)) with p = 0.1
     2.67
     """
-
-    per_channel: ClassVar[bool] = True
 
     floor: float = param(
         1e-10, 'Amplitude added before a logarithm; it is squared where a power is meant.', low=1e-140, high=1e100
@@ -304,7 +289,7 @@ SLIDE_ONSET = 'slide_onset'
 
 
 @dataclass(frozen=True)
-class SlideOnset:
+class SlideOnset(Feature):
     """1 for a window that begins with the slide, 0 for later ones and where the time since the start is unknown.
 
     While friction, contact and sensor settle, all textures look different from what they look like later.
@@ -317,7 +302,6 @@ class SlideOnset:
     """
 
     per_channel: ClassVar[bool] = False
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     within_s: float = param(
         0.03,
@@ -338,7 +322,7 @@ class SlideOnset:
 
 
 @dataclass(frozen=True)
-class Speed:
+class Speed(Feature):
     """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say.
 
     Examples
@@ -348,7 +332,6 @@ class Speed:
     """
 
     per_channel: ClassVar[bool] = False
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the speed."""
@@ -360,7 +343,7 @@ class Speed:
 
 
 @dataclass(frozen=True)
-class TemporalVariation:
+class TemporalVariation(Feature):
     """Logarithm of the mean absolute difference of the signal with itself `lag_s` later.
 
     In nerves the rougher surface makes the response of each fibre vary more in time; here the channel takes the place
@@ -374,9 +357,6 @@ class TemporalVariation:
     >>> round(TemporalVariation()(ramp).item(), 6)
     0.0
     """
-
-    per_channel: ClassVar[bool] = True
-    names: ClassVar[tuple[str, ...]] = ('',)
 
     lag_s: float = param(
         0.002,
@@ -404,7 +384,7 @@ LARGEST_FACTOR = 10.0
 
 
 @dataclass(frozen=True)
-class Stretched:
+class Stretched(Feature):
     """A feature of windows that are first brought to one speed; itself a feature.
 
     A window of n samples at speed v becomes one of n · v / `to_m_s` samples at the same rate: the surface passes as it
@@ -426,7 +406,7 @@ class Stretched:
     to_m_s: float
 
     @property
-    def per_channel(self) -> bool:
+    def per_channel(self) -> bool:  # type: ignore[override]
         """As the feature says."""
         return self.feature.per_channel
 
