@@ -242,7 +242,7 @@ def test_the_reason_names_the_slides_that_are_needed_and_those_that_were_there()
 
 def test_a_limited_confidence_keeps_the_order_of_the_labels_and_the_sum_of_the_probabilities():
     sure = np.array([0.0001, 0.9989, 0.001])
-    limited = ErrorBound(12, 0.02).limited(sure)
+    limited = np.array(ErrorBound(12, 0.02).limited(sure))
     assert limited.max() == pytest.approx(0.05 ** (1 / 12))
     assert limited.sum() == pytest.approx(1.0)
     assert np.argsort(limited).tolist() == np.argsort(sure).tolist()

@@ -382,7 +382,7 @@ class ErrorBound:
         needed = f'{self.slides_needed:g} slides or more to be held out of the training'
         return f'too few slides for early stopping: {rate} need {needed}{limit}'
 
-    def limited(self, probabilities: Array) -> Array:
+    def limited(self, probabilities: Sequence[float]) -> Sequence[float]:
         """Return the probabilities, mixed with equal ones just so much that none is above the highest confidence.
 
         Parameters
@@ -394,12 +394,12 @@ class ErrorBound:
         -------
         (n_labels,)
         """
-        equal, highest = 1.0 / len(probabilities), float(probabilities.max())
+        equal, highest = 1.0 / len(probabilities), max(probabilities)
         limit = max(self.highest_confidence, equal)
         if highest <= limit:
             return probabilities
         kept = (limit - equal) / (highest - equal)
-        return equal + kept * (probabilities - equal)
+        return [equal + kept * (probability - equal) for probability in probabilities]
 
 
 # --------------------
@@ -629,10 +629,10 @@ class Domain:
 
     def _covers(self, direction_rad: float) -> bool:
         margin = self.margins.direction_rad
-        return any(
-            (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin
-            for start, end in self.directions_rad
-        )
+        for start, end in self.directions_rad:
+            if (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin:
+                return True
+        return False
 
 
 def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[Interval, ...]:

@@ -198,7 +198,9 @@ class EvidenceAccumulator:
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
         # As long as the windows that the classifier trusts do not add up to one, their mean counts less.
-        mean = self._evidence.mean * min(1.0, self._trusted_ns / self._window_ns)
+        mean = self._evidence.mean
+        if self._trusted_ns < self._window_ns:
+            mean = mean * (self._trusted_ns / self._window_ns)
         deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
         probabilities = self._with_added(
             model, model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent), effective_windows
@@ -218,7 +220,7 @@ class EvidenceAccumulator:
             rejection = Rejection.NONE
         known = rejection is Rejection.NONE
         bound = model.error_bound_of(best)
-        reported = bound.limited(probabilities)
+        reported = tuple(bound.limited(listed))
         sets = model.decisions.prediction_sets
         members = sets.members(probabilities, effective_windows) if final and within else ()
         return TextureEstimate(
@@ -227,8 +229,8 @@ class EvidenceAccumulator:
             frame_id=vector.frame_id,
             label=model.labels[best] if single else '',
             rejection=rejection,
-            confidence=float(reported.max()),
-            probabilities=tuple(reported.tolist()),
+            confidence=max(reported),
+            probabilities=reported,
             decided=known and bound.shown and model.decisions.decided(confidence, effective_windows, novelty_score),
             prediction_set=tuple(model.labels[number] for number in members),
             windows=self._windows,
@@ -260,7 +262,7 @@ class EvidenceAccumulator:
         detector = model.active_decisions.novelty_detector
         if self._novelty is None or detector is None:
             return 0.0, True
-        second, first = np.partition(mean, -2)[-2:].tolist()
+        second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
         scores = self._novelty.scores(best, first - second)
         novelty_score, threshold = detector.score_and_threshold(scores, effective_windows)
         return novelty_score, novelty_score <= threshold

@@ -11,7 +11,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_features.features.temporal import squares
+from texture_features.features.temporal import signal_differences
 from texture_features.windows import Feature, WindowBatch, floor_param, mean_weights, power
 
 # --------------------
@@ -684,7 +684,7 @@ class PowerAutocorrelation(Feature):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; 0 for all if the window is not two samples longer than the longest lag."""
-        powers = squares(windows)[..., :2, :]
+        powers = signal_differences(windows)[..., 1, :2, :]
         n_steps = powers.shape[-1] - 1  # one less than samples
         count = n_steps - self._lags[-1]
         if count < 1:

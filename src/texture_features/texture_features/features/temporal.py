@@ -18,34 +18,26 @@ from texture_features.windows import Feature, WindowBatch, centred, first_differ
 
 
 def signal_differences(windows: WindowBatch) -> Array:
-    """Return the zero-mean signal, its steps from sample to sample, and their steps, ended by zeros: (..., 3, n).
+    """Return the zero-mean signal, its steps from sample to sample and their steps, ended by zeros, in one array.
 
     Returns
     -------
-    (..., n_channels, 3, n_samples)
-        In the unit of the signal; differences are per sample step.
+    (..., n_channels, 3, 3, n_samples)
+        These three as they are, their squares, and their absolute values, per sample step.
     """
     return windows.shared('differences', lambda: _differences(windows.centred_rows))
 
 
-def squares(windows: WindowBatch) -> Array:
-    """Return the squares of `signal_differences`.
-
-    Returns
-    -------
-    (..., n_channels, 3, n_samples)
-        In the square of the unit of the signal.
-    """
-    return windows.shared('squares', lambda: np.square(signal_differences(windows)))
-
-
 def _differences(rows: Array) -> Array:
-    orders = np.zeros((*rows.shape[:-1], 3, rows.shape[-1]))
-    signal, slope, second_difference = orders[..., 0, :], orders[..., 1, :], orders[..., 2, :]
-    signal[...] = rows
+    powers = np.zeros((*rows.shape[:-1], 3, 3, rows.shape[-1]))
+    orders = powers[..., 0, :, :]
+    slope = orders[..., 1, :]
+    orders[..., 0, :] = rows
     np.subtract(rows[..., 1:], rows[..., :-1], out=slope[..., :-1])
-    np.subtract(slope[..., 1:-1], slope[..., :-2], out=second_difference[..., :-2])
-    return orders
+    np.subtract(slope[..., 1:-1], slope[..., :-2], out=orders[..., 2, :-2])
+    np.square(orders, out=powers[..., 1, :, :])
+    np.abs(orders, out=powers[..., 2, :, :])
+    return powers
 
 
 # --------------------
@@ -265,21 +257,17 @@ class Moments(Feature):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; skewness and log kurtosis of a constant signal are 0."""
-        signals, powers = signal_differences(windows), squares(windows)
-        n_samples = signals.shape[-1]
-        mean = mean_weights(n_samples)
-        square = powers @ mean
-        # Products of vectors for each row: no arrays of third and fourth powers.
-        cubes, fourths = (
-            (powers[..., None, :] @ other[..., :, None])[..., 0, 0] / n_samples for other in (signals, powers)
-        )
-        values = (
-            np.log(square + self.floor * self.floor),
-            np.log(np.abs(signals) @ mean + self.floor),
-            cubes / (square * np.sqrt(square) + MOMENTS_TINY),
-            np.log((fourths + MOMENTS_TINY) / (square * square + MOMENTS_TINY)),
-        )
-        return np.concatenate(values, axis=-1)
+        orders = signal_differences(windows)
+        n_samples = orders.shape[-1]
+        means = orders[..., 1:, :, :] @ mean_weights(n_samples)  # of squares and amplitudes
+        square = means[..., 0, :]
+        # A product for each row: no arrays of third and fourth powers.
+        products = (orders[..., :2, :, :].swapaxes(-3, -2) @ orders[..., 1, :, :, None])[..., 0] / n_samples
+        skewness = products[..., 0] / (square * np.sqrt(square) + MOMENTS_TINY)
+        kurtosis = (products[..., 1] + MOMENTS_TINY) / (square * square + MOMENTS_TINY)
+        means += ((self.floor * self.floor,), (self.floor,))
+        logs = np.log(means, out=means).reshape(*square.shape[:-1], 6)
+        return np.concatenate((logs, skewness, np.log(kurtosis)), axis=-1)
 
 
 # --------------------
