@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import golden
 import pytest
@@ -65,3 +66,9 @@ def test_a_word_that_no_row_has_is_refused_in_one_sentence(
     assert said.err.startswith("golden: no row that can be computed here has 'defualt' in its name")
     assert said.err.count('\n') == 1
     assert golden.STORED.read_bytes() == before
+
+
+def test_a_part_that_cannot_be_compared_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(golden, 'DATA', tmp_path)
+    assert golden.verdict('oriented') == 'the golden set agrees'
+    assert golden.verdict('default on ').endswith('not compared, as this is missing here: biotac20')
