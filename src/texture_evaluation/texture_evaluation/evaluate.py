@@ -174,7 +174,11 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
     vectors, estimates, taken_us = run_model(model, events)
     used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
-        _check_features(model, slide, vector)
+        if not vector.last and vector.feature_set != model.feature_set:
+            difference = fingerprint_difference(vector.feature_set, model.feature_set)
+            raise ModelMismatch(
+                f"model '{model.name}' does not fit slide '{slide.name}' in '{slide.bag}': {difference}"
+            )
         # A window without a usable value adds no evidence, and counts nowhere.
         if estimate.windows > before and not vector.last:
             used.append(vector.values)
@@ -183,13 +187,6 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
     alone = single_decisions(model, np.stack(used)) if used else []
     final = next((estimate for estimate in reversed(estimates) if estimate.final), None)
     return SlideResult(slide.surface, alone, received, final, model.recipe.evidence.group), taken_us
-
-
-def _check_features(model: TextureModel, slide: LabelledSlide, vector: FeatureVector) -> None:
-    """Raise ModelMismatch if the features of a window are not those of the model."""
-    if not vector.last and vector.feature_set != model.feature_set:
-        difference = fingerprint_difference(vector.feature_set, model.feature_set)
-        raise ModelMismatch(f"model '{model.name}' does not fit slide '{slide.name}' in '{slide.bag}': {difference}")
 
 
 # --------------------

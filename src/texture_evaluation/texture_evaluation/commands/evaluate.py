@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
 
 from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count, task
 from texture_core.config import refuse_inputs, shipped, write_json
@@ -16,8 +15,6 @@ from texture_estimation.model import both_files, load_model
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation import (
-    CrossValidation,
-    PairedComparison,
     compare_all,
     comparison_chart,
     cross_validate,
@@ -40,8 +37,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     refuse_inputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
     report = evaluate(model, options.bags, options.slides)
-    for line in summary(report):
-        print(line)
+    print('\n'.join(summary(report)))
     if options.json:
         write_json(report.as_json(), options.json)
     return 0
@@ -69,7 +65,10 @@ def _cross_validate(options: argparse.Namespace) -> int:
     """Cross-validate one recipe or several, print tables and comparisons, and write and draw them if asked to."""
     split = parse_split(options.split, options.seed)
     names, bags = recipes_and_bags([options.recipe, *options.bags])
-    _check_outputs(options, [*names, *bags])
+    # Files that cannot be written or would be lost are refused before hours of training, not after them.
+    refuse_inputs([options.json, options.chart], [*names, *bags])
+    if options.chart:
+        refuse_chart_format(options.chart)
     recipes = [load_recipe(name) for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
     dataset = split.cut(SlideDataset.from_bags(bags, options.slides, topics=tuple(topics)))
@@ -87,28 +86,14 @@ def _cross_validate(options: argparse.Namespace) -> int:
     for one in compared:
         print(sentence(one))
     if options.json:
+        figures = [result.as_json() for result in results]
+        several = {'recipes': figures, 'comparisons': [vars(one) for one in compared]}
         setting = {'split': split.name, 'seed': options.seed, 'bags': bags}
-        _write_figures(results, compared, setting, options.json)
+        write_json({**setting, **(figures[0] if len(figures) == 1 else several)}, options.json)
     if options.chart:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
         print(comparison_chart(results, title, options.chart))
     return 0
-
-
-def _check_outputs(options: argparse.Namespace, inputs: Sequence[str]) -> None:
-    """Refuse files that cannot be written or would be lost before hours of training, not after them."""
-    refuse_inputs([options.json, options.chart], inputs)
-    if options.chart:
-        refuse_chart_format(options.chart)
-
-
-def _write_figures(
-    results: Sequence[CrossValidation], compared: Sequence[PairedComparison], setting: Mapping[str, Any], path: str
-) -> None:
-    """Write the figures of one recipe, or of several with their comparisons with the first, as JSON."""
-    recipes = [result.as_json() for result in results]
-    several = {'recipes': recipes, 'comparisons': [vars(one) for one in compared]}
-    write_json({**setting, **(recipes[0] if len(recipes) == 1 else several)}, path)
 
 
 def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
