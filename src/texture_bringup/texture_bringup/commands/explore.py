@@ -21,15 +21,14 @@ from texture_core.cli import Command, add_namespace, add_parameters, parameters_
 from texture_core.config import find
 from texture_core.errors import CollectionError, InvalidParameter, MotionAborted, MotionRefused
 from texture_core.types import (
-    Array,
     ExplorationRequest,
     ExplorationState,
     RoughnessEstimate,
     SlideMotion,
     TextureEstimate,
 )
-from texture_estimation.model import TextureModel, load_model
-from texture_estimation.next_motion import NextTouchModel, slide_values
+from texture_estimation.model import load_model
+from texture_estimation.next_motion import slide_values
 from texture_evaluation.check import adapt_to_today, check_finger, store_reference
 from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
@@ -199,7 +198,12 @@ def _identify(options: argparse.Namespace) -> int:
             f'--most is {options.most} and --sure {options.sure:g}; 1 or more and a probability are needed'
         )
     model = load_model(options.model)
-    known = next_touch_model_of(model)
+    known = model.next_touch_model
+    if known is None:
+        raise InvalidParameter(
+            f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
+            'of each kind, in several directions or at several speeds or forces'
+        )
     belief, number = known.uniform_log_prior, 0
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(deadline_s=10.0)
@@ -212,20 +216,11 @@ def _identify(options: argparse.Namespace) -> int:
             if not explored.success:
                 return int(not tell(explored))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
-            print(f'  {belief_text(known, belief)}')
+            likely = np.argsort(-belief, kind='stable')[:SHOWN]
+            print(f'  {", ".join(f"{known.textures[k]} {np.exp(belief[k]):.2f}" for k in likely)}')
     best = int(belief.argmax())
     print(f'texture: {known.textures[best]}, probability {np.exp(belief[best]):.2f} after {number} slides')
     return 0
-
-
-def next_touch_model_of(model: TextureModel) -> NextTouchModel:
-    """Return what the textures look like under each motion."""
-    if model.next_touch_model is None:
-        raise InvalidParameter(
-            f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
-            'of each kind, in several directions or at several speeds or forces'
-        )
-    return model.next_touch_model
 
 
 def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
@@ -246,12 +241,6 @@ def motion_text(motion: SlideMotion) -> str:
         f'{motion.motion}, direction {math.degrees(motion.direction_rad):.0f}°, {motion.speed_m_s:g} m/s, '
         f'{motion.force_n:g} N, {motion.duration_s:g} s'
     )
-
-
-def belief_text(known: NextTouchModel, belief: Array) -> str:
-    """Return the most probable textures in words; `belief`, (n_textures,), holds log-probabilities."""
-    first = np.argsort(-belief, kind='stable')[:SHOWN]
-    return ', '.join(f'{known.textures[k]} {np.exp(belief[k]):.2f}' for k in first)
 
 
 # --------------------
