@@ -641,12 +641,9 @@ class RunningConditions:
         return self._force.value
 
     @property
-    def levels(self) -> Sequence[SignalLevel]:
-        """Levels of the channels so far."""
-        return [
-            (channel, _rms(power.value), _rms(power.range[0]), _rms(power.range[1]))
-            for channel, _, power in self._levels or ()
-        ]
+    def levels(self) -> Sequence[tuple[str, float]]:
+        """Channels and their levels so far."""
+        return [(channel, _rms(power.value)) for channel, _, power in self._levels or ()]
 
     def get(self) -> SlideConditions:
         """Return the conditions of the windows so far."""
@@ -658,7 +655,7 @@ class RunningConditions:
             tuple(self.directions_rad),
             self._speed.range,
             self._force.range,
-            tuple(self.levels),
+            tuple((name, _rms(power.value), *map(_rms, power.range)) for name, _, power in self._levels or ()),  # type: ignore[misc]
         )
 
 

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
@@ -76,7 +77,7 @@ def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) ->
     Each half lies in one piece of memory, which makes the sum of both three times as fast as side by side.
     """
     cut = segments(rows, segment, step)
-    parts: Array = _transform(cut.shape[-1], segment, bins, rate_hz).T @ cut.swapaxes(-1, -2)
+    parts: Array = _transform(cut.shape[-1], segment, bins, rate_hz) @ cut.swapaxes(-1, -2)
     parts *= parts
     return parts
 
@@ -231,9 +232,9 @@ def hann(length: int) -> Array:
 
 @lru_cache(maxsize=64)
 def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
-    """Return the matrix (length, 2 · bins) that takes a segment to the square roots of its densities.
+    """Return the matrix (2 · bins, length) that takes a segment to the square roots of its densities.
 
-    Columns are cosines, then sines, tapered. Their own mean is removed, which removes that of the segment: with the
+    Rows are cosines, then sines, tapered. Their own mean is removed, which removes that of the segment: with the
     taper w and a wave e, Σ w e (s - mean(s)) = Σ (w e - mean(w e)) s.
     """
     taper = hann(length)
@@ -243,7 +244,7 @@ def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
     # The bins count for both signs of frequency, but for the one at half the sampling rate, which has no other.
     scale = np.full(bins, 2.0 / (rate_hz * float(taper @ taper)))
     scale[segment // 2 - 1 :] /= 2.0
-    matrix: Array = waves * np.sqrt(np.tile(scale, 2))
+    matrix: Array = np.ascontiguousarray((waves * np.sqrt(np.tile(scale, 2))).T)
     matrix.flags.writeable = False
     return matrix
 
@@ -674,8 +675,9 @@ class PowerAutocorrelation(Feature):
     )
 
     @cached_property
-    def _lags(self) -> list[int]:
-        return [1, *chain.from_iterable((2 << octave, 3 << octave) for octave in range(self.lags // 2))][: self.lags]
+    def _lags(self) -> NDArray[np.intp]:
+        lags = [1, *chain.from_iterable((2 << octave, 3 << octave) for octave in range(self.lags // 2))]
+        return np.array(lags[: self.lags])  # which picks rows faster than a list
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -686,7 +688,7 @@ class PowerAutocorrelation(Feature):
         """Return the values; 0 for all if the window is not two samples longer than the longest lag."""
         powers = signal_differences(windows)[..., 1, :2, :]
         n_steps = powers.shape[-1] - 1  # one less than samples
-        count = n_steps - self._lags[-1]
+        count = n_steps - int(self._lags[-1])
         if count < 1:
             return np.zeros((*powers.shape[:-2], len(self.names)))
         # The axis of lags in front, where picking some copies whole blocks: a third of the time of doing so behind.
