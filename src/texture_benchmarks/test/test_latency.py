@@ -13,8 +13,8 @@ pytestmark = pytest.mark.realtime
 def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="did you mean 'latency'"):
         run_benchmark('latancy', BenchmarkOptions(tmp_path))
-    for data in (None, tmp_path):
-        with pytest.raises(InvalidData, match='no recorded data'):
+    for data, missing in ((None, 'no folder of recorded data was given'), (tmp_path, "there is no 'biotac20' in")):
+        with pytest.raises(InvalidData, match=missing):
             BENCHMARKS['borders'](BenchmarkOptions(tmp_path, data))
 
 

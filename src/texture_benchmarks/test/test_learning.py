@@ -8,7 +8,7 @@ import pytest
 from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.learning import run_incremental
 from texture_benchmarks.next_motion import CHOICES, MOTIONS, explored, extracted, training
-from texture_benchmarks.scale import DrawnSize, FeatureSpread
+from texture_benchmarks.scale import FeatureSpread
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
@@ -58,7 +58,7 @@ def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
 
 
 def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(InvalidData, match='no recorded data'):
+    with pytest.raises(InvalidData, match='no folder of recorded data was given'):
         run_benchmark('learning', BenchmarkOptions(tmp_path))
 
 
@@ -112,7 +112,7 @@ def test_drawn_features_vary_as_much_among_textures_slides_and_windows_as_the_re
     names = ('signal/mean', 'signal/rms', 'signal/peak')
     spread = FeatureSpread.of(LabelledFeatures(values.reshape(-1, 3), labels, groups, names, 'a1', 0.5, 0.1))
     centres = spread.textures(2000, rng)
-    drawn = spread.slides(np.zeros((1, 3)), DrawnSize(1, slides=2000, windows=10), rng).values.reshape(2000, 10, 3)
+    drawn = spread.slides(np.zeros((1, 3)), 2000, 10, rng).values.reshape(2000, 10, 3)
     assert centres.std(axis=0) == pytest.approx([DEVIATIONS['textures']] * 3, rel=0.2)  # of 60 textures: 9 % each
     assert drawn.mean(axis=1).std(axis=0) == pytest.approx([DEVIATIONS['slides']] * 3, rel=0.1)
     # The mean of ten windows takes a tenth of their variance: once when it is measured, once when it is drawn.

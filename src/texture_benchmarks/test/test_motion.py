@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.motion import (
-    ARM,
-    simulate_force_controlled_slide,
-)
+from texture_benchmarks.motion import ARM, Hazard, simulate_force_controlled_slide
 from texture_benchmarks.study import BenchmarkOptions
 from texture_exploration.arms.simulated import SimulatedSurface, SurfaceShape
 from texture_exploration.force_control import StiffnessEstimate
@@ -24,7 +21,8 @@ TILT = math.radians(10)
 
 def slide(stiffness, **surface):
     """Return overshoot, root mean square and speed error of a slide with 1 N, as shares."""
-    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=stiffness), shape=SurfaceShape(**surface))
+    hazard = Hazard(SurfaceShape(**surface))
+    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=stiffness), hazard=hazard)
     assert trial.success, trial.message
     return trial.overshoot, trial.force_rms, trial.speed_error
 

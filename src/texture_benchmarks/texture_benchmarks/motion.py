@@ -80,22 +80,20 @@ class ForceControlMetrics:
 
 
 @dataclass(frozen=True)
-class Injection:
-    """What happens to a simulated arm, at the third step of a phase."""
+class Hazard:
+    """What is under the finger, and what happens to a simulated arm at the third step of a phase, if anything."""
 
-    phase: Phase
-    happens: Callable[[SimulatedArm], None]
+    surface: SurfaceShape = PLANE
+    phase: Phase = Phase.SLIDE
+    happens: Callable[[SimulatedArm], None] | None = None
+    stiffnesses_n_m: tuple[float, ...] = (200.0, 2000.0, 5000.0, 20000.0)  # that it is tried on, N/m
 
 
 Log = Sequence[tuple[Phase, ArmState]]
 
 
 def simulate_force_controlled_slide(
-    arm: SimulatedArmParams = ARM,
-    request: ExplorationRequest = SLIDE,
-    touch: TouchParams = SIMULATED_TOUCH,
-    injection: Injection | None = None,
-    shape: SurfaceShape = PLANE,
+    arm: SimulatedArmParams = ARM, request: ExplorationRequest = SLIDE, hazard: Hazard = Hazard()
 ) -> ForceControlMetrics:
     """Explore once with a simulated arm, under the real exploration loop; evaluated by the true force."""
     log: list[tuple[Phase, ArmState]] = []
@@ -105,9 +103,9 @@ def simulate_force_controlled_slide(
     def clock() -> int:
         return now_ns
 
-    moving = SimulatedArm(arm, clock, own_thread=False, shape=shape)
+    moving = SimulatedArm(arm, clock, own_thread=False, shape=hazard.surface)
     moving.connect()
-    motion = MOTIONS[request.motion](request, moving.state().position, touch, SIMULATED_LIMITS)
+    motion = MOTIONS[request.motion](request, moving.state().position, SIMULATED_TOUCH, SIMULATED_LIMITS)
     exploration = Exploration(
         'trial', request, arm=moving, motion=motion, limits=SIMULATED_LIMITS, clock=clock, on_state=lambda state: None
     )
@@ -119,9 +117,9 @@ def simulate_force_controlled_slide(
             now_ns += ARM_PERIOD_NS
             moving.step(ARM_PERIOD_NS * 1e-9)
         log.append((exploration.state.phase, replace(moving.state(), force_n=moving.true_force_n)))
-        if injection and injected_ns is None and [phase for phase, _ in log[-3:]] == [injection.phase] * 3:
+        if hazard.happens and injected_ns is None and [phase for phase, _ in log[-3:]] == [hazard.phase] * 3:
             injected_ns = now_ns
-            injection.happens(moving)
+            hazard.happens(moving)
 
     outcome = exploration.run(pace)
     moving.close()
@@ -193,44 +191,26 @@ LAGS_S = (0.0, 0.01, 0.02, 0.05)
 DRIFT_N_S = 0.5
 
 
-@dataclass(frozen=True)
-class Hazard:
-    """What is under the finger or happens to its force sensor; stiffnesses that it is tried on, N/m."""
-
-    surface: SurfaceShape = PLANE
-    injection: Injection | None = None
-    stiffnesses_n_m: tuple[float, ...] = (200.0, 2000.0, 5000.0, 20000.0)
-
-
-FREEZE = Injection(Phase.SLIDE, SimulatedArm.freeze_force)
 HAZARDS: Mapping[str, Hazard] = {
     'none': Hazard(),
     'step down 12 mm': Hazard(SurfaceShape(step_m=-0.012)),
     'step up 1 mm': Hazard(SurfaceShape(step_m=0.001), stiffnesses_n_m=(200.0, 2000.0)),
     'edge: the surface ends': Hazard(SurfaceShape(edge_m=0.03)),
     'soft layer of 1 mm on 20 kN/m': Hazard(SurfaceShape(layer_m=0.001), stiffnesses_n_m=(200.0, 500.0, 1000.0)),
-    'force frozen in the approach': Hazard(injection=replace(FREEZE, phase=Phase.APPROACH)),
-    'force frozen while pressing': Hazard(injection=replace(FREEZE, phase=Phase.CONTACT)),
-    'force frozen in the slide': Hazard(injection=FREEZE),
-    'force frozen in the slide, rising 10°': Hazard(SurfaceShape(tilt_rad=0.1745), FREEZE),
-    'force drifts up by 0.5 N/s': Hazard(injection=Injection(Phase.SLIDE, lambda arm: arm.drift_force(DRIFT_N_S))),
-    'force drifts down by 0.5 N/s': Hazard(injection=Injection(Phase.SLIDE, lambda arm: arm.drift_force(-DRIFT_N_S))),
+    'force frozen in the approach': Hazard(phase=Phase.APPROACH, happens=SimulatedArm.freeze_force),
+    'force frozen while pressing': Hazard(phase=Phase.CONTACT, happens=SimulatedArm.freeze_force),
+    'force frozen in the slide': Hazard(happens=SimulatedArm.freeze_force),
+    'force frozen in the slide, rising 10°': Hazard(SurfaceShape(tilt_rad=0.1745), happens=SimulatedArm.freeze_force),
+    'force drifts up by 0.5 N/s': Hazard(happens=lambda arm: arm.drift_force(DRIFT_N_S)),
+    'force drifts down by 0.5 N/s': Hazard(happens=lambda arm: arm.drift_force(-DRIFT_N_S)),
 }
 
 
-def hazard_trials(name: str, stiffnesses_n_m: Sequence[float], lags_s: Sequence[float]) -> dict[float, Trials]:
-    """Return the trials with a hazard by undeclared lag in s and stiffness, of an arm that knows velocities alone."""
-    hazard = HAZARDS[name]
+def hazard_trials(hazard: Hazard, stiffnesses_n_m: Sequence[float], lag_s: float) -> Trials:
+    """Return the trials with a hazard by stiffness, of an arm with an undeclared lag that knows velocities alone."""
     return {
-        lag_s: {
-            k: simulate_force_controlled_slide(
-                replace(ARM, stiffness_n_m=k, undeclared_lag_s=lag_s),
-                injection=hazard.injection,
-                shape=hazard.surface,
-            )
-            for k in stiffnesses_n_m
-        }
-        for lag_s in lags_s
+        k: simulate_force_controlled_slide(replace(ARM, stiffness_n_m=k, undeclared_lag_s=lag_s), hazard=hazard)
+        for k in stiffnesses_n_m
     }
 
 
@@ -393,17 +373,6 @@ STYLES = list(zip(COLOURS, 'o^vsDP', strict=False))
 Trials = Mapping[float, ForceControlMetrics]  # by stiffness in N/m
 
 
-def _over_stiffness(
-    axes: Any, lines: Mapping[str, tuple[Sequence[float], Sequence[float]]], title: str, target: float
-) -> None:
-    """Draw lines of (stiffness in N/m, values) by name, and what is asked."""
-    for (name, (stiffnesses, values)), (colour, marker) in zip(lines.items(), STYLES, strict=False):
-        axes.semilogx(np.array(stiffnesses) / 1000, values, color=colour, marker=marker, markersize=4, label=name)
-    axes.axhline(target, color='black', linestyle='--', linewidth=1)
-    ticks = (0.2, 2, 20)
-    axes.set(title=title, xlabel='stiffness of the contact (kN/m)', xticks=ticks, xticklabels=map(str, ticks))
-
-
 def surface_chart(surfaces: Mapping[str, Trials], path: Path) -> Path:
     """Draw force and speed errors over stiffness, a line for each surface."""
     with chart(path, (9.0, 4.4), 'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s') as figure:
@@ -413,11 +382,12 @@ def surface_chart(surfaces: Mapping[str, Trials], path: Path) -> Path:
             ('force error, rms (%)', 'largest speed error in space (%)'),
             strict=True,
         ):
-            lines = {
-                name: ([*trials], [100 * getattr(trial, number) for trial in trials.values()])
-                for name, trials in surfaces.items()
-            }
-            _over_stiffness(axes, lines, title, 100 * TARGETS[number])
+            for (name, trials), (colour, marker) in zip(surfaces.items(), STYLES, strict=False):
+                values = [100 * getattr(trial, number) for trial in trials.values()]
+                axes.semilogx([k / 1000 for k in trials], values, color=colour, marker=marker, markersize=4, label=name)
+            axes.axhline(100 * TARGETS[number], color='black', linestyle='--', linewidth=1)
+            ticks = (0.2, 2, 20)
+            axes.set(title=title, xlabel='stiffness of the contact (kN/m)', xticks=ticks, xticklabels=map(str, ticks))
             axes.set_ylim(bottom=0)
         figure.axes[0].legend(loc='best')
     return path
@@ -532,11 +502,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     stiffnesses = STIFFNESSES_N_M[1:2] if options.quick else STIFFNESSES_N_M
     fine = STIFFNESSES_N_M if options.quick else FINE_STIFFNESSES_N_M
     lags_s, most = (LAGS_S[::3], 2) if options.quick else (LAGS_S, None)
-    surfaces = {
-        name: {k: simulate_force_controlled_slide(replace(ARM, stiffness_n_m=k), shape=shape) for k in fine}
-        for name, shape in SURFACES.items()
+    surfaces = {name: hazard_trials(Hazard(shape), fine, 0.0) for name, shape in SURFACES.items()}
+    hazards = {
+        name: {
+            f'{1e3 * lag_s:.0f} ms': _rows(hazard_trials(hazard, hazard.stiffnesses_n_m[:most], lag_s))
+            for lag_s in lags_s
+        }
+        for name, hazard in HAZARDS.items()
     }
-    hazards = {name: hazard_trials(name, hazard.stiffnesses_n_m[:most], lags_s) for name, hazard in HAZARDS.items()}
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S)
     robots = {
         name: {
@@ -566,7 +539,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'targets': TARGETS,
             'robots': robots,
             'surfaces_velocities_only': {name: _rows(trials) for name, trials in surfaces.items()},
-            'hazards': {name: _by_lag(by_lag) for name, by_lag in hazards.items()},
+            'hazards': hazards,
             'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
             'margin': margins(),
         },
@@ -575,10 +548,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             border_chart(border, options.out / 'motion_stability.png'),
         ),
     )
-
-
-def _by_lag(lags: Mapping[float, Trials]) -> dict[str, Any]:
-    return {f'{1e3 * lag:.0f} ms': _rows(trials) for lag, trials in lags.items()}
 
 
 def _rows(trials: Trials) -> dict[str, Any]:

@@ -205,13 +205,12 @@ class Processes:
 
 
 class ProcessUsage(NamedTuple):
-    """What a process used until a time (monotonic clock): memory in RAM, its own part of it, computing time."""
+    """What a process used until a time (monotonic clock): memory in RAM, computing time."""
 
     time_s: float
     node: str
     pid: int
     resident_bytes: int
-    own_bytes: int  # RssAnon: what grows if something is forgotten
     cpu_s: float
 
 
@@ -228,7 +227,7 @@ def read_usage(node: str, pid: int, time_s: float) -> ProcessUsage | None:
     if 'VmRSS' not in kib:  # it has ended, and nobody has asked how yet
         return None
     cpu_s = (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
-    return ProcessUsage(time_s, node, pid, 1024 * kib['VmRSS'], 1024 * kib['RssAnon'], cpu_s)
+    return ProcessUsage(time_s, node, pid, 1024 * kib['VmRSS'], cpu_s)
 
 
 @dataclass(frozen=True)
@@ -297,7 +296,6 @@ class SoakRecord:
 
 GROWTH = 0.01
 HUNG_S = 60.0
-CPU_SHARE, CPU_POINTS = 0.1, 0.01  # flat: within 10 % of itself, or within 1 % of all nodes together
 DRIFT_S = 0.3  # of what a device that was frozen keeps and sends late, 0.25 s, nothing may be taken for new
 WARM_UP_S = 300.0  # of a process, before its memory is evaluated
 STRETCH_S = 120.0  # medians over so long are compared, and a life must have two of them after the warm-up
@@ -328,9 +326,8 @@ def memory_growth(usages: Sequence[ProcessUsage]) -> list[dict[str, Any]]:
             early = [one for one in own if born_s + WARM_UP_S <= one.time_s <= born_s + WARM_UP_S + STRETCH_S]
             late = [one for one in own if one.time_s >= died_s - STRETCH_S]
             begin, end = (float(np.median([one.resident_bytes for one in part])) for part in (early, late))
-            own_begin, own_end = (float(np.median([one.own_bytes for one in part])) for part in (early, late))
-            growths = {'growth': end / begin - 1, 'own_growth': own_end / own_begin - 1}
-            found.append({'node': node, 'age_s': died_s - born_s, 'resident_bytes': (begin, end), **growths})
+            grown = {'resident_bytes': (begin, end), 'growth': end / begin - 1}
+            found.append({'node': node, 'age_s': died_s - born_s, **grown})
     return found
 
 
@@ -342,21 +339,6 @@ def cpu_shares(usages: Sequence[ProcessUsage]) -> dict[str, tuple[Array, Array]]
             share = (after.cpu_s - before.cpu_s) / max(1e-3, after.time_s - before.time_s)
             points.setdefault(node, []).append((after.time_s, share))
     return {node: (np.array(sorted(pairs))[:, 0], np.array(sorted(pairs))[:, 1]) for node, pairs in points.items()}
-
-
-def cpu_change(record: SoakRecord) -> dict[str, tuple[float, float]]:
-    """Return of each node the median share of a core in the first and in the last third after the warm-up."""
-    begin_s = min(record.begin_s + WARM_UP_S, (record.begin_s + record.end_s) / 2)
-    third_s = (record.end_s - begin_s) / 3
-    found = {}
-    for node, (times_s, shares) in cpu_shares(record.usages).items():
-        early, late = (
-            shares[(times_s >= begin_s) & (times_s < begin_s + third_s)],
-            shares[times_s >= record.end_s - third_s],
-        )
-        if len(early) and len(late):
-            found[node] = (float(np.median(early)), float(np.median(late)))
-    return found
 
 
 def check_requirements(record: SoakRecord) -> list[Requirement]:
@@ -373,10 +355,6 @@ def check_requirements(record: SoakRecord) -> list[Requirement]:
     memory = memory_growth(record.usages)
     worst = max(memory, key=lambda life: life['growth'], default=None)
     grown = f'{worst["node"]}, {worst["growth"]:+.2%} in {worst["age_s"] / 60:.0f} min' if worst else 'no process lived'
-    cpu = cpu_change(record)
-    # Of all nodes together: a machine that grows warm or is shared takes longer for the same work of each.
-    first, last = (sum(pair[i] for pair in cpu.values()) or 1.0 for i in (0, 1))
-    steep = [n for n, (a, b) in cpu.items() if b / last - a / first > max(CPU_POINTS, CPU_SHARE * a / first)]
     counts, book = record.totals, record.signal
     counted = max(counts.get('sensor', {}).get('lost', 0), counts.get('feature_extractor', {}).get('lost_samples', 0))
     missing = max(0, book.gaps - counted)
@@ -409,11 +387,6 @@ def check_requirements(record: SoakRecord) -> list[Requirement]:
             'memory of each process grows < 1 %',
             f'most: {grown} ({len(memory)} processes that lived long enough)',
             worst is not None and worst['growth'] < GROWTH,
-        ),
-        Requirement(
-            'computing time is flat',
-            f'all together {first:.1%} of a core early, {last:.1%} late; share rose: {", ".join(steep) or "none"}',
-            not steep,
         ),
         Requirement(
             'every lost sample is counted',
@@ -454,7 +427,6 @@ def write(record: SoakRecord, out: Path) -> Path:
             for name, taken in recovery_s.items()
         },
         'memory': memory_growth(record.usages),
-        'cpu_share_early_late': cpu_change(record),
         'counters': record.totals,
         'signal': {
             'samples': record.signal.samples,

@@ -16,7 +16,7 @@ from texture_benchmarks.borders import SETS as BORDER_SETS
 from texture_benchmarks.borders import figures as border_figures
 from texture_benchmarks.disturbances import ROWS, SCENE, SIMULATED, TRAINED, DisturbanceSweep, disturbed, simulate
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, share_interval, trained_apart
-from texture_core.types import Array, FeatureVector
+from texture_core.types import Array
 from texture_estimation.decisions import OUTSIDE
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel
@@ -32,6 +32,11 @@ OURS, PEER, PAPER = 'default', 'SVC on log bands', 'ets-fine-svm'  # of the pape
 RECIPES = (OURS, 'vibration-and-taxels')
 COMPARED = (*RECIPES, PEER, PAPER)
 TRAINED_ON, TESTED_ON, DISTURBED = '1-30', '31-40', '32,35,38'
+DISTURBED_DATA = f'{DATA["biotac20"]}; disturbances are computed on the recorded signals'
+SPLIT = (
+    f'BioTac, trained on slides {TRAINED_ON}, tested on {TESTED_ON}; disturbed: {DISTURBED}; borders: one half of the '
+    'path of slides 21-30 trained, of slides 31-40 tested'
+)
 TRAINED_SLIDES, TESTED_SLIDES = 25, 5  # simulated, of each of the 12 surfaces; 300 in all show an error rate of 1 %
 QUICK_COMPARED, QUICK_ROWS, QUICK_SIMULATED = ('fast', PEER), ('gain', 'lost samples'), ('circle, simulated',)
 QUICK_TRAINED, QUICK_TESTED = 6, 3
@@ -54,7 +59,6 @@ class Outcome:
     # the others were rejected
     final_right: int
     final_wrong: int
-    mean_s: float  # Mean sliding time until the first decided estimate, or to the end
     label_right: int  # Slides with the right label at the end, whether they were taken for known or not
     interval: tuple[
         float, float
@@ -72,7 +76,6 @@ class Outcome:
         first = [(next((e for e in result.estimates if e.decided), None), result) for result in measured]
         early = [estimate.label == result.surface for estimate, result in first if estimate is not None]
         final = [result.end.label == result.surface for result in measured if result.end.known]
-        times = [(estimate or result.estimates[-1]).evidence_s for estimate, result in first]
         labels = [bool(result.estimates) and result.end.label == result.surface for result in results]
         return cls(
             slides=len(results),
@@ -80,7 +83,6 @@ class Outcome:
             early_wrong=len(early) - sum(early),
             final_right=sum(final),
             final_wrong=len(final) - sum(final),
-            mean_s=float(np.mean(times)) if times else math.nan,
             label_right=sum(labels),
             interval=share_interval(labels, [result.surface for result in results]),
         )
@@ -91,50 +93,24 @@ Outcomes = dict[str, dict[str, Outcome]]  # by recipe and row
 
 def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> list[SlideResult]:
     """Return what a model says of slides, window by window."""
-    extracted = SlideDataset(tuple(slides)).vectors(model.recipe.feature_set)
-    return [evaluate_vectors(model, slide.surface, vectors) for slide, vectors in extracted]
+    results = []
+    for slide, vectors in SlideDataset(tuple(slides)).vectors(model.recipe.feature_set):
+        evidence = EvidenceAccumulator(model)
+        estimates = [evidence.update(vector) for vector in vectors]
+        alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []
+        results.append(SlideResult(slide.surface, alone, [estimate for estimate in estimates if estimate.windows]))
+    return results
 
 
-def evaluate_vectors(model: TextureModel, surface: str, vectors: Sequence[FeatureVector]) -> SlideResult:
-    """Return what a model says of the windows of one slide."""
-    evidence = EvidenceAccumulator(model)
-    estimates = [evidence.update(vector) for vector in vectors]
-    alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []
-    return SlideResult(surface, alone, [estimate for estimate in estimates if estimate.windows])
-
-
-@dataclass(frozen=True, eq=False)
-class _Data:
-    """What is trained on, and tested undisturbed and disturbed."""
-
-    trained: SlideDataset
-    tested: SlideDataset
-    to_disturb: SlideDataset
-    described: str
-    split: str
-
-    @classmethod
-    def recorded(cls, options: BenchmarkOptions) -> _Data:
-        """Return the recorded slides."""
-        with imported(options, 'biotac20') as bags:
-            slides = SlideDataset.from_bags(bags)
-        trained, tested, to_disturb = (slides.select(numbers) for numbers in (TRAINED_ON, TESTED_ON, DISTURBED))
-        return cls(
-            trained,
-            tested,
-            to_disturb,
-            f'{DATA["biotac20"]}; disturbances are computed on the recorded signals',
-            f'BioTac, trained on slides {TRAINED_ON}, tested on {TESTED_ON}; disturbed: {DISTURBED}; borders: one half '
-            'of the path of slides 21-30 trained, of slides 31-40 tested',
-        )
-
-    @classmethod
-    def simulated(cls, seed: int) -> _Data:
-        """Return simulated slides, for a quick run."""
-        slides = simulate(TRAINED, QUICK_TRAINED + QUICK_TESTED, np.random.default_rng(seed), told=True)
+def _slides(options: BenchmarkOptions) -> tuple[SlideDataset, SlideDataset, SlideDataset]:
+    """Return the slides that are trained, tested, and disturbed: recorded, or for a quick run simulated ones."""
+    if options.quick:
+        slides = simulate(TRAINED, QUICK_TRAINED + QUICK_TESTED, np.random.default_rng(options.seed), told=True)
         later = slides.select(f'{QUICK_TRAINED + 1}-{QUICK_TRAINED + QUICK_TESTED}')
-        split = f'simulated, trained on the first {QUICK_TRAINED} slides of each surface, tested on the others'
-        return cls(slides.select(f'1-{QUICK_TRAINED}'), later, later, f'simulated scene {SCENE}', split)
+        return slides.select(f'1-{QUICK_TRAINED}'), later, later
+    with imported(options, 'biotac20') as bags:
+        slides = SlideDataset.from_bags(bags)
+    return slides.select(TRAINED_ON), slides.select(TESTED_ON), slides.select(DISTURBED)
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
@@ -145,10 +121,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     disturbance, linear between strengths. The estimates are told nothing of the disturbance. 95 % intervals by
     bootstrap over surfaces, or exact over slides where these are wider.
     """
-    data = _Data.simulated(options.seed) if options.quick else _Data.recorded(options)
-    models = {name: _trained(name, data.trained) for name in (QUICK_COMPARED if options.quick else COMPARED)}
-    clean = {name: evaluate_slides(model, data.tested.slides) for name, model in models.items()}
-    outcomes = _under_disturbances(models, clean, data, options)
+    trained, tested, to_disturb = _slides(options)
+    models = {name: _trained(name, trained) for name in (QUICK_COMPARED if options.quick else COMPARED)}
+    clean = {name: evaluate_slides(model, tested.slides) for name, model in models.items()}
+    outcomes = _under_disturbances(models, clean, to_disturb, options)
     own = tuple(models)[:1] if options.quick else RECIPES
     refusals = _under_conditions({name: outcomes[name] for name in own}, options)
     numbers: dict[str, Any] = {
@@ -156,15 +132,16 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         'told_outside_what_was_trained': refusals,
         **{
             name: {
-                **_figures(clean[name]),
+                'window_accuracy': metrics.window_accuracy(clean[name]),
+                'calibration_error': metrics.calibration_error(clean[name]),
+                'wrong_known': metrics.wrong_known(clean[name]),
+                'unknown': metrics.unknown(clean[name]),
                 'early': metrics.early_decision(clean[name]),
-                'stopping_rule': asdict(model.decisions.stopping_rule),
-                'confidence_floor': asdict(model.decisions.confidence_floor),
                 'above_allowed': [row for row, one in outcomes[name].items() if one.worst_wrong > MAX_WRONG_KNOWN],
                 'outcomes': {row: asdict(outcome) for row, outcome in outcomes[name].items()},
                 'breakdown': {row: breakdown_strengths(ROWS[row], outcomes[name]) for row in _rows(options)},
             }
-            for name, model in models.items()
+            for name in models
         },
     }
     if not options.quick:
@@ -174,9 +151,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     return BenchmarkResult(
         name='trust',
         measured=run.__doc__,
-        data=f'{data.described}; forces and motions: simulated, scene {SCENE}, trained on {TRAINED_SLIDES} straight '
-        f'slides of each surface and tested on {TESTED_SLIDES}',
-        split=data.split,
+        data=f'{f"simulated scene {SCENE}" if options.quick else DISTURBED_DATA}; forces and motions: simulated, scene '
+        f'{SCENE}, trained on {TRAINED_SLIDES} straight slides of each surface and tested on {TESTED_SLIDES}',
+        split=f'simulated, trained on the first {QUICK_TRAINED} slides of each surface' if options.quick else SPLIT,
         numbers=numbers,
         charts=charts,
     )
@@ -195,20 +172,10 @@ def _recipe(name: str) -> Recipe:
     return trained_apart(recipe_of(name)) if name in (PEER, PAPER) else recipe_of(name)
 
 
-def _figures(results: Sequence[SlideResult]) -> dict[str, object]:
-    return {
-        'window_accuracy': metrics.window_accuracy(results),
-        'accuracy_at_s': metrics.accuracy_at_times(results),
-        'calibration_error': metrics.calibration_error(results),
-        'wrong_known': metrics.wrong_known(results),
-        'unknown': metrics.unknown(results),
-    }
-
-
 def _under_disturbances(
     models: Mapping[str, TextureModel],
     clean: Mapping[str, Sequence[SlideResult]],
-    data: _Data,
+    to_disturb: SlideDataset,
     options: BenchmarkOptions,
 ) -> Outcomes:
     """Return the outcomes of undisturbed slides, and of the slides under each disturbance."""
@@ -216,10 +183,10 @@ def _under_disturbances(
     for row, kind in enumerate(_rows(options)):
         own = ROWS[kind]
         for column, strength in enumerate(own.strengths):
-            seeds = np.random.SeedSequence([options.seed, row, column]).spawn(len(data.to_disturb))
+            seeds = np.random.SeedSequence([options.seed, row, column]).spawn(len(to_disturb))
             slides = [
                 disturbed(item, own, strength, np.random.default_rng(seed))
-                for item, seed in zip(data.to_disturb, seeds, strict=True)
+                for item, seed in zip(to_disturb, seeds, strict=True)
             ]
             for name, model in models.items():
                 outcomes[name][own.name(strength)] = Outcome.of(evaluate_slides(model, slides))
