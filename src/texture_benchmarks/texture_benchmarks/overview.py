@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.transforms import Bbox
 
 from texture_benchmarks.borders import recipe_of
 from texture_benchmarks.study import (
@@ -84,6 +85,7 @@ CLASSIFIERS: Mapping[str, str] = {
     'QUANT': 'aeon.classification.interval_based:QUANTClassifier',  # Dempster et al. 2024
 }
 OF_ALL_CHANNELS = ('MiniRocket',)  # the features of 23 channels take the other gigabytes, and a tenth of a second each
+PEERS_SHOWN = ('SVC on log bands', 'MiniRocket')  # over the sliding time: QUANT lies between them
 PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.5)
 FIRST_COUNTS = 1e-6  # of a vote: of equal counts, the label that was voted for first wins
 
@@ -340,19 +342,21 @@ def _shown(numbers: Mapping[str, Any], channels: str) -> dict[str, Mapping[str, 
     papers = {name: cell for name, cell in cells.items() if cell['kind'] == PAPERS}
     best = max(papers, key=lambda name: papers[name]['accuracy_at_end'])
     ours = {name: cells[name] for name in ('default', 'vibration-and-taxels') if name in cells}
-    peers = {name: cell for name, cell in cells.items() if cell['kind'] == PEERS}
-    if channels != VIBRATION:
-        others = {f'{name},\n{VIBRATION}': cell for name, cell in numbers[VIBRATION].items() if cell['kind'] == PEERS}
-        peers |= {name: cell for name, cell in others.items() if name.partition(',')[0] not in peers}
+    peers = {
+        name if name in cells else f'{name},\n{VIBRATION}': cells.get(name, numbers[VIBRATION][name])
+        for name in PEERS_SHOWN
+        if name in numbers[VIBRATION]
+    }
     return {**ours, f'{AUTHORS[best.split("-")[0]]}:\n{best}': papers[best], **peers}
 
 
 def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
-    for cell in shown.values():
+    for name, cell in shown.items():
+        dashes = ':' if name.startswith(PEERS_SHOWN[0]) else DASHES[cell['kind']]
         style, wrong = STYLES[cell['kind']], wrong_percent(cell['share'])
         high, low = wrong_percent(cell['interval']).T
         axes.fill_between(cell['s'], low, high, alpha=0.13, linewidth=0, **style)
-        axes.plot(cell['s'], wrong, DASHES[cell['kind']], linewidth=2.0, **style)
+        axes.plot(cell['s'], wrong, dashes, linewidth=2.0, **style)
         if ends := cell['ends_when_decided']:
             axes.plot(ends['mean_s'], wrong_percent(ends['accuracy']), '*', markersize=15, markeredgecolor='black',
                       zorder=5, **style)  # fmt: skip
@@ -420,16 +424,19 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     return Path(path)
 
 
+OFFSETS = [(x, y) for y in (7, -8, 20, -21, 33, -34) for x in (6, -6)]  # of a name from its point, in points
+
+
 def _name_points(axes: Any, names: Sequence[str], kinds: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
-    """Write names above their points, the most accurate first, where they cover no other name."""
-    figure = axes.figure
-    taken: list[Any] = []
-    for index in sorted(range(len(names)), key=lambda at: (kinds[at] == VARIANTS, -points[at][1])):
-        for offset, side in (((6, 7), 'left'), ((-6, 7), 'right'), ((6, -7), 'left'), ((-6, -7), 'right')):
-            text = axes.annotate(names[index], (points[index][0], wrong_percent(points[index][1])), xytext=offset,
-                                 textcoords='offset points', ha=side, va='center', **STYLES[kinds[index]])  # fmt: skip
-            box = text.get_window_extent(figure.canvas.get_renderer())
-            if not any(box.overlaps(other) for other in taken):
+    """Write names next to their points, the most accurate first, where they cover no other name and no point."""
+    places = [(cost, wrong_percent(share)) for cost, share in points]
+    taken = [Bbox.from_bounds(x - 6, y - 6, 12, 12) for x, y in axes.transData.transform(places)]
+    for index in sorted(range(len(names)), key=lambda at: -points[at][1]):
+        for offset in OFFSETS:
+            text = axes.annotate(names[index], places[index], xytext=offset, textcoords='offset points', va='center',
+                                 ha='left' if offset[0] > 0 else 'right', **STYLES[kinds[index]])  # fmt: skip
+            box = text.get_window_extent(axes.figure.canvas.get_renderer())
+            if box.x0 > axes.bbox.x0 and not any(box.overlaps(other) for other in taken):
                 text.set_bbox({'facecolor': 'white', 'alpha': 0.7, 'edgecolor': 'none', 'pad': 0.5})
                 taken.append(box)
                 break
