@@ -332,8 +332,7 @@ def figures(tested: Sequence[SlideAnswer]) -> dict[str, Any]:
         'slides_of_clusters': dict(zip(names, np.bincount(row).tolist(), strict=True)),
         'decided_wrong': float(np.mean(wrong)),
         'interval': {
-            name: interval(np.stack([np.bincount(row, which), np.bincount(row)], axis=1).astype(np.float64))
-            for name, which in shares.items()
+            name: interval(np.stack([which, np.ones(len(which))], axis=1), row) for name, which in shares.items()
         },
         'after_s': {f'{seconds:g}': _after(results, seconds) for seconds in TIMES_S},
     }

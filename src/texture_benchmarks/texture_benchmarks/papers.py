@@ -24,7 +24,7 @@ from texture_benchmarks.borders import (
 )
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, of_examples
+from texture_estimation.learners.learner import of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.cross_validation import interval
 from texture_features.feature_set import LabelledFeatures
@@ -129,8 +129,10 @@ def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:
 
 
 def _share(pairs: list[tuple[str, bool]]) -> dict[str, Any]:
-    names = sorted({cluster for cluster, _ in pairs})
-    row: Codes = np.array([names.index(cluster) for cluster, _ in pairs])
     which = np.array([right for _, right in pairs])
-    counts = np.stack([np.bincount(row, which), np.bincount(row)], axis=1).astype(np.float64)
-    return {'slides': len(pairs), 'right': float(which.mean()), 'interval': interval(counts)}
+    counts = np.stack([which, np.ones(len(which))], axis=1)
+    return {
+        'slides': len(pairs),
+        'right': float(which.mean()),
+        'interval': interval(counts, [cluster for cluster, _ in pairs]),
+    }

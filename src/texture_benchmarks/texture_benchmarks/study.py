@@ -122,8 +122,7 @@ def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[floa
     Slides over one surface are no independent draws. Where all surfaces are alike, resampling them says nothing.
     Source of the exact one: Clopper & Pearson 1934.
     """
-    surface = np.unique(surfaces, return_inverse=True)[1]
-    drawn = interval(np.stack([np.bincount(surface, right), np.bincount(surface)], axis=1).astype(np.float64))
+    drawn = interval(np.stack([right, np.ones(len(right))], axis=1), surfaces)
     exact = binomtest(int(np.sum(right)), len(right)).proportion_ci()
     if all(right) or not any(right):
         return float(exact.low), float(exact.high)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import argparse
 import json
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from texture_evaluation.cross_validation import (
     ChronologicalSplit,
     CrossValidation,
     FoldResult,
+    clustered,
     compare,
     compare_all,
     cross_validate,
@@ -27,7 +29,7 @@ from texture_evaluation.cross_validation import (
     slide_counts,
     split_slides,
 )
-from texture_evaluation.evaluate import evaluate_dataset, table
+from texture_evaluation.evaluate import evaluate_dataset, sentence, table
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
@@ -136,6 +138,14 @@ def test_a_single_fold_gives_the_figures_of_train_and_evaluate(simulated: Path) 
         assert one.end.prediction_set == other.end.prediction_set
 
 
+def test_answers_of_one_cluster_count_together() -> None:
+    counts = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 1.0], [1.0, 2.0]])
+    np.testing.assert_array_equal(clustered(counts, ['b', 'a', 'b', 'a']), [[1.0, 3.0], [2.0, 2.0]])
+    alike = np.repeat([[1.0, 1.0], [0.0, 1.0]], 10, axis=0)
+    assert interval(alike, ['a'] * 10 + ['b'] * 10) == [0.0, 1.0]  # two draws
+    assert interval(alike, list('abcdefghijklmnopqrst')) == interval(alike)
+
+
 def test_impossible_splits_are_refused_with_a_sentence() -> None:
     with pytest.raises(InvalidData, match="'cork' has 6 slides, too few for 7 folds"):
         cross_validate(RECIPE, tones(), StratifiedGroupKFold(7))
@@ -149,6 +159,39 @@ def test_a_surface_that_is_tested_but_never_trained_is_refused() -> None:
     dataset = tones()
     with pytest.raises(InvalidData, match=r"tested but never trained.*'cork'.*set `session`.*stratified"):
         cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=dataset.labels)
+
+
+def test_a_surface_of_one_session_trains_but_is_not_tested() -> None:
+    dataset = tones()
+    sessions = np.where(np.arange(24) < 12, 'monday', 'tuesday')
+    sessions[dataset.labels == 'cork'] = 'monday'
+    result = cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=sessions)
+    assert result.untested == {'cork': 6}
+    assert {one.surface for one in result.pooled} == {'felt', 'wood', 'slate'}
+    by_name = {fold.name: fold for fold in result.folds}
+    assert not any(name.startswith('cork') for name in by_name['tuesday'].results)
+    assert any(name.startswith('cork') for name in by_name['tuesday'].trained_on)
+    assert "trained but not tested, as no other slide would train them: 'cork' (6 slides)" in table(result, 'x')
+
+
+@pytest.mark.parametrize(
+    ('splitter', 'groups', 'border', 'clusters'),
+    [
+        (LeaveOneGroupOut(), 'speed', 'other speed', 12),  # four surfaces, three speeds
+        (GroupShuffleSplit(4, test_size=0.5, random_state=0), 'slide', 'same track', None),
+    ],
+)
+def test_slides_of_what_was_left_out_are_one_cluster_of_the_interval(
+    splitter: object, groups: str, border: str, clusters: int | None
+) -> None:
+    result = cross_validate(RECIPE, tones(), splitter, groups=groups)
+    figures = result.as_json()
+    assert figures['border'] == border
+    distinct = len({name for fold in result.folds for name in fold.results})  # a slide that is tested twice is one
+    assert distinct < figures['n_slides'] or clusters
+    assert figures['n_clusters'] == (clusters or distinct)
+    assert figures['slide_accuracy_interval'] == [pytest.approx(0.05 ** (1 / figures['n_clusters'])), 1.0]
+    assert f'border: {border}' in table(result, 'x')[0]
 
 
 def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
@@ -189,6 +232,7 @@ def test_a_split_is_named_in_a_word(text: str, kind: type, groups: str) -> None:
         '',
         'leave-one-out:place:1',
         'leave-one-out:speed:2',
+        'random:0',
     ],
 )
 def test_a_split_that_makes_no_sense_is_refused_with_what_is_allowed(text: str) -> None:
@@ -273,6 +317,16 @@ def test_a_comparison_counts_the_slides_that_the_one_alone_recognises() -> None:
     assert 0.0 < low < 0.6 < high <= 1.0
 
 
+def test_slides_of_one_place_are_one_case_of_the_test() -> None:
+    first, second = (cross_validation(name, [right] * 8) for name, right in (('a', False), ('b', True)))
+    assert compare(first, second).p_value == pytest.approx(2 / 2**8)
+    places = {f'cork/{number}': str(number % 3) for number in range(1, 9)}
+    one = compare(*(replace(result, clusters=places) for result in (first, second)))
+    assert (one.n_slides, one.n_clusters, one.only_second) == (8, 3, 8)
+    assert one.p_value == pytest.approx(2 / 2**3)
+    assert 'exact sign test over 3 clusters' in sentence(one)
+
+
 def test_the_interval_of_the_difference_is_that_of_pairs() -> None:
     """Slides that both recognise, or both do not, say nothing of the difference and widen it little."""
     common = [True, False] * 50
@@ -322,7 +376,7 @@ def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
     assert "'level' against 'bands' on 18 slides" in said
     figures = json.loads((tmp_path / 'figures.json').read_text())
     assert (figures['split'], figures['seed']) == ('leave-one-out:session', 0)
-    assert figures['bags'] == [str(tmp_path / 'bags')]
+    assert (figures['bags'], figures['slides']) == ([str(tmp_path / 'bags')], 'all')
     assert [recipe['recipe'] for recipe in figures['recipes']] == ['bands', 'level']
     assert figures['recipes'][0]['slide_accuracy'] == 1.0
     assert figures['comparisons'][0]['slide_difference'] < 0

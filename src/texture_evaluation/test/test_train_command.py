@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from texture_estimation.training import train
 from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.commands.train import summary
 from texture_evaluation.evaluate import evaluate, evaluate_dataset
+from texture_evaluation.evaluate import summary as report_summary
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
@@ -126,11 +128,9 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     evaluated: TextureModel, simulated: Path
 ) -> None:
     figures = evaluate(evaluated, [simulated], '5-6').as_json()
-    assert list(figures) == [
-        'window_accuracy', 'accuracy_at_s', 'early', 'calibration_error', 'candidates', 'falsely_rejected',
-        'unknown_accepted', 'labels', 'confusion', 'latency_us', 'unclassified',
-        'wrong_known', 'unknown',
-    ]  # fmt: skip
+    assert (figures['border'], figures['trained_on'], figures['n_slides']) == ('same session', [], 6)
+    assert figures['n_slides_at_s'] == {'0.5': 6, '1.0': 6, '2.5': 0, '5.0': 0}
+    assert figures['slide_accuracy_interval'] == [pytest.approx(0.05 ** (1 / 6)), 1.0]
     table = np.array(figures['confusion'])
     assert figures['window_accuracy'] == pytest.approx(np.trace(table) / table.sum())
     assert figures['window_accuracy'] > 0.9
@@ -141,6 +141,19 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert figures['wrong_known'] == {'early': 0.0, 'final': 0.0}
     assert figures['unknown'] == {'early': 0.0, 'final': 0.0}
     assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
+
+
+def test_slides_of_the_training_are_named_whatever_their_bag_is_called(
+    evaluated: TextureModel, simulated: Path, tmp_path: Path
+) -> None:
+    copies = tmp_path / 'other'
+    copies.mkdir()
+    for bag in simulated.iterdir():
+        shutil.copytree(bag, copies / f'{bag.name}_again')
+    report = evaluate(evaluated, [copies], '4-6')
+    assert report.trained_on == ('glass/4', 'leather/4', 'ridge_2mm_deep/4')
+    assert report.border == 'other session'
+    assert '3 of 9 slides were in the training' in '\n'.join(report_summary(report))
 
 
 def test_surfaces_that_were_not_trained_count_as_unknown_alone(simulated: Path) -> None:

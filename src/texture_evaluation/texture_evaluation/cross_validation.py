@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
@@ -105,56 +106,81 @@ def _check_cluster(client: Any, address: str) -> None:
 
 
 # --------------------
-# Shares of windows and slides that are right, with 95 % intervals by bootstrap over slides; exact at 0 and 100 %.
+# Shares of windows and slides that are right, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
 
 RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
 
-def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
+def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = None) -> dict[str, Any]:
     """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are.
 
     Parameters
     ----------
     results
         Of the test slides.
+    clusters : (n_slides,)
+        As in `interval`.
 
     Returns
     -------
     dict
         A share is None where no slide is long enough, and so is its interval.
     """
+    of_clusters = np.arange(len(results)).astype(str) if clusters is None else np.array(clusters, dtype=str)
+    counts = {
+        'window_accuracy': window_counts(results),
+        'slide_accuracy': slide_counts(results),
+        'known_right': _counted([one.end.known and one.end.label == one.surface for one in results]),
+        'known_wrong': _counted([one.end.known and one.end.label != one.surface for one in results]),
+    }
+    at_s, intervals_at_s, n_at_s = {}, {}, {}
+    for seconds in metrics.TIMES_S:
+        ends = [result.after(seconds) for result in results]
+        reached = [row for row, end in enumerate(ends) if end is not None]
+        right = _counted([end.label == one.surface for one, end in zip(results, ends, strict=True) if end is not None])
+        key = f'{seconds:.1f}'
+        at_s[key], intervals_at_s[key] = _share_of(right, of_clusters[reached])
+        n_at_s[key] = len(reached)
+    shares = {name: _share_of(own, of_clusters) for name, own in counts.items()}
     return {
         'n_slides': len(results),
         'n_windows': sum(len(result.window_labels) for result in results),
-        'window_accuracy': metrics.window_accuracy(results) if results else None,
-        'slide_accuracy': metrics.accuracy_at_end(results) if results else None,
-        'accuracy_at_s': dict(metrics.accuracy_at_times(results)),
-        'window_accuracy_interval': interval(window_counts(results)) if results else None,
-        'slide_accuracy_interval': interval(slide_counts(results)) if results else None,
-        'accuracy_at_s_interval': {f'{seconds:.1f}': _interval_at(results, seconds) for seconds in metrics.TIMES_S},
+        'n_clusters': len(set(of_clusters.tolist())),
+        **{name: share for name, (share, _) in shares.items()},
+        **{f'{name}_interval': own for name, (_, own) in shares.items()},
+        'accuracy_at_s': at_s,
+        'accuracy_at_s_interval': intervals_at_s,
+        'n_slides_at_s': n_at_s,
     }
 
 
-def _interval_at(results: Sequence[SlideResult], seconds: float) -> list[float] | None:
-    """Return the interval of `metrics.accuracy_at`, over the slides that are long enough; None without any."""
-    ends = [(result.surface, result.after(seconds)) for result in results]
-    right = [(end.label == surface, 1) for surface, end in ends if end is not None]
-    return interval(np.array(right, dtype=np.float64)) if right else None
+def _counted(which: Sequence[bool]) -> Array:
+    """Return 0 or 1, and 1, for each slide, (n_slides, 2)."""
+    return np.array([(one, 1) for one in which], dtype=np.float64).reshape(-1, 2)
 
 
-def interval(counts: Array) -> list[float]:
-    """Return the 95 % interval of a share by bootstrap over slides: windows of a slide are not independent.
+def _share_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[float] | None]:
+    """Return a share and its interval; None for both without an answer."""
+    right, answers = counts.sum(axis=0)
+    return (float(right / answers), interval(counts, clusters)) if answers else (None, None)
+
+
+def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) -> list[float]:
+    """Return the 95 % interval of a share by bootstrap over clusters: answers within one are not independent.
 
     Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
-    the share of slides, about 3/n wide.
+    the share of clusters, about 3/n wide.
 
     Parameters
     ----------
     counts : (n_slides, 2)
         Number of right answers and of all answers of each slide, see `window_counts` and `slide_counts`.
+    clusters : (n_slides,)
+        Name of the cluster of each slide, such as its surface and place; None: each slide is one.
 
     Sources: Efron & Tibshirani 1993, chapter 13 (percentile interval); Clopper & Pearson 1934, at 0 and n of n.
     """
+    counts = counts if clusters is None else clustered(counts, clusters)
     right, answers = counts.sum(axis=0)
     if right in (0.0, answers):
         edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
@@ -162,11 +188,25 @@ def interval(counts: Array) -> list[float]:
     return _edges(_resampled(counts))
 
 
+def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:
+    """Return right and all answers of each cluster, (n_clusters, 2), by the sorted names of the clusters.
+
+    Parameters
+    ----------
+    counts : (n_slides, 2)
+        Of each slide.
+    clusters : (n_slides,)
+        Name of the cluster of each slide.
+    """
+    row = np.unique(clusters, return_inverse=True)[1]
+    return np.stack([np.bincount(row, column) for column in counts.T], axis=1)
+
+
 def _resampled(counts: Array) -> Array:
-    """Return the share that is right in each resample of the slides, (..., RESAMPLES), of (..., n_slides, 2)."""
+    """Return the share that is right in each resample of the rows, (..., RESAMPLES), of (..., n_clusters, 2)."""
     # Always the same resamples: the figures of a page do not change from run to run.
-    n_slides = counts.shape[-2]
-    drawn = np.random.default_rng(0).integers(n_slides, size=(RESAMPLES, n_slides))
+    n_rows = counts.shape[-2]
+    drawn = np.random.default_rng(0).integers(n_rows, size=(RESAMPLES, n_rows))
     sums = counts[..., drawn, :].sum(axis=-2)
     return sums[..., 0] / sums[..., 1]
 
@@ -185,7 +225,7 @@ def window_counts(results: Sequence[SlideResult]) -> Array:
         Whole numbers.
     """
     counts = [(sum(label == one.surface for label in one.window_labels), len(one.window_labels)) for one in results]
-    return np.array(counts, dtype=np.float64)
+    return np.array(counts, dtype=np.float64).reshape(-1, 2)
 
 
 def slide_counts(results: Sequence[SlideResult]) -> Array:
@@ -196,7 +236,7 @@ def slide_counts(results: Sequence[SlideResult]) -> Array:
     (n_slides, 2)
         0 or 1, and 1.
     """
-    return np.array([(one.estimates[-1].label == one.surface, 1) for one in results], dtype=np.float64)
+    return _counted([one.estimates[-1].label == one.surface for one in results])
 
 
 # --------------------
@@ -268,6 +308,15 @@ class ChronologicalSplit:
 # --------------------
 # The outcome of a cross-validation.
 
+SAME_TRACK, SAME_SESSION, OTHER_SESSION = 'same track', 'same session', 'other session'
+# Which border is crossed where this condition is on one side only; other splits test the same track.
+BORDERS: Mapping[str, str] = {
+    'place': 'other place',
+    'session': OTHER_SESSION,
+    'sensor': 'other finger',
+    **{name: f'other {name}' for name in ('speed', 'force', 'direction', 'motion')},
+}
+
 
 @dataclass(frozen=True, eq=False)
 class FoldResult:
@@ -308,17 +357,31 @@ class CrossValidation:
         In their order.
     unusable
         Names of test slides without a whole window, which count nowhere.
+    border
+        Which border the test slides cross from those of the training, such as 'other place'.
+    clusters
+        Cluster of each slide, by its name: those of one are no independent draws. One that is missing is a cluster.
+    untested
+        How many slides of a surface train, but are not tested, as no slide of it would be in their training.
     """
 
     recipe: str
     labels: tuple[str, ...]
     folds: tuple[FoldResult, ...]
     unusable: tuple[str, ...] = ()
+    border: str = SAME_TRACK
+    clusters: Mapping[str, str] = field(default_factory=dict)
+    untested: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def pooled(self) -> list[SlideResult]:
         """Results of all test slides of all folds."""
         return [result for fold in self.folds for result in fold.results.values()]
+
+    def figures(self, folds: Sequence[FoldResult]) -> dict[str, Any]:
+        """Return the figures of folds together, with intervals over clusters; see the function `figures`."""
+        named = [item for fold in folds for item in fold.results.items()]
+        return figures([result for _, result in named], [self.clusters.get(name, name) for name, _ in named])
 
     def as_json(self) -> dict[str, Any]:
         """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide.
@@ -329,19 +392,21 @@ class CrossValidation:
             'recipe': self.recipe,
             'feature_set': self.folds[0].model.feature_set,
             'version': version('texture_evaluation'),
-            **figures(self.pooled),
+            'border': self.border,
+            **self.figures(self.folds),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
             'folds': [
                 {
                     'name': fold.name,
                     'trained_on': list(fold.trained_on),
-                    **figures(list(fold.results.values())),
+                    **self.figures([fold]),
                     'slides': {name: result.estimates[-1].label for name, result in fold.results.items()},
                 }
                 for fold in self.folds
             ],
             'unusable': list(self.unusable),
+            'untested': dict(self.untested),
         }
 
 
@@ -357,24 +422,26 @@ class PairedComparison:
     ----------
     first, second
         Names of the recipes.
-    n_slides
-        Number of slides that both were tested on.
+    n_slides, n_clusters
+        Number of slides that both were tested on, and of clusters of them, see `CrossValidation`.
     only_first, only_second
         Number of slides that the one alone recognises. A slide that is tested in several folds is recognised if it is
         in more than half of them.
     p_value
-        Probability of at least such a difference if both were equally good: exact McNemar test, two-sided.
+        Probability of at least such a difference if both were equally good: exact sign test over clusters, two-sided,
+        which is the McNemar test where each slide is one.
     p_value_adjusted
         The same, adjusted for all comparisons that were made together (Holm).
     slide_difference, window_difference
         Second minus first share that is right.
     slide_interval, window_interval
-        Their 95 % intervals by bootstrap over slides.
+        Their 95 % intervals by bootstrap over clusters.
     """
 
     first: str
     second: str
     n_slides: int
+    n_clusters: int
     only_first: int
     only_second: int
     p_value: float
@@ -417,11 +484,14 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     # A slide may be tested in several folds, and half right is not recognised.
     recognised = right[..., 0] > 0.5 * right[..., 1]
     only_first, only_second = (int((recognised[a] & ~recognised[b]).sum()) for a, b in ((0, 1), (1, 0)))
-    p_value = mcnemar(only_first, only_second)
+    clusters = [first.clusters.get(name, name) for name in slides]
+    right, windows = (np.stack([clustered(own, clusters) for own in both]) for both in (right, windows))
+    alike = np.stack([clustered(_counted(own), clusters)[:, 0] for own in recognised])  # slides of each cluster
+    p_value = mcnemar(int((alike[0] > alike[1]).sum()), int((alike[1] > alike[0]).sum()))
     slide_difference, slide_interval = _difference(right)
     window_difference, window_interval = _difference(windows)
     return PairedComparison(
-        first.recipe, second.recipe, len(slides), only_first, only_second, p_value, p_value,
+        first.recipe, second.recipe, len(slides), right.shape[1], only_first, only_second, p_value, p_value,
         slide_difference, slide_interval, window_difference, window_interval,
     )  # fmt: skip
 
@@ -449,7 +519,7 @@ def compare_all(results: Sequence[CrossValidation]) -> list[PairedComparison]:
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
-    """Return the exact two-sided p value of the McNemar test, 1 if the two never differ.
+    """Return the exact two-sided p value of the McNemar (sign) test, 1 if the two never differ.
 
     Parameters
     ----------
@@ -482,9 +552,9 @@ def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool)
 
 
 def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
-    """Return second minus first share, and its interval; `counts` is (2, n_slides, 2)."""
+    """Return second minus first share, and its interval; `counts` is (2, n_clusters, 2)."""
     first, second = (right / answers for right, answers in counts.sum(axis=1))
-    # Both recipes on the same resampled slides: what is hard for both widens no interval.
+    # Both recipes on the same resampled clusters: what is hard for both widens no interval.
     drawn = _resampled(counts)
     low, high = _edges(drawn[1] - drawn[0])
     return float(second - first), (low, high)
@@ -518,7 +588,8 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
         for result, style in zip(results, line_styles(), strict=False):
             seconds, accuracy = curve(result.pooled)
             times.plot(seconds, 100 * accuracy, label=result.recipe, marker='.', **style)
-        times.set(xlabel='sliding time used (s)', ylabel='slides recognised (%)', xlim=(0, None), ylim=(None, 101))
+        times.set(xlabel='sliding time used (s), as far as all slides reach', ylabel='slides recognised (%)')
+        times.set(xlim=(0, None), ylim=(None, 101))
         times.legend(loc='best')
     return Path(path)
 
@@ -610,7 +681,10 @@ def parse_split(text: str, seed: int = 0) -> Split:
     if name not in SPLITS:
         raise InvalidParameter(f"the split is '{text}': {unknown_name(name, SPLITS, 'split')}; {ALLOWED}")
     try:
-        return SPLITS[name](text, argument, seed)
+        split = SPLITS[name](text, argument, seed)
+        if getattr(split.splitter, 'n_splits', 1) < 1:
+            raise ValueError
+        return split
     except ValueError as error:
         raise InvalidParameter(f"the split is '{text}'; {ALLOWED}") from error
 
@@ -637,7 +711,7 @@ SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
 }
 ALLOWED = (
     f'write stratified:FOLDS (2 or more), leave-one-out:CONDITION ({", ".join(CONDITIONS)}; place:PARTS), '
-    'chronological:TRAINING_FRACTION (between 0 and 1) or random:SPLITS'
+    'chronological:TRAINING_FRACTION (between 0 and 1) or random:SPLITS (1 or more)'
 )
 
 
@@ -705,8 +779,11 @@ def _of_other_slides(
         yield train[~tested[train]], test[tested[test]]
 
 
-def refuse_untrained(labels: AnyArray, splits: Sequence[tuple[NDArray[np.intp], NDArray[np.intp]]]) -> None:
-    """Refuse splits in which a surface is never trained where it is tested: its slides could not be right.
+Rows = NDArray[np.intp]
+
+
+def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -> list[tuple[Rows, Rows]]:
+    """Return splits that test no slide of a surface that they do not train: it could not be right.
 
     Parameters
     ----------
@@ -718,16 +795,16 @@ def refuse_untrained(labels: AnyArray, splits: Sequence[tuple[NDArray[np.intp], 
     Raises
     ------
     InvalidData
-        With the surfaces.
+        With the surfaces, if no slide is left to test.
     """
-    sides = [(set(labels[train].tolist()), set(labels[test].tolist())) for train, test in splits]
-    if any(len(trained) < 2 for trained, _ in sides):
-        return  # the training says it better: it names the fold
-    possible = {label for trained, tested in sides for label in trained & tested}
-    untrained = sorted({label for _, tested in sides for label in tested} - possible)
-    if untrained:
-        names = ', '.join(f"'{label}'" for label in untrained)
+    if any(len(np.unique(labels[train])) < 2 for train, _ in splits):
+        return list(splits)  # the training says it better: it names the fold
+    possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
+    left = [(train, test) for train, test in possible if len(test)]
+    if not left:
+        names = ', '.join(f"'{label}'" for label in np.unique(labels))
         raise InvalidData(f'tested but never trained in the same fold: {names}; {SPLIT_ADVICE}')
+    return left
 
 
 def _check_folds(labels: AnyArray, folds: int) -> None:
@@ -807,8 +884,8 @@ def cross_validate(
     Raises
     ------
     InvalidData
-        If a split is impossible, no slide has a window, a fold has fewer than two surfaces to train on, or a surface is
-        tested but never trained.
+        If a split is impossible, no slide has a window, a fold has fewer than two surfaces to train on, or no surface
+        is tested where it is trained.
 
     Examples
     --------
@@ -820,7 +897,9 @@ def cross_validate(
     """
     columns = slide_groups(dataset, groups)
     splits = split_slides(dataset, splitter, columns)
-    refuse_untrained(dataset.labels, splits)
+    asked = {row for _, test in splits for row in test.tolist()}
+    splits = of_trained_surfaces(dataset.labels, splits)
+    untested = asked - {row for _, test in splits for row in test.tolist()}
     names = dataset.names
     named = [
         (names[train_rows], names[test_rows], _fold_name(number, columns, test_rows))
@@ -836,11 +915,20 @@ def cross_validate(
         for train, test, name in named
     )
     usable = set(tested.groups.tolist())
+    border = BORDERS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
+    of_slides = border == SAME_TRACK
+    clusters = [
+        slide.whole_name if of_slides else f'{slide.surface} {group}'
+        for slide, group in zip(dataset, columns.tolist(), strict=True)
+    ]
     return CrossValidation(
         recipe.name,
         tuple(np.unique(dataset.labels).tolist()),
         tuple(folds),
         tuple(name for name in names.tolist() if name not in usable),
+        border,
+        dict(zip(names.tolist(), clusters, strict=True)),
+        dict(Counter(dataset.labels[sorted(untested)].tolist())),
     )
 
 

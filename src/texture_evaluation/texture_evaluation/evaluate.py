@@ -16,8 +16,16 @@ from texture_core.types import AnyArray, Array, FeatureVector, TextureEstimate
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
-from texture_evaluation.cross_validation import CrossValidation, PairedComparison
+from texture_evaluation.cross_validation import (
+    OTHER_SESSION,
+    SAME_SESSION,
+    SAME_TRACK,
+    CrossValidation,
+    PairedComparison,
+    figures,
+)
 from texture_evaluation.metrics import SlideResult
+from texture_evaluation.train import slide_digest
 from texture_features.feature_set import fingerprint_difference
 from texture_features.windows import WindowEvent
 from texture_recordings.dataset import LabelledSlide, SlideDataset, no_window
@@ -39,6 +47,12 @@ class EvaluationReport:
         Names of slides without a usable window, which count nowhere.
     tare_faults
         Streams that are tared and should not be, or the other way round, in sentences.
+    border
+        Which border the slides cross from the training, as far as the names of the bags tell; '' if they do not.
+    trained_on
+        Names of the slides that were in the training.
+    clusters
+        Of the slides in `known`: those of one are no independent draws; None: each is one.
     """
 
     labels: tuple[str, ...]
@@ -47,6 +61,9 @@ class EvaluationReport:
     latency_us: Array
     unusable: tuple[str, ...] = ()
     tare_faults: tuple[str, ...] = ()
+    border: str = ''
+    trained_on: tuple[str, ...] = ()
+    clusters: Sequence[str] | None = None
 
     @property
     def confusion(self) -> AnyArray:
@@ -58,8 +75,9 @@ class EvaluationReport:
         nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
         return {
-            'window_accuracy': metrics.window_accuracy(self.known) if self.known else None,
-            'accuracy_at_s': metrics.accuracy_at_times(self.known),
+            'border': self.border,
+            'trained_on': list(self.trained_on),
+            **figures(self.known, self.clusters),
             'early': metrics.early_decision(self.known) if self.known else nothing,
             'calibration_error': metrics.calibration_error(self.known),
             'candidates': metrics.candidates(self.known),
@@ -124,13 +142,20 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
     results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
     if not results:
         raise no_window(dataset, model.recipe.feature_set)
+    sessions, digests = (model.training.get(name, ()) for name in ('sessions', 'slide_digests'))
+    there = [slide.session in sessions for slide in results]
+    crossed = SAME_SESSION if all(there) else OTHER_SESSION if not any(there) else f'{SAME_SESSION} and {OTHER_SESSION}'
+    known = [slide for slide in results if slide.surface in model.labels]
     return EvaluationReport(
         labels=model.labels,
-        known=[result for slide, result in results.items() if slide.surface in model.labels],
+        known=[results[slide] for slide in known],
         unknown=[result for slide, result in results.items() if slide.surface not in model.labels],
         latency_us=np.concatenate([latency for _, latency in tested.values()]),
         unusable=tuple(slide.name for slide in tested if slide not in results),
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
+        border=crossed if sessions else '',
+        trained_on=tuple(slide.name for slide in results if slide_digest(slide) in digests),
+        clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
     )
 
 
@@ -202,11 +227,22 @@ def sentence(one: PairedComparison) -> str:
             (one.window_difference, one.window_interval),
         )
     )
+    test = 'exact McNemar test'
+    if one.n_clusters != one.n_slides:
+        test = f'exact sign test over {one.n_clusters} clusters'
     return (
         f"'{one.second}' against '{one.first}' on {one.n_slides} slides: slides {slides}, windows {windows}; "
         f'{one.only_second} slides are right by it alone, {one.only_first} by the other alone: '
-        f'p = {one.p_value:.2g} (exact McNemar test), {one.p_value_adjusted:.2g} adjusted for all comparisons (Holm)'
+        f'p = {one.p_value:.2g} ({test}), {one.p_value_adjusted:.2g} adjusted for all comparisons (Holm)'
     )
+
+
+COLUMNS = {
+    'windows right': 'window_accuracy',
+    'slides right': 'slide_accuracy',
+    'known and right': 'known_right',
+    'known and wrong': 'known_wrong',
+}
 
 
 def table(result: CrossValidation, split: str) -> list[str]:
@@ -215,16 +251,23 @@ def table(result: CrossValidation, split: str) -> list[str]:
     rows = [(fold['name'], fold) for fold in figures['folds']] + [('all', figures)]
     width = max(len('fold'), *(len(name) for name, _ in rows))
     lines = [
-        f"recipe '{result.recipe}', split {split}: {len(result.labels)} surfaces",
-        f'{"fold":<{width}}  {"slides":>6}  {"windows right":>13}  {"slides right":>12}',
+        f"recipe '{result.recipe}', split {split}: {len(result.labels)} surfaces; border: {result.border}",
+        f'{"fold":<{width}}  {"slides":>6}' + ''.join(f'  {title:>15}' for title in COLUMNS),
     ]
     lines += [
-        f'{name:<{width}}  {row["n_slides"]:>6}  {percent(row["window_accuracy"]):>13}  '
-        f'{percent(row["slide_accuracy"]):>12}'
+        f'{name:<{width}}  {row["n_slides"]:>6}' + ''.join(f'  {percent(row[key]):>15}' for key in COLUMNS.values())
         for name, row in rows
     ]
-    windows, slides = (' to '.join(map(percent, figures[f'{name}_accuracy_interval'])) for name in ('window', 'slide'))
-    lines.append(f'95 % intervals over all slides: windows {windows}; slides {slides}')
+    intervals = (
+        f'{title} {" to ".join(map(percent, figures[f"{key}_interval"]))}'
+        for title, key in COLUMNS.items()
+        if figures[key] is not None
+    )
+    whole = 'slides' if result.border == SAME_TRACK else 'clusters (surface × what was left out)'
+    lines.append(f'95 % intervals over {figures["n_clusters"]} {whole}: {"; ".join(intervals)}')
+    if result.untested:
+        names = ', '.join(f"'{surface}' ({count} slides)" for surface, count in result.untested.items())
+        lines.append(f'trained but not tested, as no other slide would train them: {names}')
     if result.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(result.unusable)}')
     return lines
@@ -233,11 +276,15 @@ def table(result: CrossValidation, split: str) -> list[str]:
 def summary(report: EvaluationReport) -> list[str]:
     """Return the figures in lines for people."""
     figures = report.as_json()
-    shares = figures['accuracy_at_s'].items()
-    at = [f'{percent(share)} after {seconds} s' for seconds, share in shares if share is not None]
+    at = [
+        f'{percent(share)} after {seconds} s ({figures["n_slides_at_s"][seconds]} slides)'
+        for seconds, share in figures['accuracy_at_s'].items()
+        if share is not None
+    ]
     early, latency = figures['early'], figures['latency_us']
     lines = [
         f'slides: {len(report.known)} over surfaces the model knows, {len(report.unknown)} over others',
+        *([f'border, by the names of the bags: {report.border}'] if report.border else []),
         f'single windows right: {percent(figures["window_accuracy"])}',
         f'slides right: {", ".join(at) or "no slide is long enough to say"}',
         f'as soon as decided: {percent(early["accuracy"])} right, after {early["mean_s"]:.2f} s on average'
@@ -252,6 +299,11 @@ def summary(report: EvaluationReport) -> list[str]:
     )
     if figures['unknown_accepted'] is not None:
         lines.append(f'slides over other surfaces called known: {percent(figures["unknown_accepted"])}')
+    if report.trained_on:
+        lines.append(
+            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures say too '
+            'much; leave them out with --slides'
+        )
     if report.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')
     return [*lines, *report.tare_faults]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, 
 from texture_estimation.training import train
 from texture_features.feature_set import LabelledFeatures
 from texture_recordings.bags import find_bags
-from texture_recordings.dataset import SlideDataset
+from texture_recordings.dataset import LabelledSlide, SlideDataset
 
 HOPS = 4  # windows of the least distance overlap so often
 
@@ -49,7 +50,11 @@ def train_from_bags(
     with task(f"fit '{plan.name}' to {len(examples.y)} windows"):
         model = train(plan, examples, _name(out, plan.name))
     faults = dataset.tare_faults(plan.feature_set)
-    model = replace(model, training={**model.training, **({'tare': faults} if faults else {})})
+    trained_on = {
+        'sessions': sorted({slide.session for slide in dataset}),
+        'slide_digests': sorted(map(slide_digest, dataset)),
+    }
+    model = replace(model, training={**model.training, **trained_on, **({'tare': faults} if faults else {})})
     if out is not None:
         _save(model, out, bags, slides)
     return model
@@ -99,6 +104,15 @@ def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures
     if not distances_m:
         return examples
     return replace(examples, resized=dataset.features_over_distances(windows, distances_m, distances_m[0] / HOPS))
+
+
+def slide_digest(slide: LabelledSlide) -> str:
+    """Return a short digest of the samples of a slide, by which it is found again under any name and number."""
+    digest = hashlib.sha256()
+    for _, batches in sorted(slide.signals.items()):
+        for batch in batches:
+            digest.update(batch.samples.tobytes())
+    return digest.hexdigest()[:12]
 
 
 def _name(out: str | Path | None, recipe: str) -> str:

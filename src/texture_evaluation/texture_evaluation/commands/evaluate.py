@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from contextlib import nullcontext
+from importlib.metadata import version
 from pathlib import Path
 
 from texture_core.cli import Command, add_dask, add_seed, add_slides, core_count, task
@@ -39,7 +40,15 @@ def _evaluate(options: argparse.Namespace) -> int:
     report = evaluate(model, options.bags, options.slides)
     print('\n'.join(summary(report)))
     if options.json:
-        write_json(report.as_json(), options.json)
+        setting = {
+            'model': options.model,
+            'recipe': model.recipe.name,
+            'feature_set': model.feature_set,
+            'version': version('texture_evaluation'),
+            'bags': options.bags,
+            'slides': options.slides or 'all',
+        }
+        write_json({**setting, **report.as_json()}, options.json)
     return 0
 
 
@@ -88,10 +97,10 @@ def _cross_validate(options: argparse.Namespace) -> int:
     if options.json:
         figures = [result.as_json() for result in results]
         several = {'recipes': figures, 'comparisons': [vars(one) for one in compared]}
-        setting = {'split': split.name, 'seed': options.seed, 'bags': bags}
+        setting = {'split': split.name, 'seed': options.seed, 'bags': bags, 'slides': options.slides or 'all'}
         write_json({**setting, **(figures[0] if len(figures) == 1 else several)}, options.json)
     if options.chart:
-        title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
+        title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}, {results[0].border}'
         print(comparison_chart(results, title, options.chart))
     return 0
 
