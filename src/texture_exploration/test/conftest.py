@@ -18,6 +18,7 @@ ROS_TESTS = [
     'test_explorer_node.py',
     'test_explore_preset.py',
     'test_interrupted_controller.py',
+    'test_ros_controllers_hand_over.py',
     'test_ros_controllers_process.py',
     'test_services_page.py',
 ]
