@@ -93,15 +93,18 @@ def test_another_commander_ends_the_slide_with_the_finger_lifted_and_then_keeps_
     explorer = make_explorer(replace(PATIENT, connect_timeout_s=5.0))
     explorer.connect()
     others = []
-    exploration, since_ns = explored(
-        explorer, lambda: others.append(graph.peer.create_publisher(TwistStamped, 'twist_controller/twist', 1))
-    )
-    assert since_ns, exploration.outcome
-    assert exploration.outcome.lifted
-    assert "'/peer' commands" in exploration.outcome.message
-    with pytest.raises(MotionRefused, match="'/peer' commands"):
-        explorer.begin('two', SLIDE)
-    graph.peer.destroy_publisher(others[0])
+    try:
+        exploration, since_ns = explored(
+            explorer, lambda: others.append(graph.peer.create_publisher(TwistStamped, 'twist_controller/twist', 1))
+        )
+        assert since_ns, exploration.outcome
+        assert exploration.outcome.lifted
+        assert "'/peer' commands" in exploration.outcome.message
+        with pytest.raises(MotionRefused, match="'/peer' commands"):
+            explorer.begin('two', SLIDE)
+    finally:
+        for other in others:  # in the tests that follow, too
+            graph.peer.destroy_publisher(other)
     assert explored(explorer)[0].outcome.success
 
 
