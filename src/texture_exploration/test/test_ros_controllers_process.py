@@ -38,8 +38,12 @@ DEADLINE_S = 60.0
 
 
 @pytest.fixture(scope='module')
-def graph():
-    with LocalGraph(94, deadline_s=DEADLINE_S) as graph:
+def graph(tmp_path_factory):
+    """Return a graph whose claims of arms are its own: ids of processes come again."""
+    folder = str(tmp_path_factory.mktemp('claims'))
+    with pytest.MonkeyPatch.context() as patch, LocalGraph(94, deadline_s=DEADLINE_S) as graph:
+        patch.setenv('TMPDIR', folder)
+        patch.setattr('tempfile.tempdir', folder)
         yield graph
 
 
