@@ -58,6 +58,11 @@ def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureMode
     assert [line.partition(';')[0] for line in found] == ([said] if said else [])
 
 
+def test_a_training_with_one_slide_of_a_label_is_said_to_be_too_confident(simulated: Path) -> None:
+    lines = summary(train_from_bags('default', [simulated], '1'), Path('model.npz'))
+    assert lines[2] == 'this share is of held-out windows, as a label has a single slide: too confident'
+
+
 def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:
     enough = replace(model, decisions=replace(model.decisions, error_bound=ErrorBound(149, 0.02)))
     assert not any('early stopping' in line for line in summary(enough, Path('model.npz')))
