@@ -6,7 +6,6 @@ import pytest
 
 from texture_bringup.dashboard import (
     BINS,
-    DEFAULTS,
     MAX_LIGHTS,
     POINTS,
     SILENT_S,
@@ -27,7 +26,7 @@ from texture_core.types import (
     TactileSignal,
     TextureEstimate,
 )
-from texture_exploration.motions import MOTIONS
+from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import RANGES, SafetyLimits
 from texture_exploration.stages import TouchParams
 

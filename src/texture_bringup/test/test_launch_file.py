@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import re
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,10 @@ from texture_bringup.launcher import (
     read,
 )
 from texture_core.errors import InvalidLaunch, UnknownName
+from texture_drivers.catalogue import SENSORS
+from texture_simulation.emulator import LIVE_SENSORS
+
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
@@ -245,3 +250,15 @@ def test_calls_are_expanded_innermost_first_and_all_else_stays(text, expanded) -
 def test_a_call_that_is_not_well_formed_is_refused_with_the_form(text) -> None:
     with pytest.raises(InvalidLaunch, match='write'):
         expand(text, shown)
+
+
+@pytest.mark.parametrize('file', ['emulator', 'tactile'])
+def test_the_launch_files_name_every_emulated_sensor(file) -> None:
+    text = (ROOT / f'src/texture_bringup/launch/{file}.launch.xml').read_text()
+    [described] = re.findall(r'<arg name="sensor" default="tsf85" description="(.*?)"', text)
+    assert set(LIVE_SENSORS) <= set(re.findall(r'\w+', described))
+
+
+def test_the_page_of_sensors_names_every_sensor() -> None:
+    table = (ROOT / 'docs/sensors.md').read_text().split('## Connect')[0]
+    assert set(SENSORS) <= set(re.findall(r'`(\w+)`', table))

@@ -37,7 +37,7 @@ from texture_core.types import (
     TactileSignal,
     TextureEstimate,
 )
-from texture_exploration import motions
+from texture_exploration.motions import DEFAULTS
 from texture_exploration.safety import SafetyLimits
 
 # --------------------
@@ -138,14 +138,6 @@ def _name(url: str) -> str:
 
 # --------------------
 # Which numbers each motion takes, with default and range: what the buttons of the page offer.
-
-DEFAULTS: Mapping[str, Mapping[str, float]] = {
-    'linear_slide': motions.LINEAR_SLIDE_DEFAULTS,
-    'circular': motions.CIRCULAR_DEFAULTS,
-    'cross_slide': motions.CROSS_SLIDE_DEFAULTS,
-    'in_hand_sliding': motions.IN_HAND_SLIDING_DEFAULTS,
-    'in_hand_random': motions.IN_HAND_SLIDING_DEFAULTS,
-}
 
 
 def offered(limits: SafetyLimits) -> dict[str, list[dict[str, Any]]]:

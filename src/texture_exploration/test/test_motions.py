@@ -11,8 +11,8 @@ from texture_core.errors import MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.motions import CROSS_SLIDE_DEFAULTS as DEFAULTS
 from texture_exploration.motions import (
+    DEFAULTS,
     MOTIONS,
     CircularPath,
     StraightPath,
@@ -39,6 +39,11 @@ def test_a_motion_with_all_defaults_slides_and_ends_lifted(table, name):
     assert table.explore(ExplorationRequest(name)).success
     assert table.phases == ORDER
     assert table.arm.state().force_n == 0
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_a_motion_takes_the_numbers_that_it_says_it_takes(table, name):
+    assert table.explore(ExplorationRequest(name, **DEFAULTS[name])).success
 
 
 @pytest.mark.parametrize('name', MOTIONS)
@@ -237,7 +242,8 @@ def test_something_in_the_way_to_the_start_is_met(table):
 
 
 CROSS = ExplorationRequest('cross_slide')
-LEG_S = DEFAULTS['distance_m'] / DEFAULTS['speed_m_s']
+CROSS_DEFAULTS = DEFAULTS['cross_slide']
+LEG_S = CROSS_DEFAULTS['distance_m'] / CROSS_DEFAULTS['speed_m_s']
 
 
 def guaranteed(table, direction_rad):
@@ -272,7 +278,7 @@ def test_the_second_leg_is_straight_and_at_right_angles_to_the_first(table):
     second = [p for s, p in sliding(table) if s.steady_s > 0 and s.direction_rad > 1.0]
     assert max(abs(y - table.home[1]) for _, y, _ in first) < 2e-4
     assert max(x for x, _, _ in second) - min(x for x, _, _ in second) < 2e-4
-    assert second[-1][1] - second[0][1] == pytest.approx(DEFAULTS['distance_m'], abs=0.003)
+    assert second[-1][1] - second[0][1] == pytest.approx(CROSS_DEFAULTS['distance_m'], abs=0.003)
 
 
 def test_the_corner_exceeds_no_acceleration_and_keeps_the_speed(table):

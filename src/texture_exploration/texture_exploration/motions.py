@@ -570,3 +570,12 @@ MOTIONS: Mapping[str, Planner] = {
     'in_hand_sliding': in_hand_sliding,  # Kaboli et al. 2015
     'in_hand_random': in_hand_random,  # its future work: random exploratory movements
 }
+
+# The numbers that each motion takes, with what is meant when one is not given: what the dashboard offers.
+DEFAULTS: Mapping[str, Mapping[str, float]] = {
+    'linear_slide': LINEAR_SLIDE_DEFAULTS,
+    'circular': CIRCULAR_DEFAULTS,
+    'cross_slide': CROSS_SLIDE_DEFAULTS,
+    'in_hand_sliding': IN_HAND_SLIDING_DEFAULTS,
+    'in_hand_random': IN_HAND_SLIDING_DEFAULTS,
+}

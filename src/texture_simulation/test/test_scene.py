@@ -10,6 +10,7 @@ import pytest
 
 from texture_core.config import find_file, shipped
 from texture_core.errors import InvalidParameter, UnknownName
+from texture_simulation.emulator import LIVE_SENSORS
 from texture_simulation.scene import load_scene, scene_from
 from texture_simulation.sensor_models import SENSORS
 from texture_simulation.surfaces import KINDS
@@ -79,3 +80,8 @@ def test_grades_of_people_lie_apart_one_for_each_texture() -> None:
         rows = list(csv.DictReader(file))
     assert {row['texture'] for row in rows} == set(load_scene('roughness').surfaces)
     assert all(1.0 <= float(row['grade']) <= 5.0 for row in rows)
+
+
+@pytest.mark.parametrize('name', LIVE_SENSORS)
+def test_an_emulated_sensor_is_one_that_scenes_name_or_several_of_it(name):
+    assert name.removesuffix('_pair').removesuffix('_hand') in SENSORS

@@ -39,9 +39,9 @@ from texture_recordings.dataset import SlideDataset
 NUMBERS = (
     ('speed', 'speed_m_s', 'm/s', 'speed along the surface'),
     ('force', 'force_n', 'N', 'force on the surface'),
-    ('distance', 'distance_m', 'm', 'length of a linear slide'),
-    ('radius', 'radius_m', 'm', 'radius of a circular motion'),
-    ('turns', 'turns', '', 'turns of a circular motion'),
+    ('distance', 'distance_m', 'm', 'length of a straight slide'),
+    ('radius', 'radius_m', 'm', 'radius, if the motion has one'),
+    ('turns', 'turns', '', 'turns, if the motion has some'),
     ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
 )
 UNLIKE = 'it resembles none of the known textures'
