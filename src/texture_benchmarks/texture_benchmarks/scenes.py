@@ -7,7 +7,7 @@ import itertools
 import time
 import zlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -150,98 +150,28 @@ BANDS = 24  # of the spectrum, each of equal width on a logarithmic scale
 LOWEST_HZ = 5.0
 MIN_POWER = 1e-12
 CONFIDENCE = 0.95
-MIN_CHANGE = 0.01  # of the accuracy, or of the decisions: an effect with less change needs no term
-
-
-@dataclass(frozen=True, eq=False)
-class MeanDifference:
-    """A mean difference over repetitions, in shares, and its half interval of 95 %."""
-
-    mean: float
-    half: float
-
-    @property
-    def matters(self) -> bool:
-        """Whether it is certain, and large enough to be seen."""
-        return bool(abs(self.mean) > self.half and abs(self.mean) >= MIN_CHANGE)
-
-    @property
-    def most(self) -> float:
-        """How large it may be, whichever sign it has."""
-        return abs(self.mean) + self.half
-
-
-@dataclass(frozen=True, eq=False)
-class TermEffect:
-    """What happens when a term is removed."""
-
-    term: str  # Name
-    easier: MeanDifference  # Accuracy without the term, in learning and in the test, less that with it
-    # Accuracy on slides with the term of a model trained without it, less that of one trained with it
-    unprepared: MeanDifference
-    # Share of the test slides decided otherwise by a model trained without it, less that by one trained with it
-    # from other slides
-    changed: MeanDifference
-    # Accuracy of the paper's method without the term, in learning and in the test, less that with it, if known
-    paper: MeanDifference | None = None
-    cost_us: float = 0.0  # What the term adds to the computing time of a slide
-
-    @property
-    def verdict(self) -> str:
-        """Return 'decides' if it certainly changes something, 'idle' if certainly nothing of note, else 'open'."""
-        known = [self.easier, self.unprepared, *([self.paper] if self.paper else [])]
-        if any(item.matters for item in known) or (self.changed.matters and self.changed.mean > 0):
-            return 'decides'
-        return 'idle' if max(item.most for item in known) < MIN_CHANGE else 'open'
-
-
-@dataclass(frozen=True, eq=False)
-class Ablation:
-    """A scene and the influence of each of its terms."""
-
-    scene: str  # Name
-    # accuracy, paper: with which its surfaces are distinguished, and by the paper's method, if known
-    accuracy: float
-    tested: int  # How many slides
-    term_effects: Sequence[TermEffect] = field(default=())  # Of its terms
-    slide_us: float = 0.0  # Computing time of a slide
-    paper: float | None = None
 
 
 def ablate(
     scene: Scene, touch_protocol: TouchProtocol, slides: int, repeats: int, seed: int, *, terms: Collection[str] = ()
-) -> Ablation:
-    """Return the effect of each term of a scene, or of some, removed one at a time.
+) -> dict[str, Any]:
+    """Return the accuracy on a scene, and how it changes without each of its terms, or of some, one at a time.
 
-    About so many slides are trained on, and as many tested; all is repeated with other random numbers.
+    About so many slides are trained on, and as many tested; all is repeated with other random numbers. Of each term
+    'accuracy_without' is the change when neither training nor test has it, 'accuracy_trained_without' that when only
+    the test has it.
     """
     others = {term: other for term, other in variants(scene, touch_protocol).items() if not terms or term in terms}
     rows = [_repeat(scene, others, touch_protocol, slides, [seed, number]) for number in range(repeats)]
-    effects = []
-    for term in others:
-        easier, unprepared, changed = zip(*(own[term] for _, _, own in rows), strict=True)
-        effects.append(TermEffect(term, difference(easier), difference(unprepared), difference(changed)))
-    return Ablation(scene.name, float(np.mean([right for right, *_ in rows])), repeats * rows[0][1], effects)
-
-
-def timed(ablation: Ablation, scene: Scene, touch_protocol: TouchProtocol, count: int, repeats: int) -> Ablation:
-    """Return the same with the time that each term takes: medians of measurements taken in turn."""
-    others = variants(scene, touch_protocol)
-    compared = [scene, *(others[term_effect.term] for term_effect in ablation.term_effects)]
-    sliding = _sliding(touch_protocol, count, 0.0)
-
-    def slide_us(made: Scene) -> float:
-        rng, began = np.random.default_rng(0), time.thread_time()
-        for surface in made.surfaces:
-            simulate_slide_streams(made, surface, count, sliding, rng)
-        return 1e6 * (time.thread_time() - began) / (count * len(made.surfaces))
-
-    for made in compared:
-        slide_us(made)  # makes what is made once
-    taken_us = np.array([[slide_us(made) for made in compared] for _ in range(repeats)])
-    costs_us = np.median(taken_us[:, :1] - taken_us, axis=0)[1:].tolist()
-    effects = [replace(own, cost_us=cost) for own, cost in zip(ablation.term_effects, costs_us, strict=True)]
-    return replace(ablation, term_effects=effects, slide_us=float(np.median(taken_us[:, 0])))
+    changes = {
+        term: {
+            'accuracy_without': difference([own[term][0] for _, _, own in rows]),
+            'accuracy_trained_without': difference([own[term][1] for _, _, own in rows]),
+        }
+        for term in others
+    }
+    accuracy = round(float(np.mean([right for right, *_ in rows])), 4)
+    return {'accuracy': accuracy, 'tested': repeats * rows[0][1], **changes}
 
 
 def simulate_features(
@@ -273,14 +203,14 @@ def extract_features(samples: Samples, rate_hz: float) -> Array:
 
 def _repeat(
     scene: Scene, others: Mapping[str, Scene], touch_protocol: TouchProtocol, slides: int, seed: list[int]
-) -> tuple[float, int, dict[str, tuple[float, float, float]]]:
-    """Return of one repetition the accuracy with all terms, the number tested, and the three differences by term."""
+) -> tuple[float, int, dict[str, tuple[float, float]]]:
+    """Return of one repetition the accuracy with all terms, the number tested, and the two differences by term."""
     count = max(2, round(slides / len(scene.surfaces)))
     pressed = replace(touch_protocol, forces_n=touch_protocol.tested_forces_n or touch_protocol.forces_n)
 
-    def learned(of: Scene, part: int) -> Any:
+    def learned(of: Scene) -> Any:
         each = max(1, count // len(touch_protocol.training_by))
-        examples = simulate_features(of, touch_protocol, each, [*seed, part], touch_protocol.training_by)
+        examples = simulate_features(of, touch_protocol, each, [*seed, 0], touch_protocol.training_by)
         learner = LinearDiscriminantAnalysis(solver='lsqr', shrinkage='auto')
         return make_pipeline(StandardScaler(), learner).fit(*examples)
 
@@ -289,28 +219,21 @@ def _repeat(
         return simulate_features(of, pressed, each, [*seed, 2], touch_protocol.tested_by)
 
     values, codes = tested(scene)
-    answers, again = (learned(scene, part).predict(values) for part in (0, 1))
-    # Two learners of other slides with all terms differ, too: only what a term changes beyond that is its own.
-    right, usual = float(np.mean(answers == codes)), float(np.mean(answers != again))
+    right = float(learned(scene).score(values, codes))
     differences = {}
     for term, other in others.items():
-        own = learned(other, 0)
-        unprepared = own.predict(values)
-        differences[term] = (
-            own.score(*tested(other)) - right,
-            float(np.mean(unprepared == codes)) - right,
-            float(np.mean(unprepared != answers)) - usual,
-        )
+        own = learned(other)
+        differences[term] = own.score(*tested(other)) - right, own.score(values, codes) - right
     return right, len(codes), differences
 
 
-def difference(values: Sequence[float] | Array) -> MeanDifference:
-    """Return the mean of differences, one of each repetition, with its interval."""
-    mean = float(np.mean(values))
-    if len(values) < 2:
-        return MeanDifference(mean, np.inf)
-    spread = float(np.std(values, ddof=1)) / np.sqrt(len(values))
-    return MeanDifference(mean, float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * spread)
+def difference(values: Sequence[float] | Array) -> dict[str, float]:
+    """Return the mean of differences, one of each repetition, and the half of its interval."""
+    half = np.inf
+    if len(values) > 1:
+        spread = float(np.std(values, ddof=1)) / np.sqrt(len(values))
+        half = float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * spread
+    return {'change': round(float(np.mean(values)), 4), 'half_interval': round(half, 4)}
 
 
 def _extracted(
@@ -376,72 +299,71 @@ PAPERS: Mapping[str, tuple[PaperProtocol, str]] = {
 }
 
 
-def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = False) -> Ablation:
-    """Return the same with the change of accuracy of the paper's method, if there is one, without each effect."""
-    if ablation.scene not in PAPERS:
-        return ablation
-    protocol, name = PAPERS[ablation.scene]
+def with_paper(
+    figures: Mapping[str, Any], name: str, repeats: int, seed: int, *, quick: bool = False
+) -> dict[str, Any]:
+    """Return figures of a scene with the change of accuracy of the paper's method, if there is one, by effect."""
+    if name not in PAPERS:
+        return dict(figures)
+    protocol, method = PAPERS[name]
     [task] = protocol.tasks
-    task = replace(task, methods=tuple(method for method in task.methods if method.name == name))
+    task = replace(task, methods=tuple(one for one in task.methods if one.name == method))
 
     def right(world: Scene, number: int) -> float:
         [(_, outcome)] = of_task(protocol, task, world, seed + number, quick=quick)
         return outcome.test.value
 
-    touch_protocol = TOUCH_PROTOCOLS[ablation.scene]
-    scene = completed(load_scene(ablation.scene), touch_protocol)
-    worlds = {term: world for term, world in variants(scene, touch_protocol).items() if term in scene.effects}
+    scene = completed(load_scene(name), TOUCH_PROTOCOLS[name])
+    worlds = {term: world for term, world in variants(scene, TOUCH_PROTOCOLS[name]).items() if term in scene.effects}
     shares = np.array([[right(world, number) for world in (scene, *worlds.values())] for number in range(repeats)])
-    changes = {term: difference(column) for term, column in zip(worlds, (shares[:, 1:] - shares[:, :1]).T, strict=True)}
-    effects = [replace(effect, paper=changes.get(effect.term)) for effect in ablation.term_effects]
-    return replace(ablation, term_effects=effects, paper=float(shares[:, 0].mean()))
+    changes = dict(zip(worlds, map(difference, (shares[:, 1:] - shares[:, :1]).T), strict=True))
+    return {
+        **{term: {**own, 'paper_without': changes[term]} if term in changes else own for term, own in figures.items()},
+        'paper_accuracy': round(float(shares[:, 0].mean()), 4),
+    }
 
 
 COLUMNS = 2
 
 
-def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
-    """Draw for each scene how the accuracy changes when a term is left out; one panel for each scene."""
-    rows = -(-len(ablations) // COLUMNS)
-    most = max(len(ablation.term_effects) for ablation in ablations)
-    with chart(
-        path, (9.0, 0.9 + rows * (0.8 + 0.27 * most)), 'Change of accuracy when a term of a simulated scene is left out'
-    ) as figure:
-        panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for axes, ablation in zip(panels, ablations, strict=False):
-            _draw_ablation(axes, ablation)
-        for axes in panels[len(ablations) :]:
+def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
+    """Draw for each scene how the accuracy changes when a term is left out; the last panel is of terms put in."""
+    added = {term: own[term] for term, own in numbers['added'].items()}
+    without = np.mean(
+        [own['accuracy'] + own[term]['accuracy_without']['change'] for term, own in numbers['added'].items()]
+    )
+    panels = {**numbers['terms'], f'{HOST}, with one of': {'accuracy': float(without), **added}}
+    terms = {name: {t: own for t, own in figures.items() if isinstance(own, dict)} for name, figures in panels.items()}
+    rows = -(-len(panels) // COLUMNS)
+    size = (9.0, 0.9 + rows * (0.8 + 0.27 * max(map(len, terms.values()))))
+    with chart(path, size, 'Change of accuracy when a term of a simulated scene is left out') as figure:
+        grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for axes, (name, own) in zip(grid, terms.items(), strict=False):
+            _draw_terms(axes, own)
+            axes.set_title(f'{name}: {panels[name]["accuracy"]:.0%} right'.replace('%', ' %'), fontsize=9)
+        for axes in grid[len(panels) :]:
             axes.axis('off')
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc='outside lower left', title='the term is left out of')
+        figure.legend(*grid[0].get_legend_handles_labels(), loc='outside lower left', title='the term is left out of')
     return Path(path)
 
 
-def _draw_ablation(axes: Any, ablation: Ablation) -> None:
+def _draw_terms(axes: Any, terms: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
     for label, which, colour, shift in (
-        ('training and test slides', 'easier', COLOURS[0], -0.2),
-        ('training slides only', 'unprepared', COLOURS[1], 0.2),
-        ("both, with the paper's method", 'paper', COLOURS[2], 0.0),
+        ('training and test slides', 'accuracy_without', COLOURS[0], -0.2),
+        ('training slides only', 'accuracy_trained_without', COLOURS[1], 0.2),
+        ("both, with the paper's method", 'paper_without', COLOURS[2], 0.0),
     ):
-        differences = (getattr(effect, which) for effect in ablation.term_effects)
-        known = [(place + shift, item) for place, item in enumerate(differences) if item]
+        known = [(place + shift, own[which]) for place, own in enumerate(terms.values()) if which in own]
         axes.errorbar(
-            [100 * item.mean for _, item in known], [place for place, _ in known],
-            xerr=[100 * item.half if np.isfinite(item.half) else 0.0 for _, item in known],
+            [100 * item['change'] for _, item in known], [place for place, _ in known],
+            xerr=[100 * item['half_interval'] if np.isfinite(item['half_interval']) else 0.0 for _, item in known],
             fmt='o', color=colour, markersize=4, capsize=2, label=label,
         )  # fmt: skip
-    names = []
-    for effect in ablation.term_effects:  # those that decide nothing are marked
-        mark = '' if effect.verdict == 'decides' else f'{effect.verdict}, '
-        names.append(f'{effect.term.replace("_", " ")} ({mark}{effect.cost_us:+.0f} µs)')
     axes.axvline(0.0, color='black', linewidth=0.8)
-    axes.set_yticks(np.arange(len(names)), names)
-    axes.set(xlabel='change of accuracy (percentage points)', ylim=(len(names) - 0.5, -0.5))
-    title = f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right, {ablation.slide_us:.0f} µs a slide'
-    axes.set_title(title, fontsize=9)
+    axes.set_yticks(np.arange(len(terms)), [term.replace('_', ' ') for term in terms])
+    axes.set(xlabel='change of accuracy (percentage points)', ylim=(len(terms) - 0.5, -0.5))
 
 
-TARGET_MS = {False: 1.0, True: 10.0}  # without and with stick-slip
 # Dear scenes are measured less often: stick-slip costs ten times as much, eight channels five times.
 FEWER: Mapping[str, int] = {'sticky': 5, 'jamali': 3}
 
@@ -456,18 +378,14 @@ class _Size:
     paper_repeats: int = 3
     scan_repeats: int = 15
     many: int = 100  # slides at once
-    timed: int = 10
-    timed_repeats: int = 5
 
-    def ablation(self, scene: Scene, seed: int, terms: Sequence[str] = ()) -> Ablation:
-        """Return what terms of a scene contribute, and what they cost."""
-        touch_protocol = TOUCH_PROTOCOLS[scene.name]
+    def ablation(self, scene: Scene, seed: int, terms: Sequence[str] = ()) -> dict[str, Any]:
+        """Return what terms of a scene contribute."""
         slides = self.slides // FEWER.get(scene.name, 1)
-        done = ablate(scene, touch_protocol, slides, self.repeats, seed, terms=terms)
-        return timed(done, scene, touch_protocol, self.timed, self.timed_repeats)
+        return ablate(scene, TOUCH_PROTOCOLS[scene.name], slides, self.repeats, seed, terms=terms)
 
 
-QUICK = _Size(('ets_linear', 'sticky'), 32, 2, 1, 2, 10, 4, 1)
+QUICK = _Size(('ets_linear', 'sticky'), 32, 2, 1, 2, 10)
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
@@ -485,9 +403,21 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         for kind in sorted(set(sticks.values())):
             surfaces = [own for own in sticks if sticks[own] is kind]
             costs[name, kind] = scan_cost(scene, surfaces, size.scan_repeats, size.many)
-    whole = [size.ablation(completed(load_scene(name), TOUCH_PROTOCOLS[name]), options.seed) for name in size.scenes]
-    ablations = [with_paper(own, size.paper_repeats, 1000 + options.seed, quick=options.quick) for own in whole]
-    added = [size.ablation(more, options.seed, (name,)) for name, more in with_one_more(load_scene(HOST)).items()]
+    whole = {
+        name: size.ablation(completed(load_scene(name), TOUCH_PROTOCOLS[name]), options.seed) for name in size.scenes
+    }
+    added = {
+        name: {'strength': asdict(EFFECTS[name]()), **size.ablation(more, options.seed, (name,))}
+        for name, more in with_one_more(load_scene(HOST)).items()
+    }
+    numbers = {
+        'scan_ms': {f'{name}, stick-slip' if kind else name: cost for (name, kind), cost in costs.items()},
+        'terms': {
+            name: with_paper(own, name, size.paper_repeats, 1000 + options.seed, quick=options.quick)
+            for name, own in whole.items()
+        },
+        'added': added,
+    }
     return BenchmarkResult(
         name='scenes',
         measured=run.__doc__,
@@ -495,51 +425,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         split=f'{size.slides} slides for training (jamali a third, sticky a fifth), others for test, '
         f"{size.repeats} repetitions; the papers' methods on {size.paper_repeats} sets of slides as many as in the "
         f'paper; intervals of {CONFIDENCE:.0%}',
-        numbers={
-            'target_ms': {'without stick-slip': TARGET_MS[False], 'with': TARGET_MS[True]},
-            'scan_ms': {f'{name}, stick-slip' if kind else name: cost for (name, kind), cost in costs.items()},
-            'terms': {ablation.scene: _terms(ablation) for ablation in ablations},
-            'added': {
-                effect.term: {'strength': asdict(EFFECTS[effect.term]()), **_terms(ablation)}
-                for ablation in added
-                for effect in ablation.term_effects
-            },
-        },
-        charts=(ablation_chart([*ablations, _together(added)], options.out / 'scenes_ablation.png'),),
-    )
-
-
-STORED = {
-    'easier': 'accuracy_without',
-    'unprepared': 'accuracy_trained_without',
-    'changed': 'decisions_changed',
-    'paper': 'paper_without',
-}
-
-
-def _terms(ablation: Ablation) -> dict[str, Any]:
-    found: dict[str, Any] = {'accuracy': round(ablation.accuracy, 4), 'tested': ablation.tested}
-    found['slide_us'] = round(ablation.slide_us)
-    if ablation.paper is not None:
-        found['paper_accuracy'] = round(ablation.paper, 4)
-    for effect in ablation.term_effects:
-        known = {name: getattr(effect, own) for own, name in STORED.items() if getattr(effect, own)}
-        found[effect.term] = {
-            **{name: {'change': round(d.mean, 4), 'half_interval': round(d.half, 4)} for name, d in known.items()},
-            'cost_us': round(effect.cost_us, 1),
-            'verdict': effect.verdict,
-        }
-    return found
-
-
-def _together(added: Sequence[Ablation]) -> Ablation:
-    """Return scenes with one more effect each as one: accuracy and time are those without any of them."""
-    term_effects = list(itertools.chain.from_iterable(ablation.term_effects for ablation in added))
-    pairs = list(zip(added, term_effects, strict=True))
-    return Ablation(
-        f'{HOST}, with one of',
-        float(np.mean([ablation.accuracy + term_effect.easier.mean for ablation, term_effect in pairs])),
-        added[0].tested,
-        term_effects,
-        float(np.median([ablation.slide_us - term_effect.cost_us for ablation, term_effect in pairs])),
+        numbers=numbers,
+        charts=(ablation_chart(numbers, options.out / 'scenes_ablation.png'),),
     )
