@@ -246,7 +246,7 @@ def result_of(found: Mapping[Cell, Sequence[SlideAnswer]], options: BenchmarkOpt
     return BenchmarkResult(
         name='borders',
         measured=run.__doc__,
-        data='simulated scene' if options.quick else DATA_SETS,
+        data=f'simulated scene {SCENE}' if options.quick else DATA_SETS,
         split='simulated halves' if options.quick else SPLIT,
         numbers=numbers,
         charts=(borders_chart(numbers, options.out / 'borders.png'),),

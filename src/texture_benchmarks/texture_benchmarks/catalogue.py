@@ -6,6 +6,7 @@ from __future__ import annotations
 import multiprocessing
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from texture_benchmarks import (
@@ -52,6 +53,8 @@ Act = Callable[[str], int]  # runs a study by its name and returns the exit code
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
     """Run one study; return its result and the JSON file, beside which its charts lie."""
     result = find(BENCHMARKS, name, 'benchmark')(options)
+    if options.quick:
+        result = replace(result, data=f'REDUCED, not for publishing; part of: {result.data}')
     return result, result.write(options.out)
 
 

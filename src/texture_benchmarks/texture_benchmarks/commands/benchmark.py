@@ -29,7 +29,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help='folder of the recorded data sets (DIR/biotac20); default: $TEXTURE_DATA',
     )
-    parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
+    parser.add_argument('--quick', action='store_true', help='few slides, or simulated ones; not for publishing')
     parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
     add_seed(parser)
 
@@ -65,4 +65,4 @@ def _run_one(name: str, benchmark_options: BenchmarkOptions) -> None:
     with task(name):
         result, path = run_benchmark(name, benchmark_options)
     took = f'{name}, {time.monotonic() - began_s:.0f} s: {(result.measured or name).splitlines()[0]}'
-    print('\n  '.join([took, *map(str, (path, *result.charts))]), flush=True)
+    print('\n  '.join([took, result.data, *map(str, (path, *result.charts))]), flush=True)
