@@ -17,10 +17,8 @@ def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_reported_line
     size = ['--population', '4', '--generations', '2', '--halves', '2', '--jobs', '1']
     assert main(['optimise', 'ets-linear-svm', str(bags), '-o', str(out), *size]) == 0
     said = capsys.readouterr()
-    assert [line.split('  ')[0] for line in said.err.splitlines() if line.startswith('[')] == [
-        '[##########..........] 1/2',
-        '[####################] 2/2',
-    ]
+    generations = [line.split(':')[0] for line in said.err.splitlines() if line.startswith('generation')]
+    assert generations == ['generation 1 of 2', 'generation 2 of 2']
     assert said.out.startswith(f'{out}: fitness ')
     assert load_recipe(str(out)).learner_name == 'texture_papers.roberge:SvmPairs'
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from texture_core.config import folder
-from texture_core.errors import ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import SlideMotion
 from texture_estimation.decisions import ConfidenceFloor
-from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide
+from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide, write_tree
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import Grades, load_roughness_recipe, train_grades
@@ -234,3 +234,9 @@ def test_the_conditions_of_an_added_slide_survive_its_file(tmp_path):
         write_added_slide(tmp_path / 'm', number, AddedSlide('oak', 'slide', np.ones((3, 1)), conditions), 'a1')
     found = [slide.conditions for slide in read_added_slides(tmp_path / 'm', 'a1', ('mean',))]
     assert repr(found) == repr([known, SlideConditions()])  # NaN is not equal to itself
+
+
+def test_a_tree_with_anything_but_arrays_and_plain_values_is_refused_and_leaves_no_file(tmp_path):
+    with pytest.raises(InvalidData, match='must be arrays and plain values'):
+        write_tree(tmp_path / 'own', {'recipe': {'learner': 'own'}, 'mean': np.zeros(2), 'own': object()})
+    assert not list(tmp_path.iterdir())

@@ -161,6 +161,11 @@ def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
     -------
     Path
         Of NAME.npz.
+
+    Raises
+    ------
+    InvalidData
+        If the tree holds anything but arrays and plain values; nothing is written then.
     """
     arrays_path, card_path = both_files(path)
     card_path.parent.mkdir(parents=True, exist_ok=True)
@@ -170,8 +175,14 @@ def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
     np.savez_compressed(packed, **arrays)  # type: ignore[arg-type]
     content = packed.getvalue()
     card = {'format': FORMAT, **card, 'sha256': hashlib.sha256(content).hexdigest()}
+    try:
+        text = json.dumps(card, indent=1) + '\n'
+    except TypeError as error:
+        raise InvalidData(
+            f'this model cannot be saved: {error}; what a learner of your own trains must be arrays and plain values'
+        ) from error
     replace_file(arrays_path, content)
-    replace_file(card_path, (json.dumps(card, indent=1) + '\n').encode())
+    replace_file(card_path, text.encode())
     return arrays_path
 
 

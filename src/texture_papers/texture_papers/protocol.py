@@ -584,6 +584,8 @@ class ExperimentResult:
             value, low, high = finding.get('over_seeds', finding['interval'])
             yield f'  {finding["verdict"]:14} {finding["claim"]}: {value:+.3f} ({low:+.3f} to {high:+.3f})'
             yield f'  {"":14} here {finding["here"]}'
+            if why := finding.get('built_in'):
+                yield f'  {"":14} built in, not found: {why}'
 
     def write(self, out: Path) -> Path:
         """Write the JSON and return its path."""

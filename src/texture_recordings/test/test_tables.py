@@ -447,3 +447,26 @@ def test_the_parent_of_the_folder_of_a_data_set_may_be_given(tmp_path: Path) -> 
     assert source_folder(str(tmp_path), 'biotac20') == tmp_path
     (tmp_path / 'biotac20').mkdir()
     assert source_folder(str(tmp_path), 'biotac20') == tmp_path / 'biotac20'
+
+
+def test_a_header_in_the_coding_of_windows_is_read(tmp_path: Path) -> None:
+    rows = '\n'.join(f'{number / 100};{number % 7}' for number in range(200))
+    (tmp_path / 'cork.csv').write_bytes(f't [s];a_x [m/s²]\n{rows}\n'.encode('cp1252'))
+    (tmp_path / 'mapping.yaml').write_text(
+        "files: '{material}.csv'\n"
+        "streams: {signal: {columns: ['a_x [m/s²]'], time: {column: 't [s]'}}}\n"
+        'label: {column: material}\n',
+        encoding='utf-8',
+    )
+    import_tables(load_mapping(tmp_path / 'mapping.yaml'), tmp_path, tmp_path / 'bags')
+    [slide] = SlideDataset.from_bags([tmp_path / 'bags'])
+    assert slide.surface == 'cork'
+
+
+def test_decimal_commas_that_the_mapping_does_not_name_are_recognised(tmp_path: Path) -> None:
+    (tmp_path / 'cork.csv').write_text('t;a\n' + ''.join(f'{number};0,5\n' for number in range(200)))
+    (tmp_path / 'mapping.yaml').write_text(
+        "files: '{material}.csv'\nstreams: {signal: {columns: [a], rate_hz: 100.0}}\nlabel: {column: material}\n"
+    )
+    with pytest.raises(InvalidData, match="'0,5' is not a finite number; if commas are decimal"):
+        import_tables(load_mapping(tmp_path / 'mapping.yaml'), tmp_path, tmp_path / 'bags')

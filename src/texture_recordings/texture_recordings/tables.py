@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import dataclasses
 import fnmatch
@@ -667,6 +668,8 @@ def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequenc
                 for index in np.flatnonzero(np.isnan(values)).tolist():
                     if row := rows[index]:
                         reason = f"column '{name}': '{row[at[name]][:40]}' is not a finite number"
+                        if form.decimal == '.' and math.isfinite(_number(row[at[name]].replace(',', '.'))):
+                            reason += "; if commas are decimal, write format: {decimal: ','}"
                         found.setdefault(block[index][0], reason)
             malformed |= dict(sorted(found.items())[: EXAMPLES - len(malformed)])
             # A row without any number, such as names or units that a logger wrote again, is none of a sample: its texts
@@ -691,10 +694,22 @@ def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequenc
     )
 
 
+CP1252 = 'texture-cp1252'  # what is no UTF-8 is read as Windows of Western Europe writes it, such as 'm/s²'
+
+
+def _from_windows(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeDecodeError):
+        raise error
+    return error.object[error.start : error.end].decode('cp1252', 'replace'), error.end
+
+
+codecs.register_error(CP1252, _from_windows)
+
+
 @contextmanager
 def _lines(path: Path, form: FileFormat) -> Iterator[Iterator[Line]]:
     """Give the lines that are neither empty nor comments, each with its number."""
-    with open_regular(path) as opened, io.TextIOWrapper(opened, 'utf-8-sig', 'replace', newline=None) as text:
+    with open_regular(path) as opened, io.TextIOWrapper(opened, 'utf-8-sig', CP1252, newline=None) as text:
         yield (
             (number, bare)
             for number, line in enumerate(text, 1)

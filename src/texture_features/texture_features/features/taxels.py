@@ -77,7 +77,8 @@ class ChannelMeanStatistics(Feature):
     Examples
     --------
     >>> rising = np.linspace(0.0, 1.0, 100)[:, None] * np.ones(2)
-    >>> values = dict(zip(ChannelMeanStatistics.names, ChannelMeanStatistics()(WindowBatch(rising, 100.0))[0]))
+    >>> feature = ChannelMeanStatistics()
+    >>> values = dict(zip(feature.names, feature(WindowBatch(rising, 100.0))[0]))
     >>> round(float(values['mean']), 2), round(float(values['rise']), 2), round(float(values['share_above']), 2)
     (0.5, 0.76, 0.5)
     """
