@@ -60,7 +60,7 @@ def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureMode
 
 def test_a_training_with_one_slide_of_a_label_is_said_to_be_too_confident(simulated: Path) -> None:
     lines = summary(train_from_bags('default', [simulated], '1'), Path('model.npz'))
-    assert lines[2] == 'this share is of held-out windows, as a label has a single slide: too confident'
+    assert lines[2] == 'this fraction is of held-out windows, as a label has a single slide: too confident'
 
 
 def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:

@@ -197,8 +197,8 @@ class SafetyLimits:
     )
     surface_tolerance_m: float = param(
         0.02,
-        'Height above or below the declared surface beyond which a contact is none with it and aborts; an arm without '
-        'a base frame has no declared surface.',
+        'Largest distance of a contact from the declared surface, upwards or downwards; a contact farther away aborts. '
+        'An arm without a base frame has no declared surface.',
         unit='m',
         low=0.001,
         high=0.5,

@@ -53,7 +53,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        *(f'this share is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
+        *(f'this fraction is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
         *_uneven(model.decisions.domain.slides),
         *training.get('tare', []),
         *filter(None, [model.decisions.error_bound.reason, model.decisions.domain.reach_reason]),
