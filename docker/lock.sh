@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 # Write requirements.txt anew: what requirements.in asks for, with the versions of tools/requirements.txt where they fit.
 set -euo pipefail

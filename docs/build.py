@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Build the site: `.venv/bin/ros-run python docs/build.py [FOLDER]`; then open FOLDER/index.html (out/site)."""
 

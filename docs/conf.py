@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """How the pages become a site: `python docs/build.py` runs Sphinx with this file on the root of the repository."""
 

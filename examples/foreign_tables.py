@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Write recordings as other people keep them, to try an import on: simulated, shaped unlike those of the suite.
 

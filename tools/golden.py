@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The golden set: what recipes say of fixed slides and arms are sent, so that a change of the structure changes none.
 

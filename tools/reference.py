@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Write the pages of docs/reference from the source: `python tools/reference.py`, or `--check` to compare only.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The suite says of fixed slides what it said when the golden set was stored; see golden.py on what to do if not."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The packages of src/: what each imports is in its manifest, and dependencies run down the table of layers."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Count pages and words written by hand: `python tools/words.py`; it ends with 1 above the limits.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Set the workspace up: a virtual environment with ROS 2 Jazzy, and the packages of src/ built in it.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Draw docs/pictures/sensor_*.png, simulated slides: `.venv/bin/ros-run python docs/pictures/sensors.py`.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Draw a slide from a bag of /views/signal as PlotJuggler does: by header stamps, by readers that know no texture.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 from pathlib import Path
 
@@ -62,9 +63,9 @@ def test_slides_of_one_track_count_once_for_the_interval() -> None:
     tested = [ended('cork', 'cork', known=True, cluster='cork 1/2')] * 50
     tested += [ended('felt', 'cork', known=True, cluster='felt 1/2')] * 50
     found = figures(tested)
-    assert (found['slides'], found['clusters'], found['right'], found['known_wrong']) == (100, 2, 0.5, 0.5)
+    assert (found['slides'], found['clusters'], found['right'], found['accepted_wrong']) == (100, 2, 0.5, 0.5)
     assert found['interval']['right'] == [0.0, 1.0]
-    assert found['after_s']['1'] == {'slides': 100, 'right': 0.5, 'known_right': 0.5, 'known_wrong': 0.5}
+    assert found['after_s']['1'] == {'slides': 100, 'right': 0.5, 'accepted_correct': 0.5, 'accepted_wrong': 0.5}
     assert found['after_s']['5'] is None
     assert found['decided_wrong'] == 0.5
 
@@ -86,7 +87,7 @@ def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() 
 
 def test_a_rejected_slide_is_neither_known_and_right_nor_known_and_wrong() -> None:
     found = figures([ended('cork', 'cork', known=False, cluster='a'), ended('felt', 'cork', known=False, cluster='b')])
-    assert (found['right'], found['known_right'], found['known_wrong']) == (0.5, 0.0, 0.0)
+    assert (found['right'], found['accepted_correct'], found['accepted_wrong']) == (0.5, 0.0, 0.0)
 
 
 def test_a_quick_run_tests_every_recipe_on_both_sides_of_the_border(tmp_path: Path) -> None:

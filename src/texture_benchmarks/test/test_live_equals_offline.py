@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A bag replayed through the running nodes gives the estimates that the evaluation gets from it."""
 

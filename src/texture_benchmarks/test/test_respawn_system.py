@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A classifier that is killed is back soon: started again by the launcher, its model loaded, estimates flowing."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What recipes recognise across borders: at another place, on another day, with another finger."""
 
@@ -348,8 +349,8 @@ def _after(results: Sequence[SlideResult], seconds: float) -> dict[str, float] |
 def _shares(ends: Sequence[tuple[TextureEstimate, str]]) -> dict[str, list[bool]]:
     return {
         'right': [end.label == surface for end, surface in ends],
-        'known_right': [end.known and end.label == surface for end, surface in ends],
-        'known_wrong': [end.known and end.label != surface for end, surface in ends],
+        'accepted_correct': [end.known and end.label == surface for end, surface in ends],
+        'accepted_wrong': [end.known and end.label != surface for end, surface in ends],
     }
 
 
@@ -379,7 +380,7 @@ def _bars(axes: Any, cells: Sequence[Mapping[str, Any] | None]) -> None:
     for row, cell in enumerate(cells):
         if cell is None:
             continue
-        right, wrong = 100 * cell['known_right'], 100 * cell['known_wrong']
+        right, wrong = 100 * cell['accepted_correct'], 100 * cell['accepted_wrong']
         named = not row
         axes.barh(row, right, color=COLOURS[2], label='right and known' if named else '')
         axes.barh(row, 100 - right - wrong, left=right, color='#d9d9d9', label='unknown' if named else '')

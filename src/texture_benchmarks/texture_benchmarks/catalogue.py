@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Studies by name, and how all of them run: each in a process of its own, so that one that fails stops no other."""
 

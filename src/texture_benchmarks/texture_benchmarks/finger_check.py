@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What `texture check` brings back: another finger by one plate, another day by a slide of each surface."""
 
@@ -97,7 +98,11 @@ def corrected(model: TextureModel, correction: Correction) -> TextureModel:
 
 
 def _counts(outcome: Outcome) -> dict[str, int]:
-    return {'right': outcome.label_right, 'known_right': outcome.final_right, 'known_wrong': outcome.final_wrong}
+    return {
+        'right': outcome.label_right,
+        'accepted_correct': outcome.final_right,
+        'accepted_wrong': outcome.final_wrong,
+    }
 
 
 def _other_day(trials: Sequence[BorderTrial]) -> dict[str, Any]:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """How long from the last sample of a window to its estimate or grade: in one process, through nodes, with a hand."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """How well force, speed and circle are kept, by which robot on which surface; and where force control is stable."""
 
@@ -429,24 +430,7 @@ def stability_chart(
     period_s: float = 0.004,
     integral_s: float = 0.5,
 ) -> dict[str, Array]:
-    """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated.
-
-    Parameters
-    ----------
-    stiffness_n_m
-        Stiffnesses of the contact, N/m, s of them.
-    delay_s
-        Delays of the loop, d of them.
-    period_s
-        Time between two commands.
-    integral_s
-        Integral time of the controller.
-
-    Returns
-    -------
-    dict
-        'stiffness_n_m' (s,), 'delay_s' (d,), and 'predicted' and 'simulated' (s, d) in m/s/N.
-    """
+    """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated."""
     loops = [[LoopModel(k, 0.0, delay, period_s, integral_s) for delay in delay_s] for k in stiffness_n_m]
     return {
         'stiffness_n_m': np.array(stiffness_n_m, dtype=float),

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Slides needed to recognise a texture: with motions chosen for what they tell, in a fixed order, and at random."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Accuracy against sliding time and against computing time: ours, the papers' and peers, in one run by one protocol."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What the recipes of the papers recognise on recordings: on the same track, and at another place of it."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What collecting at several places brings, on simulated samples that vary along their length; and their anchor."""
 
@@ -34,7 +35,7 @@ TRAINED, TESTED = 30, 10
 PLACES = 6
 PATCH_M = 0.1  # side of the patch on which places are drawn
 NEW_PLACES = 8  # of each surface, tested
-FIGURES = ('right', 'known_right', 'known_wrong')
+FIGURES = ('right', 'accepted_correct', 'accepted_wrong')
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Hours of explorations on the emulator with faults at random: what is injected, recorded, required and reported.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What several tests of the whole suite share: simulated slides and a model of them, made once for all of a run."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The nodes of a robot brought up in order: the explorer takes control of its arm last, or not at all."""
 

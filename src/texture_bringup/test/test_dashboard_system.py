@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The dashboard as an operator meets it: the emulator, and the requests and the WebSocket of the page."""
 

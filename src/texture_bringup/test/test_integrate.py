@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The integrator's walkthrough, line by line: every line that begins with `texture` is run as it stands in the page."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What a user gets who gives `texture` the wrong thing: exit code 2 and one sentence that says what to do."""
 

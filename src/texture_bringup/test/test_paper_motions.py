@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The motion that ships with a paper gives the recipes that ship with it a window, on every kind of arm."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Each paper as a user repeats it on the emulator: its sensor, motion and recipes, from exploring to a live answer."""
 

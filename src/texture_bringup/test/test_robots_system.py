@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Each emulated robot as a user starts and uses it: the launch file, then `texture explore`."""
 

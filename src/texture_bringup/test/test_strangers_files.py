@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Files from strangers: cut off, altered, of wrong types. Each is read or refused with one sentence, and runs no code.
 

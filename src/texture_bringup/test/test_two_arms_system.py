@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Two arms in two namespaces, one of them with two fingers, as a user starts them: they explore at once."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The dashboard: a web page with the state of the nodes, and its server."""
 
@@ -50,22 +51,7 @@ MIN_TOKEN = 16
 
 @dataclass(frozen=True)
 class Access:
-    """What is asked of a request.
-
-    Parameters
-    ----------
-    host
-        Address the server is bound to.
-    token
-        Secret of the page; needed as soon as others can reach the server.
-    names
-        Names of this machine by which it may be called beside 'localhost' and addresses.
-
-    Raises
-    ------
-    InvalidParameter
-        If the server is bound beyond loopback without a token, or with a short one.
-    """
+    """What is asked of a request."""
 
     host: str
     token: str = ''
@@ -169,21 +155,7 @@ class NodeStatuses:
         self._lights: dict[str, tuple[str, str, float, bool]] = {}
 
     def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
-        """Take note of a report; when there are too many names, the one silent for longest is forgotten.
-
-        Parameters
-        ----------
-        name
-            Name of the status.
-        level
-            'OK', 'WARN', 'ERROR' or 'STALE'.
-        message
-            One sentence.
-        time_s
-            When it came, of a clock that only rises.
-        ended
-            Whether the node has ended.
-        """
+        """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
         self._lights.pop(name, None)
         self._lights[name[:MAX_CHARACTERS]] = level, message[:MAX_CHARACTERS], time_s, ended
         if len(self._lights) > MAX_LIGHTS:
@@ -211,15 +183,7 @@ class NodeStatuses:
 
 
 class Recorder:
-    """Begins and ends recordings.
-
-    Parameters
-    ----------
-    folder
-        Where the bags go; made if missing.
-    namespace
-        Of what is recorded.
-    """
+    """Begins and ends recordings."""
 
     def __init__(self, folder: Path, namespace: str) -> None:
         self.bag = ''  # that is being recorded
@@ -229,13 +193,7 @@ class Recorder:
         self._child: ChildLauncher | None = None
 
     def begin(self, name: str) -> str:
-        """Begin a recording of this name; return what is to be said.
-
-        Raises
-        ------
-        InvalidParameter
-            If one is going on already, or the folder cannot be written.
-        """
+        """Begin a recording of this name; return what is to be said."""
         if self._child is not None:
             raise InvalidParameter(f"'{self.bag}' is being recorded already; end that first")
         try:
@@ -275,13 +233,7 @@ MAX_SAMPLES = 100_000
 
 
 class Ring:
-    """Keep the newest samples of the first channel of a stream.
-
-    Parameters
-    ----------
-    length_s
-        So much is kept; never more than `MOST_SAMPLES`.
-    """
+    """Keep the newest samples of the first channel of a stream."""
 
     def __init__(self, length_s: float) -> None:
         self._length_s = length_s
@@ -306,18 +258,7 @@ class Ring:
         self._samples = np.concatenate([self._samples, fresh])[-len(self._samples) :]
 
     def newest(self, length_s: float) -> NDArray[np.float64]:
-        """Return the newest samples, (n_samples,), oldest first; NaN where none came yet.
-
-        Parameters
-        ----------
-        length_s
-            Length of the stretch.
-
-        Returns
-        -------
-        (n_samples,)
-            In the unit of the signal.
-        """
+        """Return the newest samples, (n_samples,), oldest first; NaN where none came yet."""
         count = min(len(self._samples), round(length_s * self.rate_hz))
         return self._samples[len(self._samples) - count :]
 
@@ -330,16 +271,7 @@ class Ring:
 
 
 def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the least and the greatest sample of `points` stretches: no peak is lost, however few are drawn.
-
-    Parameters
-    ----------
-    samples : (n_samples,)
-
-    Returns
-    -------
-    low, high : (points,), or as many as there are samples; NaN where there is none
-    """
+    """Return the least and the greatest sample of `points` stretches: no peak is lost, however few are drawn."""
     points = min(points, len(samples))
     if points == 0:
         return np.zeros(0), np.zeros(0)
@@ -353,14 +285,6 @@ def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
     """Return the amplitude from 0 Hz to half the rate in dB of one unit, the greatest of each bin; empty if gaps.
 
     A sine of amplitude 1 reads 0 dB (Hann window, its gain taken out).
-
-    Parameters
-    ----------
-    samples : (n_samples,)
-
-    Returns
-    -------
-    (bins,), or fewer if there are few samples
     """
     if len(samples) < 16 or not np.isfinite(samples).all():
         return np.zeros(0)
@@ -443,18 +367,7 @@ VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
 
 
 def make_app(commands: Any, access: Access, page: Path) -> web.Application:
-    """Return the application, which is not started yet.
-
-    Parameters
-    ----------
-    commands
-        Carries out what the page asks for, as `nodes.dashboard.DashboardNode` does: a coroutine of what is asked for
-        each of `BUTTONS`, and a coroutine `offered`. A TextureError is shown to the user.
-    access
-        Who may ask for what.
-    page
-        Folder of the static files.
-    """
+    """Return the application, which is not started yet."""
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
     viewers = app[VIEWERS] = Viewers()
 
@@ -547,13 +460,7 @@ SERVING_CLOSING_S = 5.0
 
 
 class Serving:
-    """Serve an application until closed.
-
-    Raises
-    ------
-    LaunchFailed
-        If the port cannot be had.
-    """
+    """Serve an application until closed."""
 
     def __init__(self, app: web.Application, host: str, port: int) -> None:
         self._app = app

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The demonstration: record, train and recognise on the emulated rig."""
 
@@ -54,13 +55,7 @@ FIRST_PORT, PORTS_PER_DOMAIN, FIRST_UNICAST = 7400, 250, 10
 
 
 def free_domain() -> int:
-    """Return a ROS domain that nobody uses now.
-
-    Raises
-    ------
-    LaunchFailed
-        If every domain is in use.
-    """
+    """Return a ROS domain that nobody uses now."""
     # Programs that start at the same moment look at different domains first.
     first = os.getpid() % len(DOMAINS)
     for domain_id in (*DOMAINS[first:], *DOMAINS[:first]):
@@ -105,21 +100,7 @@ class DemoPlan:
     untrained_speed_m_s: float = 0.02
 
     def requests(self, surface: str, slides: int, early_stopping: bool = False) -> Iterator[ExplorationRequest]:
-        """Yield the explorations of one surface.
-
-        Parameters
-        ----------
-        surface
-            Label of the surface.
-        slides
-            Number of explorations.
-        early_stopping
-            Whether a slide may end when it is decided.
-
-        Yields
-        ------
-        ExplorationRequest
-        """
+        """Yield the explorations of one surface."""
         for number in range(slides):
             yield ExplorationRequest(
                 'linear_slide',
@@ -143,13 +124,7 @@ class DemoPlan:
 
 
 class ProgressLog:
-    """Tell what happens, each chapter with the time since the start.
-
-    Parameters
-    ----------
-    out
-        Where to.
-    """
+    """Tell what happens, each chapter with the time since the start."""
 
     def __init__(self, out: TextIO = sys.stdout) -> None:
         self._out = out
@@ -198,17 +173,7 @@ START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first 
 
 
 class DemoRig:
-    """Run the bench in a ROS domain of its own; use it in a `with` block.
-
-    Parameters
-    ----------
-    folder
-        For the device and the logs of ROS; it must outlive the block.
-    log
-        File for what the nodes say.
-    recipe, seed
-        Of the features, and of the bench's randomness.
-    """
+    """Run the bench in a ROS domain of its own; use it in a `with` block."""
 
     def __init__(self, folder: Path, log: Path, recipe: str, seed: int) -> None:
         domain_id = free_domain()
@@ -256,22 +221,7 @@ ATTEMPTS = 3  # a machine that is busy with something else holds the emulated ar
 def explore_patiently(
     explore: Callable[[ExplorationRequest], ExplorationResult], request: ExplorationRequest, tell: Callable[[str], None]
 ) -> ExplorationResult:
-    """Return the result of an exploration; an aborted one is made again, twice at most.
-
-    Parameters
-    ----------
-    explore
-        Explores as an `Operator` does.
-    request
-        What is asked of it.
-    tell
-        Takes a line on each exploration that is made again.
-
-    Raises
-    ------
-    MotionAborted
-        If none ends as asked.
-    """
+    """Return the result of an exploration; an aborted one is made again, twice at most."""
     for left in reversed(range(ATTEMPTS)):
         explored = explore(request)
         if explored.success:
@@ -314,23 +264,7 @@ def sliding_samples(states: Sequence[ExplorationState], batches: Iterable[Tactil
 
 
 def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> None:
-    """Draw an exploration of a surface, and the confusion of all explorations in the bag.
-
-    Parameters
-    ----------
-    bag
-        With the signal, the states, the features and the live estimates.
-    surface
-        Of which surface: the exploration that was least certain at first.
-    model
-        That recognised the slides.
-    report
-        Of the model on this bag.
-    path
-        File that is written.
-    note
-        Lines below the panels.
-    """
+    """Draw an exploration of a surface, and the confusion of all explorations in the bag."""
     states, estimates, batches = recorded(bag)
     surfaces = {name: states[name][0].surface for name in estimates}
     own = [name for name in surfaces if surfaces[name] == surface]
@@ -399,21 +333,7 @@ def _clear(folder: Path) -> None:
 
 
 def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
-    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained.
-
-    Parameters
-    ----------
-    out
-        Folder of recordings, model, figures and picture.
-    recipe
-        Name of the recipe.
-    seed
-        Of the surfaces and places.
-    plan
-        Surfaces, slides and numbers.
-    progress
-        Takes what is printed.
-    """
+    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained."""
     _clear(out)
     progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
     with (

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Start the nodes of an XML launch file where ROS 2's own launcher is missing."""
 
@@ -38,21 +39,7 @@ STOP_DEADLINE_S = 15.0  # the launcher itself kills after 8 s
 
 
 class ChildLauncher:
-    """Run `texture launch FILE …` beside this program; use it in a `with` block.
-
-    Parameters
-    ----------
-    file
-        Path or name of the launch file.
-    arguments
-        Launch arguments.
-    environment
-        Environment of the nodes.
-    log
-        File for everything the nodes say.
-    together
-        Whether the launch ends when one node dies, even if the launch file would start it again.
-    """
+    """Run `texture launch FILE …` beside this program; use it in a `with` block."""
 
     def __init__(
         self,
@@ -86,13 +73,7 @@ class ChildLauncher:
         self.stop()
 
     def check(self) -> None:
-        """Raise LaunchFailed, with what the log says, if the nodes have ended.
-
-        Raises
-        ------
-        LaunchFailed
-            If they have.
-        """
+        """Raise LaunchFailed, with what the log says, if the nodes have ended."""
         if self._process is not None and self._process.poll() is not None:
             raise LaunchFailed(f'{self._reason()}; everything the nodes said is in {self.log}')
 
@@ -210,15 +191,6 @@ class RunningNode:
     """A running node, and the lines that it writes.
 
     Start it from the main thread of a program without other threads: the kernel ends it with the thread that did.
-
-    Parameters
-    ----------
-    node
-        What is run.
-    command_line, environment
-        Of the process.
-    say
-        Receives each line to show.
     """
 
     def __init__(
@@ -327,17 +299,7 @@ MISTAKE = 2  # exit code of a node that was given something it cannot use, and s
 
 
 class Supervisor:
-    """Run nodes until all have ended or a stop is asked for.
-
-    Parameters
-    ----------
-    nodes
-        What to run.
-    say
-        Receives each line to show, without its line end.
-    together
-        Whether all are stopped when one dies, whatever the launch file says about it, and none is started again.
-    """
+    """Run nodes until all have ended or a stop is asked for."""
 
     def __init__(self, nodes: Sequence[NodeDescription], say: Callable[[str], None], *, together: bool = False) -> None:
         self._nodes = nodes
@@ -456,13 +418,7 @@ Perform = Callable[[str, Sequence[str]], str]
 
 
 def expand(text: str, perform: Perform) -> str:
-    """Return a text with its calls performed: `perform(name, arguments)` gives the text of each, innermost first.
-
-    Raises
-    ------
-    InvalidLaunch
-        If a call is not closed or not well formed.
-    """
+    """Return a text with its calls performed: `perform(name, arguments)` gives the text of each, innermost first."""
     done: list[str] = []  # what calls have given; marks stand for it, as nothing in it is a call or a quote
 
     def resolved(part: str) -> str:
@@ -547,18 +503,6 @@ def parameter_value(text: str, type_name: str) -> Any:
 
     Quotes do not keep `'$(var x)'` a string, as upstream reads the text as YAML before and after the substitution:
     `type="str"` does.
-
-    Parameters
-    ----------
-    text
-        Value in the launch file, with its substitutions performed.
-    type_name
-        Content of the attribute `type`; 'yaml' lets the text decide.
-
-    Raises
-    ------
-    InvalidLaunch
-        If the text is no value of the type.
     """
     kind = find(TYPES, type_name, 'parameter type')
     if kind is str or not text:
@@ -614,13 +558,7 @@ ALLOWED: Mapping[str, tuple[Sequence[str], Sequence[str] | None]] = {
 
 
 def find_launch_file(name_or_path: str) -> Path:
-    """Return a launch file: a path, or the name of one of this package, such as 'emulator' or 'emulator.launch.xml'.
-
-    Raises
-    ------
-    UnknownName
-        If there is neither, with the nearest name.
-    """
+    """Return a launch file: a path, or the name of one of this package, such as 'emulator' or 'emulator.launch.xml'."""
     path = Path(name_or_path).expanduser()
     if path.is_file():
         return path
@@ -633,13 +571,7 @@ def find_launch_file(name_or_path: str) -> Path:
 
 
 def given_arguments(texts: Iterable[str]) -> dict[str, str]:
-    """Return the launch arguments in texts of the form NAME:=VALUE; the last one of a name counts.
-
-    Raises
-    ------
-    InvalidLaunch
-        If a text has no ':='.
-    """
+    """Return the launch arguments in texts of the form NAME:=VALUE; the last one of a name counts."""
     given = {}
     for text in texts:
         name, mark, value = text.partition(':=')
@@ -650,27 +582,7 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
 
 
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
-    """Return the nodes that a launch file asks for, in its order.
-
-    Parameters
-    ----------
-    given
-        Launch arguments by name.
-    environment
-        Environment of the launcher: what `$(env …)` sees and the nodes inherit.
-    path
-        Of the launch file.
-
-    Returns
-    -------
-    list of NodeDescription
-        Included files in their place.
-
-    Raises
-    ------
-    InvalidLaunch, UnknownName
-        With the file and what is wrong in it.
-    """
+    """Return the nodes that a launch file asks for, in its order."""
     reader = _Reader()
     reader.read_file(path, Scope(dict(given), dict(environment)))
     for name in given:
@@ -680,20 +592,7 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
 
 
 def all_arguments(path: Path, environment: Mapping[str, str]) -> dict[str, Element]:
-    """Return the `arg` elements of a launch file, and of those it includes at a place that no argument decides.
-
-    Parameters
-    ----------
-    path
-        Of the launch file.
-    environment
-        As for `read`.
-
-    Returns
-    -------
-    dict
-        By name: elements with the attributes `default`, without which an argument is required, and `description`.
-    """
+    """Return the `arg` elements of a launch file, and of those it includes at a place that no argument decides."""
     found: dict[str, Element] = {}
     waiting, seen = [path], {path}
     while waiting:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A client of the suite's nodes: explore, call services, set parameters."""
 
@@ -45,13 +46,7 @@ FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
 
 
 async def ready(is_ready: Callable[[], bool], node: str) -> None:
-    """Wait until a node can be asked: one that has just started is found a moment later.
-
-    Raises
-    ------
-    LaunchFailed
-        If it is not there in time.
-    """
+    """Wait until a node can be asked: one that has just started is found a moment later."""
     deadline_s = time.monotonic() + FOUND_DEADLINE_S
     while not is_ready():
         if time.monotonic() > deadline_s:
@@ -60,13 +55,7 @@ async def ready(is_ready: Callable[[], bool], node: str) -> None:
 
 
 async def answer_of(future: Future, deadline_s: float) -> Any:
-    """Return the result of a future of ROS, which the executor's thread completes.
-
-    Raises
-    ------
-    LaunchFailed
-        If it does not come in time.
-    """
+    """Return the result of a future of ROS, which the executor's thread completes."""
     loop = asyncio.get_running_loop()
     answered: asyncio.Event = asyncio.Event()
     future.add_done_callback(lambda _future: loop.call_soon_threadsafe(answered.set))
@@ -91,26 +80,7 @@ READERS: dict[int, tuple[Callable[[str], Any], str]] = {
 
 
 def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
-    """Return a parameter of a declared type.
-
-    Parameters
-    ----------
-    name
-        Name of the parameter.
-    text
-        Its value, as an operator writes it.
-    kind
-        Type of `rcl_interfaces.msg.ParameterType`.
-
-    Returns
-    -------
-    Parameter
-
-    Raises
-    ------
-    InvalidParameter
-        If its type cannot be read from a text, or the text is no such value.
-    """
+    """Return a parameter of a declared type."""
     if kind not in READERS:
         raise InvalidParameter(f"parameter '{name}' is a list, which cannot be set from a text; give it at the start")
     read, allowed = READERS[kind]

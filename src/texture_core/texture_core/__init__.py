@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What all packages share: data types, parameters, catalogues, errors, framing of serial lines and ROS glue.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What every sub-command of `texture` shares: exit codes, sentences for errors, common options."""
 
@@ -22,23 +23,7 @@ T = TypeVar('T')
 
 @dataclass(frozen=True)
 class Command:
-    """A sub-command of `texture` that shares its module with others; package.xml lists it by its name there.
-
-    Parameters
-    ----------
-    summary
-        What it does, for the help; a literal text, because the help reads it without importing the module.
-    configure
-        Adds the arguments of the sub-command to a parser.
-    run
-        Does it, and returns the exit code.
-
-    Examples
-    --------
-    >>> Command('say hello', add_namespace, lambda options: print('hello') or 0).run(argparse.Namespace())
-    hello
-    0
-    """
+    """A sub-command of `texture` that shares its module with others; package.xml lists it by its name there."""
 
     summary: str
     configure: Callable[[argparse.ArgumentParser], None]
@@ -120,18 +105,6 @@ def task(what: str, total: int = 0) -> Iterator[Callable[[], None]]:
 
     On a terminal one line changes in place and goes at the end; elsewhere a line is written every 10 s. Of nested tasks
     the outermost is shown.
-
-    Parameters
-    ----------
-    what
-        What is done, such as 'read bags'.
-    total
-        Number of steps; 0 if unknown.
-
-    Yields
-    ------
-    Callable
-        To be called after each step.
     """
     if not _Shown.wanted or _Shown.busy:
         yield lambda: None
@@ -183,21 +156,7 @@ USER_ERROR, INTERRUPTED, CUT_OFF = 2, 130, 141
 
 
 def run_program(action: Callable[[], int], name: str = 'texture') -> int:
-    """Do what a program is for, and return its exit code.
-
-    Parameters
-    ----------
-    action
-        Returns an exit code.
-    name
-        Of the program, which stands before its sentences.
-
-    Returns
-    -------
-    int
-        That of the action; 2 for an error of the user or a file that the system refuses, 130 after Ctrl-C, 141 when
-        nobody reads on what the program prints, as behind `| head`.
-    """
+    """Do what a program is for, and return its exit code."""
     try:
         try:
             return action()

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Names, parameters, YAML and JSON: how a choice is looked up, a value checked and a file read within limits."""
 
@@ -69,22 +70,7 @@ def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
 
 
 def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
-    """Return the error for a name that is not among the known ones, with the nearest of them.
-
-    Parameters
-    ----------
-    name
-        Name that the user gave.
-    known
-        All names that are allowed.
-    kind
-        Noun for the error sentence, such as 'feature'.
-
-    Returns
-    -------
-    UnknownName
-        To be raised.
-    """
+    """Return the error for a name that is not among the known ones, with the nearest of them."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean '{near[0]}'?" if near else '.'
@@ -124,27 +110,7 @@ def place_of(error: Exception, module: str) -> str:
 
 
 def library(name: str, purpose: str, extra: str) -> Any:
-    """Return a library that does not come with the suite.
-
-    Parameters
-    ----------
-    name
-        Its name, such as 'h5py', or that of a module in it.
-    purpose
-        What needs it, in the plural, for the sentence.
-    extra
-        Name of the extra that brings it, in a `package.xml`.
-
-    Returns
-    -------
-    module
-        The library.
-
-    Raises
-    ------
-    MissingLibrary
-        If it is not installed.
-    """
+    """Return a library that does not come with the suite."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -188,31 +154,7 @@ def shipped(package: str, subfolder: str, suffix: str = '.yaml') -> dict[str, Pa
 
 
 def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix: str = '.yaml') -> Path:
-    """Return the file a user means: a path, or the name of a file that a package ships in `subfolder`.
-
-    Parameters
-    ----------
-    name_or_path
-        Path of a file, or name of a shipped one without its suffix.
-    package
-        Package whose files come first; any other that is installed may ship more (see `shipped`).
-    subfolder
-        Folder in the package, such as 'config/recipes'.
-    kind
-        Noun for the error sentence, such as 'feature'.
-    suffix
-        Ending of the shipped files.
-
-    Returns
-    -------
-    Path
-        Of an existing file.
-
-    Raises
-    ------
-    UnknownName
-        If there is neither, with the nearest name; `kind` is the noun for the sentence, such as 'recipe'.
-    """
+    """Return the file a user means: a path, or the name of a file that a package ships in `subfolder`."""
     path = Path(name_or_path).expanduser()
     if path.is_file():
         return path
@@ -251,25 +193,6 @@ def open_regular(path: str | Path, most_bytes: int | None = MAX_FILE_BYTES) -> B
 
     A device is not even opened: opening a serial line may reset what is connected to it. Since the path may lead to
     another file a moment later, what was opened is examined as well.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-    most_bytes
-        Largest allowed size; None for any.
-
-    Returns
-    -------
-    BinaryIO
-        At the beginning of the file.
-
-    Raises
-    ------
-    OSError
-        If there is no such file, or it may not be read.
-    FileRefused
-        If it is too large, a device, a named pipe or a socket, also behind a symbolic link.
     """
     _check_regular(os.stat(path), most_bytes)  # noqa: PTH116  # the same call as below, on a path
     number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
@@ -292,53 +215,19 @@ def _check_regular(status: os.stat_result, most_bytes: int | None) -> None:
 
 
 def read_bounded(path: str | Path, most_bytes: int) -> bytes:
-    """Return the bytes of a regular file.
-
-    Raises
-    ------
-    OSError, FileRefused
-        If it cannot be opened, see `open_regular`, or is larger than `most_bytes`.
-    """
+    """Return the bytes of a regular file."""
     with open_regular(path, most_bytes) as file:
         return file.read(most_bytes)
 
 
 def read_text(path: str | Path, most_bytes: int, encoding: str = 'utf-8') -> str:
-    """Return the text in a regular file; see `read_bounded`, UnicodeDecodeError (a ValueError) if it is no text.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-    most_bytes
-        Largest allowed size in bytes.
-    encoding
-        Encoding of the text.
-
-    Returns
-    -------
-    str
-        The whole text.
-    """
+    """Return the text in a regular file; see `read_bounded`, UnicodeDecodeError (a ValueError) if it is no text."""
     return read_bounded(path, most_bytes).decode(encoding)
 
 
 @contextmanager
 def writing(path: str | Path, other: str = 'file') -> Iterator[None]:
-    """Say in one sentence, within a `with` block, that a file or folder cannot be written.
-
-    Parameters
-    ----------
-    path
-        What the block writes.
-    other
-        What to name instead, such as 'folder'.
-
-    Raises
-    ------
-    InvalidParameter
-        If the block raises OSError.
-    """
+    """Say in one sentence, within a `with` block, that a file or folder cannot be written."""
     try:
         yield
     except OSError as error:
@@ -346,23 +235,7 @@ def writing(path: str | Path, other: str = 'file') -> Iterator[None]:
 
 
 def read_array(file: IO[bytes]) -> AnyArray:
-    """Return the array in a stream of NumPy's format (.npy); nothing in it is run.
-
-    Parameters
-    ----------
-    file
-        Stream at the beginning of the array.
-
-    Returns
-    -------
-    (...)
-        Array of the shape that the file states.
-
-    Raises
-    ------
-    FileRefused
-        If it is no such array, holds Python objects, or its values do not follow.
-    """
+    """Return the array in a stream of NumPy's format (.npy); nothing in it is run."""
     import numpy as np  # noqa: PLC0415  # takes 0.1 s, and the help of the command needs none
 
     try:
@@ -378,18 +251,6 @@ class Archive:
     """The members of a zip file, such as .npz or .skops, which unpack to 1 GB at most.
 
     zipfile gives no more of a member than its directory states, so the stated sizes are what counts.
-
-    Parameters
-    ----------
-    file
-        Open file; stays with the caller.
-    most_bytes
-        To which it may unpack.
-
-    Raises
-    ------
-    FileRefused
-        If it is no zip file, or states that it unpacks to more.
     """
 
     def __init__(self, file: IO[bytes], most_bytes: int = MAX_FILE_BYTES) -> None:
@@ -418,13 +279,7 @@ class Archive:
             raise FileRefused(f"its member '{name}' is damaged: {error}") from error
 
     def array(self, name: str) -> AnyArray:
-        """Return the array in a member, see `read_array`; KeyError if there is no such member.
-
-        Returns
-        -------
-        (...)
-            Array of the shape that the member states.
-        """
+        """Return the array in a member, see `read_array`; KeyError if there is no such member."""
         return read_array(io.BytesIO(self.read(name)))
 
 
@@ -448,20 +303,7 @@ class Arrays:
 
 
 def refuse_inputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | Path]) -> None:
-    """Refuse to write over a file that is read.
-
-    Parameters
-    ----------
-    outputs
-        Files to be written; None for one that is not wanted.
-    inputs
-        Files and folders that are read, such as recipes, bags and both files of a model.
-
-    Raises
-    ------
-    InvalidParameter
-        With the file that would be lost.
-    """
+    """Refuse to write over a file that is read."""
     read = {_real(given) for given in inputs}
     for output in outputs:
         if output and _real(output) in read:
@@ -491,13 +333,7 @@ def write_json(content: Any, path: str | Path) -> None:
 
 
 def load_yaml(path: Path, what: str) -> Any:
-    """Return the plain values in a YAML file; `what` is the noun for the error sentence, such as 'scene'.
-
-    Raises
-    ------
-    InvalidParameter
-        If it cannot be read, is no YAML, or holds more than a file of settings does.
-    """
+    """Return the plain values in a YAML file; `what` is the noun for the error sentence, such as 'scene'."""
     try:
         return parse_yaml(read_text(path, 4 * MAX_CHARACTERS))
     except PARSE_ERRORS as error:
@@ -505,13 +341,7 @@ def load_yaml(path: Path, what: str) -> Any:
 
 
 def load_card(path: Path) -> Any:
-    """Return what stands under `recipe` in a model's card (JSON).
-
-    Raises
-    ------
-    InvalidParameter
-        If it cannot be read as such.
-    """
+    """Return what stands under `recipe` in a model's card (JSON)."""
     try:
         return load_json(path, MAX_CARD_BYTES).get('recipe')
     except PARSE_ERRORS as error:
@@ -519,13 +349,7 @@ def load_card(path: Path) -> Any:
 
 
 def parse_yaml(text: str) -> Any:
-    """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it.
-
-    Raises
-    ------
-    ValueError
-        If the text is too long or its aliases stand for too many values.
-    """
+    """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it."""
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
     # The tree of nodes has each alias once: values are counted before any is made.
@@ -536,24 +360,12 @@ def parse_yaml(text: str) -> Any:
 
 
 def load_json(path: Path, most_bytes: int) -> Any:
-    """Return the plain values in a JSON file.
-
-    Raises
-    ------
-    OSError, ValueError
-        If it cannot be read, is no JSON, or larger than `most_bytes`.
-    """
+    """Return the plain values in a JSON file."""
     return parse_json(read_text(path, most_bytes))
 
 
 def parse_json(text: str) -> Any:
-    """Return the plain values in a text; ValueError if it is no JSON, or nested too deeply.
-
-    Raises
-    ------
-    ValueError
-        If it is no JSON.
-    """
+    """Return the plain values in a text; ValueError if it is no JSON, or nested too deeply."""
     try:
         return json.loads(text)
     except RecursionError as error:
@@ -654,13 +466,7 @@ class Parameter:
         return bounds[self.low is not None, self.high is not None]
 
     def check(self, value: Any) -> Any:
-        """Return the value in the parameter's type.
-
-        Raises
-        ------
-        InvalidParameter
-            If its type or range is wrong.
-        """
+        """Return the value in the parameter's type."""
         if typing.get_origin(self.type) is list:
             return self._check_list(value)
         if self.type is float and isinstance(value, int) and not isinstance(value, bool):
@@ -698,22 +504,7 @@ def parameters_of(cls: type) -> list[Parameter]:
 
 
 def check_option(cls: type, name: str, value: Any) -> None:
-    """Check the option `--NAME` of a command, which sets a parameter.
-
-    Parameters
-    ----------
-    cls
-        Parameter dataclass.
-    name
-        Name of the parameter and of the option.
-    value
-        What the user gave.
-
-    Raises
-    ------
-    InvalidParameter
-        If its type or range is wrong; the sentence names the option.
-    """
+    """Check the option `--NAME` of a command, which sets a parameter."""
     parameter = next(one for one in parameters_of(cls) if one.name == name)
     try:
         parameter.check(value)
@@ -722,27 +513,7 @@ def check_option(cls: type, name: str, value: Any) -> None:
 
 
 def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
-    """Build a parameter dataclass from a mapping (a YAML section); what is not named keeps its default.
-
-    Parameters
-    ----------
-    cls
-        Parameter dataclass.
-    values
-        Values by the names of the fields.
-    where
-        Where the values stand, for the sentence of an error.
-
-    Returns
-    -------
-    instance of `cls`
-        Checked.
-
-    Raises
-    ------
-    InvalidParameter
-        If a value has the wrong type or range, or a name is unknown (with the nearest known one).
-    """
+    """Build a parameter dataclass from a mapping (a YAML section); what is not named keeps its default."""
     if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
         raise InvalidParameter(f'{where}: {cls!r} is not a class with parameters; name a dataclass')
     return cls(**_read(cls, values, where, _checked))
@@ -775,25 +546,6 @@ def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
     """Build a dataclass whose fields are parameters, dataclasses of their own, or mappings of names to these.
 
     A number that stands where a text is needed is taken as text: YAML reads a column named 3 as a number.
-
-    Parameters
-    ----------
-    cls
-        Frozen dataclass; what is not named keeps its default.
-    values
-        Mapping of names to values; None is an empty one.
-    where
-        Place for the error sentence, such as "mapping 'my.yaml'".
-
-    Returns
-    -------
-    cls
-        With every value checked.
-
-    Raises
-    ------
-    InvalidParameter
-        If a name is unknown (with the nearest known one), or a value has the wrong type or range.
     """
     read = _read(cls, {} if values is None else values, where, _value)
     try:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What can go wrong, each with one sentence for the user: what came, what is allowed, what to do."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Frames on a serial line: checked, numbered and timed, for devices of our own design.
 
@@ -41,13 +42,7 @@ class Frame(NamedTuple):
 
 
 class FrameDecoder:
-    """Decode frames from a byte stream with lost, added or damaged bytes.
-
-    Parameters
-    ----------
-    max_frame_bytes
-        Longest frame on the line; what goes on longer without a zero byte is refused. Bounds the memory kept.
-    """
+    """Decode frames from a byte stream with lost, added or damaged bytes."""
 
     def __init__(self, max_frame_bytes: int = MAX_FRAME_BYTES) -> None:
         self.frames = 0
@@ -98,13 +93,7 @@ class FrameDecoder:
 
 
 def cobs_encode(data: bytes) -> bytes:
-    """Return bytes without a zero: each run between zeros, or of 254 bytes, after its length plus one.
-
-    Examples
-    --------
-    >>> cobs_encode(bytes.fromhex('11 22 00 33')).hex(' ')
-    '03 11 22 02 33'
-    """
+    """Return bytes without a zero: each run between zeros, or of 254 bytes, after its length plus one."""
     stuffed = bytearray()
     for run in data.split(DELIMITER):
         for at in range(0, len(run) + 1, LONGEST_RUN):
@@ -154,13 +143,7 @@ def pack(frame: Frame) -> bytes:
 
 
 class CounterUnwrapper:
-    """Unwrap a counter of few bits.
-
-    Parameters
-    ----------
-    bits
-        Width of the device's counter; it may move by less than half of its range between two readings.
-    """
+    """Unwrap a counter of few bits."""
 
     def __init__(self, bits: int) -> None:
         self._range = 1 << bits

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The suite's types as messages, its parameters in ROS, quality of service, diagnostics, and how a node runs."""
 
@@ -64,17 +65,7 @@ DiagnosticReport = tuple[str, str, Mapping[str, Any]]
 
 
 class Diagnostics:
-    """Publish a status once a second, and whenever asked.
-
-    Parameters
-    ----------
-    node
-        The node that reports.
-    report
-        Returns (level, message, numbers): 'OK', 'WARN' or 'ERROR', one sentence, and what to show beside it.
-    hardware_id
-        Serial number or device path; '' for a node that owns no device.
-    """
+    """Publish a status once a second, and whenever asked."""
 
     def __init__(
         self, node: Any, report: Callable[[], DiagnosticReport], hardware_id: str = '', period_s: float = 1.0
@@ -122,24 +113,7 @@ def _text(value: Any) -> str:
 
 
 def frame_name(namespace: str, name: str) -> str:
-    """Return what a frame is called on tf that a node in a namespace calls `name`: 'left/fingertip'.
-
-    Parameters
-    ----------
-    namespace
-        Of the node, and of the finger below it, such as '/left/finger0'; '/' is the root.
-    name
-        A name with a '/' in it is that of tf already.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> frame_name('/left', 'fingertip'), frame_name('/', 'fingertip'), frame_name('/left', 'right/fingertip')
-    ('left/fingertip', 'fingertip', 'right/fingertip')
-    """
+    """Return what a frame is called on tf that a node in a namespace calls `name`: 'left/fingertip'."""
     if '/' in name or not name:
         return name
     return f'{namespace.strip("/")}/{name}'.lstrip('/')
@@ -179,28 +153,7 @@ UNBOUNDED = 1e300
 
 
 def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
-    """Declare every field of `cls` with its description, unit and range; return the values the node was given.
-
-    Parameters
-    ----------
-    node
-        The rclpy node that gets the parameters.
-    cls
-        Parameter dataclass.
-    changeable
-        Whether a running node follows changes (see `on_change`). If not, the parameters are read-only after the start:
-        a change that had no effect would look as if it had one.
-
-    Returns
-    -------
-    instance of `cls`
-        Checked.
-
-    Raises
-    ------
-    InvalidParameter
-        If a given value has the wrong type or range.
-    """
+    """Declare every field of `cls` with its description, unit and range; return the values the node was given."""
     for item in parameters_of(cls):
         if node.has_parameter(item.name):
             continue
@@ -219,17 +172,7 @@ def read(node: Any, cls: type[T]) -> T:
 
 
 def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
-    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set.
-
-    Parameters
-    ----------
-    node
-        The rclpy node whose parameters were declared.
-    cls
-        Parameter dataclass, as it was declared.
-    apply
-        Takes all values; it refuses them by raising a TextureError.
-    """
+    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set."""
     known = {item.name for item in parameters_of(cls)}
 
     def check(changes: list[RosParameter]) -> SetParametersResult:
@@ -255,11 +198,6 @@ def check_names(node: Any) -> None:
 
     Names in the node's `names_elsewhere`, if it has them, belong to what it did not choose: they are not misspelled.
     A node with `shares_file` takes only what it knows from the file of another node, such as the pose of a surface.
-
-    Raises
-    ------
-    InvalidParameter
-        With the nearest name. A mistyped limit limits nothing, and the node would run with its default.
     """
     if getattr(node, 'shares_file', False):
         return
@@ -415,15 +353,6 @@ def run_node(make_node: Callable[[], Any], parameters: Mapping[str, Any], namesp
     """Run a node with parameters until it ends or is told to stop.
 
     A user's error ends the program with exit code 2 and one sentence, as for any node.
-
-    Parameters
-    ----------
-    make_node
-        Makes the node when ROS is initialised.
-    parameters
-        Values of parameters by name.
-    namespace
-        Namespace of the node; '' for the root.
     """
     rules = [f'{name}:={json.dumps(value)}' for name, value in parameters.items()]  # JSON is YAML, strings quoted
     options = [part for rule in rules for part in ('-p', rule)]

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Start nodes as processes, and a graph of one's own for a test."""
 
@@ -29,13 +30,7 @@ TICKS_PER_S = os.sysconf('SC_CLK_TCK')
 
 
 def executable(package: str, node: str) -> Path:
-    """Return the executable of a node in the first installation that has it.
-
-    Raises
-    ------
-    DeviceError
-        If none has.
-    """
+    """Return the executable of a node in the first installation that has it."""
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     for prefix in filter(None, prefixes):
         path = Path(prefix) / 'lib' / package / node
@@ -46,18 +41,7 @@ def executable(package: str, node: str) -> Path:
 
 @contextmanager
 def killed_on_error(process: subprocess.Popen[Any]) -> Iterator[None]:
-    """Kill a process when the block fails, because `Popen` would wait for its end for ever.
-
-    Parameters
-    ----------
-    process
-        Which the block starts or watches.
-
-    Raises
-    ------
-    BaseException
-        What the block raised.
-    """
+    """Kill a process when the block fails, because `Popen` would wait for its end for ever."""
     try:
         yield
     except BaseException:
@@ -66,21 +50,7 @@ def killed_on_error(process: subprocess.Popen[Any]) -> Iterator[None]:
 
 
 class NodeProcess:
-    """A node in its own process, from `with` to the end of the block.
-
-    Parameters
-    ----------
-    package, node
-        Which executable.
-    parameters
-        ROS parameters; texts, numbers and booleans.
-    namespace
-        Where its relative topics are.
-    domain_id
-        ROS domain; that of the environment if None.
-    program
-        Command to run instead of the installed executable.
-    """
+    """A node in its own process, from `with` to the end of the block."""
 
     def __init__(
         self,
@@ -118,13 +88,7 @@ class NodeProcess:
 
     @property
     def process(self) -> subprocess.Popen[bytes]:
-        """The process, once started.
-
-        Raises
-        ------
-        RuntimeError
-            If it has not been started.
-        """
+        """The process, once started."""
         if self._process is None:
             raise RuntimeError(f'{self.name} has not been started: use it in a with block')
         return self._process
@@ -163,15 +127,7 @@ POLL_S = 0.05
 
 
 class LocalGraph:
-    """Nodes under test and a `peer` that plays the others, from `with` to the end of the block.
-
-    Parameters
-    ----------
-    domain_id
-        ROS domain, which no other test may use.
-    deadline_s
-        For each wait; generous, as a busy machine is slow.
-    """
+    """Nodes under test and a `peer` that plays the others, from `with` to the end of the block."""
 
     def __init__(self, domain_id: int, deadline_s: float = 30.0) -> None:
         self._environment = {'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
@@ -197,22 +153,7 @@ class LocalGraph:
         return self._spun(kind(parameter_overrides=given))
 
     def listen(self, kind: type, topic: str, qos: Any = 10) -> list[Any]:
-        """Return the list to which the messages of a topic will be added.
-
-        Parameters
-        ----------
-        kind
-            Type of the messages.
-        topic
-            Name of the topic.
-        qos
-            Quality of service, or the depth of the queue.
-
-        Returns
-        -------
-        list
-            Grows while the graph spins.
-        """
+        """Return the list to which the messages of a topic will be added."""
         received: list[Any] = []
         self.peer.create_subscription(kind, topic, received.append, qos)
         return received
@@ -222,13 +163,7 @@ class LocalGraph:
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def until(self, condition: Callable[[], Any]) -> None:
-        """Let things happen until the condition holds.
-
-        Raises
-        ------
-        TimeoutError
-            If the condition does not hold within the deadline.
-        """
+        """Let things happen until the condition holds."""
         deadline = time.monotonic() + self._deadline_s
         while not condition():
             if time.monotonic() > deadline:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What flows between the packages: signals, windows, features, estimates, explorations; and small types of all."""
 
@@ -69,18 +70,7 @@ SHOWN_CHARACTERS = 40
 
 
 def checked_label(label: str) -> str:
-    """Return a label without the white space around it; '' stays ''.
-
-    Parameters
-    ----------
-    label
-        Name of a surface as a user gave it.
-
-    Raises
-    ------
-    InvalidData
-        If it is longer than 100 characters, or has a slash, a backslash or a character that cannot be printed.
-    """
+    """Return a label without the white space around it; '' stays ''."""
     label = label.strip()
     if len(label) > MAX_CHARACTERS:
         raise InvalidData(
@@ -188,16 +178,7 @@ def lost_samples(batches: Sequence[TactileSignal]) -> int:
 
 
 def join_batches(batches: Sequence[TactileSignal], anchors_ns: Iterable[int] = ()) -> list[TactileSignal]:
-    """Return consecutive batches of one stream with those that continue one another joined: fewer and larger ones.
-
-    Parameters
-    ----------
-    batches
-        In their order.
-    anchors_ns
-        The first batch that ends after each of these times begins a joined one: the samples of a slide are counted from
-        the stamp of its first batch, and no jitter of later stamps may move them.
-    """
+    """Return consecutive batches of one stream with those that continue one another joined: fewer and larger ones."""
     anchors = [next((n for n, batch in enumerate(batches) if batch.end_ns > time_ns), -1) for time_ns in anchors_ns]
     groups: list[list[TactileSignal]] = []
     for number, batch in enumerate(batches):
@@ -220,22 +201,7 @@ def _alike(one: TactileSignal, other: TactileSignal) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Samples of one stream over one stretch of sliding.
-
-    Parameters
-    ----------
-    samples : (n_samples, n_channels) float64
-    rate_hz
-        Sampling rate, > 0.
-    channels
-        Name of each column; () if they do not matter.
-    start_ns
-        Time of the first sample.
-    speed_m_s, force_n
-        Mean speed and normal force in the window; NaN if unknown.
-    sensor
-        Name of the sensor part that measured; '' if unknown.
-    """
+    """Samples of one stream over one stretch of sliding."""
 
     samples: Samples
     rate_hz: float
@@ -471,15 +437,7 @@ Convert = Callable[[Any], Any] | None  # None: the same on both sides
 
 
 class MessageCodec:
-    """Turn data classes into messages and back: field by field of the same name, the time in the header.
-
-    Parameters
-    ----------
-    kind
-        Returns the class of a message by its name, such as 'std_msgs/msg/Header'.
-    convert
-        By the type of a field that is not the same on both sides: to the message, and back.
-    """
+    """Turn data classes into messages and back: field by field of the same name, the time in the header."""
 
     def __init__(self, kind: Callable[[str], Any], convert: Mapping[Any, tuple[Convert, Convert]]) -> None:
         self._kind = kind
@@ -584,19 +542,7 @@ TURNED_RAD, SPEED_RATIO, FORCE_RATIO = 0.1, 1.15, 1.3
 
 @dataclass(frozen=True)
 class SlideMotion:
-    """One way to slide.
-
-    Parameters
-    ----------
-    motion
-        Name in the catalogue of motions.
-    direction_rad
-        From +x towards +y.
-    speed_m_s, force_n
-        Along the surface, and on it.
-    duration_s
-        What it costs: of two motions that tell as much, the shorter is made.
-    """
+    """One way to slide."""
 
     motion: str
     direction_rad: float
@@ -723,13 +669,7 @@ class FingerSender:
 
 
 class FingerReceiver:
-    """The emulator's end of the named pipe at a path, which it makes and removes.
-
-    Raises
-    ------
-    DeviceError
-        If the pipe cannot be made, or another emulator has it.
-    """
+    """The emulator's end of the named pipe at a path, which it makes and removes."""
 
     def __init__(self, path: str) -> None:
         self.received = 0
@@ -787,17 +727,7 @@ class FingerReceiver:
 
 
 def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
-    """Return the matrix that turns by |r| about the axis r/|r| (Rodrigues' formula).
-
-    Parameters
-    ----------
-    rotation_vector_rad : (3,)
-
-    Returns
-    -------
-    (3, 3)
-        Its columns are the axes of the turned frame.
-    """
+    """Return the matrix that turns by |r| about the axis r/|r| (Rodrigues' formula)."""
     x, y, z = rotation_vector_rad
     angle = float(np.sqrt(x * x + y * y + z * z))
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -808,22 +738,7 @@ def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
 
 
 def quaternion(rotation_vector_rad: Sequence[float] | Array) -> tuple[float, float, float, float]:
-    """Return the quaternion x, y, z, w of ROS that turns by |r| about the axis r/|r|.
-
-    Parameters
-    ----------
-    rotation_vector_rad : (3,)
-
-    Returns
-    -------
-    (4,)
-        Of length 1.
-
-    Examples
-    --------
-    >>> [round(value, 3) for value in quaternion((0.0, 0.0, np.pi / 2))]
-    [0.0, 0.0, 0.707, 0.707]
-    """
+    """Return the quaternion x, y, z, w of ROS that turns by |r| about the axis r/|r|."""
     vector = np.array(rotation_vector_rad, dtype=float)
     half = 0.5 * float(np.linalg.norm(vector))
     x, y, z = (0.5 * np.sinc(half / np.pi) * vector).tolist()  # sin(half)/|r| in a form that holds for 0
@@ -831,18 +746,7 @@ def quaternion(rotation_vector_rad: Sequence[float] | Array) -> tuple[float, flo
 
 
 def quaternion_matrix(quaternion: Sequence[float]) -> Array:
-    """Return the matrix of a rotation that is given as the quaternion x, y, z, w of ROS.
-
-    Parameters
-    ----------
-    quaternion : (4,)
-        Of any length but 0; it is normalised.
-
-    Returns
-    -------
-    (3, 3)
-        Its columns are the axes of the turned frame; NaN for a quaternion of length 0, which is no rotation.
-    """
+    """Return the matrix of a rotation that is given as the quaternion x, y, z, w of ROS."""
     vector, w = np.array(quaternion[:3], dtype=float), float(quaternion[3])
     length = float(np.linalg.norm(vector))
     if length == 0.0 == w:
@@ -851,18 +755,7 @@ def quaternion_matrix(quaternion: Sequence[float]) -> Array:
 
 
 def rotation_vector(matrix: Array) -> Array:
-    """Return the rotation vector of a rotation, the inverse of `rotation_matrix`.
-
-    Parameters
-    ----------
-    matrix : (3, 3)
-        Orthonormal, with determinant 1.
-
-    Returns
-    -------
-    (3,)
-        rad; its length is from 0 to π.
-    """
+    """Return the rotation vector of a rotation, the inverse of `rotation_matrix`."""
     # The quaternion from its largest component is exact also at half a turn (Shepperd 1978).
     trace = float(np.trace(matrix))
     squares = np.array([*(1.0 + 2.0 * np.diag(matrix) - trace), 1.0 + trace])  # 4·x², 4·y², 4·z², 4·w²

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The C++ in docs/sensors.md is what people will copy: it must make frames that the driver takes."""
 

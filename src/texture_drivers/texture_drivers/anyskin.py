@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """AnySkin, five magnetometers under a skin: protocol and sensor."""
 
@@ -63,15 +64,7 @@ LOCK_FRAMES = 3  # so many in a row, and nothing between them, make sure where f
 
 
 class FrameRun(NamedTuple):
-    """Consecutive frames.
-
-    Parameters
-    ----------
-    missing
-        Frames that must have been there before it, by the number of bytes that were passed over.
-    values : (n_frames, n_magnetometers, 4)
-        Temperature (°C) and field along x, y, z (µT) of each magnetometer.
-    """
+    """Consecutive frames."""
 
     missing: int
     values: Values
@@ -85,11 +78,6 @@ class FrameParser:
     behind CR LF (a byte more or less at its beginning would change a value and not its end), and, from there on, as
     long as each follows the one before without a byte between. A changed bit that leaves a value in its range cannot
     be seen.
-
-    Parameters
-    ----------
-    magnetometers
-        How many the board has.
     """
 
     def __init__(self, magnetometers: int = MAGNETOMETERS) -> None:
@@ -170,17 +158,7 @@ class FrameParser:
 
 
 def in_range(values: Values) -> NDArray[np.bool_]:
-    """Return whether all values of each frame, (n_frames, n_magnetometers, 4), can have been measured, (n_frames,).
-
-    Parameters
-    ----------
-    values : (n_frames, n_magnetometers, 4)
-        Temperature in °C, then the field along x, y and z, as sent.
-
-    Returns
-    -------
-    (n_frames,) bool
-    """
+    """Return whether all values of each frame, (n_frames, n_magnetometers, 4), can have been measured, (n_frames,)."""
     with np.errstate(invalid='ignore'):  # NaN is in no range
         temperature_c, magnitudes = values[..., 0], np.abs(values)
         warm = (temperature_c >= LOWEST_TEMPERATURE_C) & (temperature_c <= HIGHEST_TEMPERATURE_C)
@@ -216,17 +194,7 @@ class AnySkinSettings:
 
 
 class AnySkinDecoder(Decoder):
-    """Decode the frames of an AnySkin; see `texture_drivers.serial_line.Decoder`.
-
-    Parameters
-    ----------
-    settings
-        Of the board.
-    batch_s
-        How often bytes are read.
-    frame_id
-        For the headers.
-    """
+    """Decode the frames of an AnySkin; see `texture_drivers.serial_line.Decoder`."""
 
     def __init__(self, settings: AnySkinSettings, batch_s: float, frame_id: str = '') -> None:
         self._settings = settings

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """SynTouch BioTac: protocol over a Cheetah adapter, messages of the vendor's driver, the sensor."""
 
@@ -27,21 +28,7 @@ from texture_drivers.timing import PPM, SLOW_CLOCK, PacketNumbering, StreamClock
 
 
 class SpiFrame(NamedTuple):
-    """The reply to all sampling commands of one frame.
-
-    Parameters
-    ----------
-    epoch
-        Changes when `number` and `time_us` begin again, as after opening or a reset.
-    number
-        Running number of the frame; a jump is a loss.
-    time_us
-        The device's clock at the start of slot 0.
-    fingers
-        How many BioTacs the board has places for.
-    reply
-        See `protocol.decode`.
-    """
+    """The reply to all sampling commands of one frame."""
 
     epoch: int
     number: int
@@ -201,17 +188,7 @@ RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made o
 
 
 class SerialBridge(SpiLink):
-    """The replies that a bridge sends, in order and each once. See `SpiLink`.
-
-    Parameters
-    ----------
-    device
-        Path of the serial device.
-    layout
-        What the bridge must be sampling.
-    wait_s
-        How long to wait for bytes.
-    """
+    """The replies that a bridge sends, in order and each once. See `SpiLink`."""
 
     max_drift = 5e-3  # the internal oscillator of a microcontroller on USB is right to 0.25 %
 
@@ -232,13 +209,7 @@ class SerialBridge(SpiLink):
         self._tracker.restart()
 
     def read(self) -> Sequence[SpiFrame]:
-        """Wait for bytes and return the replies they complete.
-
-        Raises
-        ------
-        DeviceError
-            If the port is not open or is gone, or the bridge samples another kind of BioTac.
-        """
+        """Wait for bytes and return the replies they complete."""
         if self._port is None:
             raise DeviceError(f"device '{self._device}' is not open; open it before reading")
         data = b''
@@ -282,13 +253,7 @@ class SerialBridge(SpiLink):
 
 
 class FrameTracker:
-    """Unwrap the numbers and the clock of a device, and detect when they restart.
-
-    Parameters
-    ----------
-    layout
-        What is sampled; it determines the duration of a frame.
-    """
+    """Unwrap the numbers and the clock of a device, and detect when they restart."""
 
     def __init__(self, layout: BioTacLayout) -> None:
         self.restarts = 0
@@ -304,13 +269,7 @@ class FrameTracker:
         self._checked: SpiFrame | None = None
 
     def place(self, frame: Frame) -> SpiFrame:
-        """Return the frame with its number and time.
-
-        Raises
-        ------
-        DeviceError
-            If the device samples at another pace than a BioTac is to be sampled.
-        """
+        """Return the frame with its number and time."""
         steps, elapsed_us = self._number.step(frame.sequence), self._time_us.step(frame.time_us)
         late_us = abs(elapsed_us - steps * self._frame_us)
         steady = steps > 0 and late_us <= (LATE_FRAMES + RATE_TOLERANCE * steps) * self._frame_us
@@ -359,15 +318,7 @@ ADAPTERS = 16
 
 
 class Cheetah(SpiLink):
-    """Frames sampled back to back by a Cheetah adapter. See `SpiLink`.
-
-    Parameters
-    ----------
-    layout
-        Kind of BioTac.
-    now_s
-        A monotonic clock: when the host was away for longer than the queue lasts, sampling has paused.
-    """
+    """Frames sampled back to back by a Cheetah adapter. See `SpiLink`."""
 
     max_drift = 2e-2  # the slots are made of delays, whose sum is nominal
 
@@ -381,13 +332,7 @@ class Cheetah(SpiLink):
         self._pause_at: int | None = None
 
     def open(self) -> None:
-        """Open the first free adapter and start sampling; DeviceError if there is none.
-
-        Raises
-        ------
-        DeviceError
-            If there is no free adapter, or its library is missing.
-        """
+        """Open the first free adapter and start sampling; DeviceError if there is none."""
         self.close()
         try:
             self._api = importlib.import_module(MODULE)
@@ -408,13 +353,7 @@ class Cheetah(SpiLink):
         self._pause_at = None
 
     def read(self) -> Sequence[SpiFrame]:
-        """Wait for one frame and return it.
-
-        Raises
-        ------
-        DeviceError
-            If the adapter is not open, or an exchange with it fails.
-        """
+        """Wait for one frame and return it."""
         if not self._handle:
             raise DeviceError('the Cheetah adapter is not open; open it before reading')
         size = self._layout.frame_bytes(len(SELECT))
@@ -529,18 +468,7 @@ LATE_S = 0.015  # host stamps jitter by some ms; what is later than that has gap
 
 
 class BioTacReading(NamedTuple):
-    """What one message holds about one finger.
-
-    Parameters
-    ----------
-    end_ns
-        Stamp of the message: time just after the last sample.
-    pac : (n,) counts
-    slow : (n_channels,) counts
-        In the order of `BioTacLayout.slow_channels`.
-    serial
-        Serial number of the finger, '' if not reported.
-    """
+    """What one message holds about one finger."""
 
     end_ns: int
     pac: NDArray[np.float32]
@@ -549,19 +477,7 @@ class BioTacReading(NamedTuple):
 
 
 class MessageLayout(NamedTuple):
-    """How one type of message is read, and when its samples were taken.
-
-    Parameters
-    ----------
-    read
-        Returns the reading of a finger, by its place from 0 on.
-    pac_rate_hz, message_rate_hz
-        Nominal rates of PAC and of messages.
-    pac_delay_s
-        From the start of the stretch that a message covers to its first PAC sample.
-    slow_delay_s
-        From there to the time given to the slow channels.
-    """
+    """How one type of message is read, and when its samples were taken."""
 
     read: Callable[[Any, int], BioTacReading]
     pac_rate_hz: float
@@ -571,13 +487,7 @@ class MessageLayout(NamedTuple):
 
 
 def read_biotac_hand(message: Any, finger: int) -> BioTacReading:
-    """Return what a `biotac_sensors/BioTacHand` says about the finger at a place of the board, 0 for position 1.
-
-    Raises
-    ------
-    InvalidData
-        If the finger is not in the message, or its arrays have other lengths than a frame has.
-    """
+    """Return what a `biotac_sensors/BioTacHand` says about the finger at a place of the board, 0 for position 1."""
     found = {int(data.bt_position) - 1: data for data in message.bt_data}
     data = _finger(found, finger)
     layout = LAYOUTS['biotac']
@@ -593,13 +503,7 @@ def read_biotac_hand(message: Any, finger: int) -> BioTacReading:
 
 
 def read_biotac_all(message: Any, finger: int) -> BioTacReading:
-    """Return what a `sr_robot_msgs/BiotacAll` says about a finger, 0 is the first of the hand.
-
-    Raises
-    ------
-    InvalidData
-        If the finger is not in the message, or has another number of electrodes.
-    """
+    """Return what a `sr_robot_msgs/BiotacAll` says about a finger, 0 is the first of the hand."""
     data = _finger(dict(enumerate(message.tactiles)), finger)
     slow = _slow([data.tdc, data.tac, data.pdc], data.electrodes, LAYOUTS['biotac'])
     return BioTacReading(_stamp_ns(message), _counts(data.pac), slow)
@@ -638,15 +542,6 @@ class BioTacMessageConverter:
 
     These messages have no numbers, so a loss is seen in the stamps alone: a message that is later than 15 ms leaves a
     gap before it.
-
-    Parameters
-    ----------
-    layout
-        How the messages are read.
-    finger
-        Place of the finger, from 0.
-    frame_id
-        Frame of the fingertip.
     """
 
     def __init__(self, layout: MessageLayout, finger: int = 0, frame_id: str = '') -> None:
@@ -662,13 +557,7 @@ class BioTacMessageConverter:
         self._next_ns: int | None = None
 
     def update(self, message: Any) -> Mapping[str, TactileSignal]:
-        """Return the batches in a message, by topic; nothing while the clock settles.
-
-        Raises
-        ------
-        InvalidData
-            If the message does not hold the finger as it should.
-        """
+        """Return the batches in a message, by topic; nothing while the clock settles."""
         reading = self._layout.read(message, self._finger)
         self.serial = reading.serial or self.serial
         first, row = self._place(len(reading.pac), reading.end_ns)
@@ -706,19 +595,7 @@ ODD_PARITY = np.array([byte.bit_count() % 2 == 1 for byte in range(256)])
 
 
 class Replies(NamedTuple):
-    """Some frames of all BioTacs of a board, in counts; NaN where a word was damaged.
-
-    Parameters
-    ----------
-    pac : (n_frames * pac_per_frame, n_fingers) float32
-        The fast pressure, in the order of time.
-    slow : (n_frames, n_slow_channels, n_fingers) float32
-        The other channels, in the order of `BioTacLayout.slow_channels`.
-    damaged : (n_fingers,)
-        Words with a wrong parity.
-    refused : (n_fingers,)
-        Those of the damaged words that are error words of the device.
-    """
+    """Some frames of all BioTacs of a board, in counts; NaN where a word was damaged."""
 
     pac: NDArray[np.float32]
     slow: NDArray[np.float32]
@@ -732,25 +609,6 @@ def decode(frames: bytes, layout: BioTacLayout, fingers: int) -> Replies:
     A word is 12 bits: seven in the upper bits of the first byte, five in the upper bits of the second; bit 0 of each
     byte makes its number of ones odd. A word belongs to the BioTac at its place in the reply, whatever became of
     its neighbours, and to the channel of its slot: what comes back while the command goes out is not relied on.
-
-    Parameters
-    ----------
-    frames : n_frames * layout.frame_bytes(fingers)
-        Replies in the order of time; each slot is two bytes of echo and two bytes for each BioTac.
-    layout
-        Slots of a frame, and the channel of each.
-    fingers
-        Number of BioTacs on the bus.
-
-    Returns
-    -------
-    Replies
-        Samples in counts and the damaged words, for each finger.
-
-    Raises
-    ------
-    InvalidData
-        If the length is not that of whole frames.
     """
     size = layout.frame_bytes(fingers)
     if not frames or len(frames) % size:

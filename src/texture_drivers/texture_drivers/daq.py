@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Eight channels of a data acquisition board on a serial line."""
 
@@ -64,13 +65,7 @@ def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> Seria
 
 
 def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
-    """Return the converter and its channels; see `texture_drivers.sensor.load_settings`.
-
-    Raises
-    ------
-    InvalidParameter
-        If the channels are missing, or two have one name.
-    """
+    """Return the converter and its channels; see `texture_drivers.sensor.load_settings`."""
     content = read_settings(config)
     listed = content.pop('channels', None)
     if not isinstance(listed, list) or not listed:

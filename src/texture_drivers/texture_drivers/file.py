@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A recording in a file as a sensor: readers of recordings, and the player."""
 
@@ -25,16 +26,7 @@ from texture_drivers.sensor import SensorParams, load_settings
 
 
 class FileRecording(NamedTuple):
-    """Samples from a file.
-
-    Parameters
-    ----------
-    samples : (n_samples, n_channels)
-    rate_hz
-        None if the file does not tell.
-    channels
-        () if the file does not tell.
-    """
+    """Samples from a file."""
 
     samples: Samples
     rate_hz: float | None = None
@@ -103,18 +95,7 @@ def _is_number(text: str) -> bool:
 
 
 def rate_from_times(time_s: Array) -> float:
-    """Return the rate of evenly spaced times, (n,); ValueError if they are not.
-
-    Parameters
-    ----------
-    time_s : (n,)
-        Rising.
-
-    Raises
-    ------
-    ValueError
-        If they do not rise or are not evenly spaced.
-    """
+    """Return the rate of evenly spaced times, (n,); ValueError if they are not."""
     steps = np.diff(time_s)
     if not len(steps) or not np.median(steps) > 0:
         raise ValueError('its times do not rise; leave the column out and set `rate_hz`')
@@ -144,13 +125,7 @@ READ_ERRORS = (
 
 
 def load_recording(path: Path) -> FileRecording:
-    """Return what is recorded in a .csv, .wav, .npy or .npz file; no file can run code.
-
-    Raises
-    ------
-    InvalidData
-        If there is no such file, or it holds something else.
-    """
+    """Return what is recorded in a .csv, .wav, .npy or .npz file; no file can run code."""
     if path.suffix.lower() not in LOADERS:
         raise InvalidData(f"recording '{path}' ends in '{path.suffix}'; allowed are {', '.join(LOADERS)}")
     try:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Is a stream as it should be: rate, dead or clipping channels, baseline, and what is said on /diagnostics."""
 
@@ -28,19 +29,7 @@ RELATIVE_FLOOR = 1e-4  # the noise of a channel is taken for at least this share
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """What a stream measures without load.
-
-    Parameters
-    ----------
-    level : (n_channels,)
-        Mean of each channel during the tare, in its unit.
-    noise : (n_channels,)
-        Standard deviation of each channel during the tare.
-    stamp_ns
-        When the tare began.
-    stream
-        A batch of the stream, for its names and units.
-    """
+    """What a stream measures without load."""
 
     level: Array
     noise: Array
@@ -53,18 +42,7 @@ class Baseline:
         return replace(batch, samples=samples, tared=True)
 
     def drift(self, level: Array) -> Array:
-        """Return by how many standard deviations of the noise a level differs from the baseline.
-
-        Parameters
-        ----------
-        level : (n_channels,)
-            Mean of each channel.
-
-        Returns
-        -------
-        (n_channels,)
-            0 or more.
-        """
+        """Return by how many standard deviations of the noise a level differs from the baseline."""
         floor = np.maximum(RELATIVE_FLOOR * np.abs(self.level), np.median(self.noise))
         return np.abs(level - self.level) / np.maximum(np.maximum(self.noise, floor), np.finfo(float).tiny)
 
@@ -74,15 +52,7 @@ class Baseline:
 
 
 class Tare:
-    """Collect the samples of a stream until its baseline is known.
-
-    Parameters
-    ----------
-    duration_s
-        Over how much the level is averaged.
-    skip_s
-        How much is left out before, while the device sets a bias of its own.
-    """
+    """Collect the samples of a stream until its baseline is known."""
 
     def __init__(self, duration_s: float, skip_s: float = 0.0) -> None:
         self._duration_s = duration_s
@@ -91,13 +61,7 @@ class Tare:
         self._begin_ns: int | None = None
 
     def add(self, batch: TactileSignal) -> Baseline | None:
-        """Take a batch; return the baseline when the last one has come.
-
-        Raises
-        ------
-        InvalidData
-            If the stream holds too little, or moved during the tare.
-        """
+        """Take a batch; return the baseline when the last one has come."""
         if self._begin_ns is None:
             self._begin_ns = batch.stamp_ns + round(self._skip_s * NANOSECONDS)
         if batch.stamp_ns < self._begin_ns:
@@ -128,21 +92,7 @@ class Tare:
 def saturated(
     samples: NDArray[np.float32], lowest: Array, highest: Array, least_fraction: float = 0.01
 ) -> NDArray[np.bool_]:
-    """Return which channels stand at an end of their range in more than a share of the samples.
-
-    Parameters
-    ----------
-    samples : (n_samples, n_channels)
-        Samples of the last while.
-    lowest, highest
-        Ends of the range, of all channels or of each.
-    least_fraction
-        Single samples at an end are a hard touch, and no fault.
-
-    Returns
-    -------
-    (n_channels,) bool
-    """
+    """Return which channels stand at an end of their range in more than a share of the samples."""
     at_end = (samples <= lowest) | (samples >= highest)
     return at_end.mean(axis=0) > least_fraction
 
@@ -228,22 +178,7 @@ class StreamWatch:
         return found is not None
 
     def review(self, elapsed_s: float, unloaded: bool | None, drift_limit: float) -> list[str]:
-        """Return sentences on what is wrong with the samples since the last review.
-
-        Parameters
-        ----------
-        elapsed_s
-            Time since then.
-        unloaded
-            Whether nothing touches the finger; None if nobody tells.
-        drift_limit
-            See `TareParams`.
-
-        Returns
-        -------
-        list of str
-            None if all is well.
-        """
+        """Return sentences on what is wrong with the samples since the last review."""
         batches, self._batches = self._batches, []
         if not batches or len({batch.channels for batch in batches}) > 1:
             return []
@@ -295,17 +230,7 @@ Limits = Mapping[str, tuple[Any, Any]]  # by topic: lowest and highest sample, o
 
 
 class ChannelWatch:
-    """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are asked for in another.
-
-    Parameters
-    ----------
-    params
-        How the level without load is measured and used.
-    topics
-        Of the sensor.
-    limits
-        Lowest and highest sample by topic, where they are known.
-    """
+    """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are asked for in another."""
 
     def __init__(self, params: TareParams, topics: Sequence[str], limits: Limits) -> None:
         self.unloaded: bool | None = None  # whether nothing touches the finger; None if nobody tells

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Contactile PapillArray: protocol and sensor."""
 
@@ -130,19 +131,7 @@ class PapillArrayParser:
 
 
 class Measurements(NamedTuple):
-    """What packets of one layout hold.
-
-    Parameters
-    ----------
-    counters : (n_packets,)
-        Number of each packet; wraps at 32 bits.
-    times_us : (n_packets,)
-        The hub's clock.
-    pillars
-        Of each array, (n_packets, 6 · n_pillars): forces (N) and displacements (mm) of each pillar.
-    wholes
-        Of each array, (n_packets, 6): force (N) and torque (N mm); none if the hub does not send it.
-    """
+    """What packets of one layout hold."""
 
     counters: NDArray[np.int64]
     times_us: NDArray[np.int64]
@@ -151,17 +140,7 @@ class Measurements(NamedTuple):
 
 
 class PacketLayout(NamedTuple):
-    """Where the measurements stand in a packet.
-
-    Parameters
-    ----------
-    hub
-        Offset of counter and time.
-    pillars
-        Of each array, the offsets of the six values of each pillar.
-    wholes
-        Of each array, the offset of its six values.
-    """
+    """Where the measurements stand in a packet."""
 
     hub: int
     pillars: tuple[tuple[int, ...], ...]
@@ -301,17 +280,6 @@ class PapillArrayDecoder(Decoder):
 
     The hub's counter numbers the samples and its clock times them; over an interruption the host's clock tells what is
     missing.
-
-    Parameters
-    ----------
-    settings
-        Of the hub.
-    arrays
-        Which arrays are published, and the prefix of the topics of each.
-    device
-        Path, for the error sentences.
-    frame_id
-        For the headers.
     """
 
     def __init__(
@@ -364,13 +332,7 @@ class PapillArrayDecoder(Decoder):
         self._interrupt()
 
     def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
-        """Return the batches in `data`; none in the first 0.1 s of a stream.
-
-        Raises
-        ------
-        DeviceError
-            If the hub does not carry an array that is published.
-        """
+        """Return the batches in `data`; none in the first 0.1 s of a stream."""
         topics: Topics = {}
         for layout, packets in self._by_layout(self._parser.feed(data)):
             self._check_arrays(len(layout.pillars))

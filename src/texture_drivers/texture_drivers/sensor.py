@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What every sensor shares: its parameters, and the thread that reads it."""
 
@@ -65,18 +66,7 @@ T = TypeVar('T')
 
 
 class SensorReader:
-    """A thread that reads a sensor, hands each batch on, and opens the sensor again when it is gone.
-
-    Parameters
-    ----------
-    sensor
-        What is read; used by this thread alone.
-    deliver
-        Called with topic and batch, in the thread.
-    warn, inform
-        Called with one sentence when the sensor goes, not at each retry, and when it comes back. A sensor that was
-        never there is warned of after `QUIET_ATTEMPTS`.
-    """
+    """A thread that reads a sensor, hands each batch on, and opens the sensor again when it is gone."""
 
     def __init__(
         self, sensor: Sensor, deliver: Deliver, warn: LogSentence = lambda _: None, inform: LogSentence = lambda _: None
@@ -160,31 +150,12 @@ class SensorReader:
 
 
 def load_settings(cls: type[T], config: str) -> T:
-    """Return the settings that `config` means; what they do not name keeps its default.
-
-    Parameters
-    ----------
-    cls
-        A dataclass of parameters.
-    config
-        Path of a YAML file, name of one in `config/sensors`, or a mapping in YAML such as '{loop: true}'; '' is none.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        If there is no such file, or it holds something unknown or impossible.
-    """
+    """Return the settings that `config` means; what they do not name keeps its default."""
     return from_mapping(cls, read_settings(config), f'settings {config}')
 
 
 def read_settings(config: str) -> dict[str, Any]:
-    """Return the mapping that `config` means; see `load_settings`.
-
-    Raises
-    ------
-    InvalidParameter
-        If it is no mapping in YAML.
-    """
+    """Return the mapping that `config` means; see `load_settings`."""
     if not config:
         return {}
     if config.lstrip().startswith('{'):

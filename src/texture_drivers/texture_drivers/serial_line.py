@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A sensor at a serial port: find the port, open it, decode its packets, count what is broken or missing."""
 
@@ -35,13 +36,7 @@ SAMPLE = np.dtype('<i2')
 
 @dataclass(frozen=True, eq=False)
 class FramedStream:
-    """What one kind of frames holds, and under what name and in what units it is published.
-
-    Parameters
-    ----------
-    gains, offsets : (n_channels,)
-        Sample in its unit = gain · count + offset.
-    """
+    """What one kind of frames holds, and under what name and in what units it is published."""
 
     topic: str
     kind: int
@@ -87,13 +82,7 @@ def baud_param(default: int) -> Any:
 
 
 class SerialPort:
-    """An exclusively opened serial device in raw mode.
-
-    Raises
-    ------
-    DeviceError
-        From every method but `close`, once the device is gone.
-    """
+    """An exclusively opened serial device in raw mode."""
 
     def __init__(self, device: str, baud: int = 115200) -> None:
         self._device = device
@@ -192,21 +181,7 @@ class Decoder:
 
 
 class SerialSensor:
-    """Read the streams of one device. See `texture_core.types.Sensor`.
-
-    Parameters
-    ----------
-    params
-        Device, frame and batch length.
-    now_ns
-        Clock of the stamps.
-    decoder
-        What understands the device's bytes.
-    baud
-        Of a real UART; a USB device has none.
-    start_command, stop_command
-        What is sent when the port has been opened, and before it is closed; b'' sends nothing.
-    """
+    """Read the streams of one device. See `texture_core.types.Sensor`."""
 
     def __init__(
         self,
@@ -239,25 +214,13 @@ class SerialSensor:
         self._decoder.restart()
 
     def send(self, command: bytes) -> None:
-        """Send a command; b'' sends nothing.
-
-        Raises
-        ------
-        DeviceError
-            If the port is not open or is gone.
-        """
+        """Send a command; b'' sends nothing."""
         port = self._opened_port()
         if command:
             port.write(command)
 
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
-        """Wait for the length of one batch and return what arrived.
-
-        Raises
-        ------
-        DeviceError
-            If the port is not open or is gone, or no valid frame has come for 1 s.
-        """
+        """Wait for the length of one batch and return what arrived."""
         port = self._opened_port()
         time.sleep(self._params.batch_s)
         data = port.read()
@@ -398,13 +361,6 @@ class StreamDecoder(Decoder):
     """Decode the bytes of a framed serial line into the batches of its streams, by topic.
 
     Frames of other kinds are passed over, so that other traffic may share the line. All streams are timed by one clock.
-
-    Parameters
-    ----------
-    streams
-        What is expected.
-    frame_id
-        For the headers.
     """
 
     def __init__(self, streams: Sequence[FramedStream], frame_id: str = '') -> None:
@@ -459,13 +415,7 @@ class StreamDecoder(Decoder):
         self._restart_streams()
 
     def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
-        """Return the batches in `data`, which has just arrived; none in the first 0.1 s of a stream.
-
-        Raises
-        ------
-        DeviceError
-            If the device sends another version, other channels or another rate than expected.
-        """
+        """Return the batches in `data`, which has just arrived; none in the first 0.1 s of a stream."""
         blocks = self._blocks(self.deframer.feed(data))
         if not blocks:
             return {}
@@ -544,29 +494,7 @@ ListPorts = Callable[[], Iterable[Any]]
 
 
 def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts = list_ports.comports) -> str:
-    """Return the path that is meant: `device` itself, or for 'auto' that of the only port with one of the numbers.
-
-    Parameters
-    ----------
-    device
-        Path of the device, or 'auto'.
-    usb_ids
-        Vendor and product numbers of the device.
-    kind
-        Name of the device for the error sentence, such as 'TSF-85'.
-    ports
-        Lists the ports of this machine.
-
-    Returns
-    -------
-    str
-        Path of a port.
-
-    Raises
-    ------
-    DeviceError
-        If for 'auto' there is none or more than one.
-    """
+    """Return the path that is meant: `device` itself, or for 'auto' that of the only port with one of the numbers."""
     if device != AUTO:
         return device
     listed = list(ports())

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Sound card as a sensor: capture in blocks, and the sensor."""
 
@@ -39,17 +40,7 @@ LONGEST_LATENCY_S = 1.0  # a time of conversion that lies further off is none: s
 
 
 class AudioBlock(NamedTuple):
-    """What PortAudio delivered at once.
-
-    Parameters
-    ----------
-    samples : (n_samples, n_channels) float32
-        1 is full scale.
-    end_ns
-        When the last sample was converted, by the host's clock.
-    overflowed
-        Whether samples before this block were lost.
-    """
+    """What PortAudio delivered at once."""
 
     samples: NDArray[np.float32]
     end_ns: int
@@ -57,22 +48,7 @@ class AudioBlock(NamedTuple):
 
 
 class Capture:
-    """An opened input of a sound card.
-
-    Parameters
-    ----------
-    device
-        Its name or a part of it, or its number; '' is the default input.
-    rate_hz, channels
-        What is asked of it.
-    now_ns
-        The host's clock.
-
-    Raises
-    ------
-    DeviceError
-        If it cannot be opened.
-    """
+    """An opened input of a sound card."""
 
     def __init__(self, device: str, rate_hz: int, channels: int, now_ns: Callable[[], int]) -> None:
         self._rate_hz = rate_hz
@@ -117,13 +93,7 @@ class Capture:
 
 @contextlib.contextmanager
 def open_errors(device: str) -> Iterator[Any]:
-    """Yield the module sounddevice with a fresh list of devices.
-
-    Raises
-    ------
-    DeviceError
-        If the module or PortAudio is missing, or for whatever goes wrong with the device meanwhile.
-    """
+    """Yield the module sounddevice with a fresh list of devices."""
     try:
         import sounddevice  # noqa: PLC0415  # optional, and it fails without PortAudio
     except (ImportError, OSError) as error:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The host time and the running index of each sample, whatever the device tells of either."""
 
@@ -236,13 +237,7 @@ class StreamClock:
 
 
 def supporting_slope(points: Sequence[Arrival]) -> float:
-    """Return the slope of that edge of the lower convex hull which lies below the mean of the points.
-
-    Parameters
-    ----------
-    points
-        At least two, of rising elapsed time.
-    """
+    """Return the slope of that edge of the lower convex hull which lies below the mean of the points."""
     middle = sum(point.elapsed_ns for point in points) / len(points)
     hull: list[Arrival] = []
     for point in points:
@@ -278,11 +273,6 @@ class SampleCounter:
     A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
     not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
     trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
-
-    Parameters
-    ----------
-    longest_gap
-        A jump above this, or backwards, that the next stamp confirms is no loss: the device restarted.
     """
 
     def __init__(self, longest_gap: int = 2000) -> None:
@@ -304,13 +294,7 @@ class SampleCounter:
         self.next_index += samples
 
     def place(self, stamps: Sequence[int | None]) -> tuple[list[int], bool]:
-        """Return the index of each stamp's sample as far as decided, and whether the device restarted after those.
-
-        Parameters
-        ----------
-        stamps : (n_samples,)
-            Ticks of the device, of 64 bits or wrapping at 16; None for a sample without.
-        """
+        """Return the index of each stamp's sample as far as decided, and whether the device restarted after those."""
         indices: list[int] = []
         for position, stamp in enumerate(stamps):
             status = self._classify(stamp, stamps[position + 1 : position + 2])
@@ -360,13 +344,7 @@ def _ticks(last: int | None, stamp: int | None) -> int:
 
 
 class PacketNumbering:
-    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
-
-    Parameters
-    ----------
-    rate_hz
-        Nominal rate of the packets.
-    """
+    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed."""
 
     def __init__(self, rate_hz: float) -> None:
         self.lost = 0
@@ -380,22 +358,7 @@ class PacketNumbering:
         self._next_number = None
 
     def place(self, number: int, count: int, start_ns: int) -> int:
-        """Return the index of the first of `count` packets that follow each other.
-
-        Parameters
-        ----------
-        number
-            The device's number of the first packet.
-        count
-            How many packets there are.
-        start_ns
-            When the first one began.
-
-        Returns
-        -------
-        int
-            Index of the first of them, from 0 on.
-        """
+        """Return the index of the first of `count` packets that follow each other."""
         skipped = 0
         if self._next_number is not None:
             skipped = number - self._next_number
@@ -422,13 +385,6 @@ class BlockCounter:
 
     The time says how many samples are missing, whoever lost them: frames lost on the line show in their numbers too,
     what is missing beyond them was left out by the device itself and counts as `overrun`.
-
-    Parameters
-    ----------
-    rate_hz
-        Nominal rate, by the device's clock.
-    name
-        What the samples are of, for the error sentence.
     """
 
     def __init__(self, rate_hz: float, name: str) -> None:
@@ -451,27 +407,7 @@ class BlockCounter:
         self._restart_check()
 
     def place(self, time_us: int, rows: int, lost_frames: int) -> int:
-        """Return the index of a block's first sample.
-
-        Parameters
-        ----------
-        time_us
-            Device's time of the first sample, unwrapped.
-        rows
-            Samples in the block.
-        lost_frames
-            Frames of this stream missing just before it.
-
-        Returns
-        -------
-        int
-            Running index, from 0.
-
-        Raises
-        ------
-        DeviceError
-            If device and settings do not mean the same rate.
-        """
+        """Return the index of a block's first sample."""
         skipped = 0
         if self._next_us is not None:
             skipped = max(0, round((time_us - self._next_us) * self._rate_hz / 1e6))
@@ -524,15 +460,6 @@ class ArrivalNumbering:
 
     Losses that the protocol shows are given by the caller. Others are known half a second later, by all samples being
     late from then on (`LATE_NS`); over an interruption the host's clock shows how much is missing.
-
-    Parameters
-    ----------
-    rate_hz
-        Rate of the stream.
-    block_s
-        How often arrivals are observed; what is late by less than 1.5 of it, and by less than 1.5 samples, is no loss.
-    max_drift
-        By what share the device's clock may be wrong.
     """
 
     def __init__(self, rate_hz: float, *, block_s: float, max_drift: float = 5e-3) -> None:
@@ -549,20 +476,7 @@ class ArrivalNumbering:
         self._interrupted = True
 
     def place(self, blocks: Sequence[tuple[int, int]], arrival_ns: int) -> list[int]:
-        """Return the index of the first sample of each block.
-
-        Parameters
-        ----------
-        blocks
-            Of each block that has just arrived: samples missing before it, and samples in it; at least one block.
-        arrival_ns
-            When they were there.
-
-        Returns
-        -------
-        list of int
-            Empty while the clock is not settled: then no time is known.
-        """
+        """Return the index of the first sample of each block."""
         indices = []
         for missing, samples in blocks:
             indices.append(self.next_index + missing)
@@ -572,17 +486,7 @@ class ArrivalNumbering:
         return [index + skipped for index in indices] if self.clock.settled else []
 
     def missing(self, index: int, arrival_ns: int, *, counted: bool = False) -> int:
-        """Return how many samples were lost, by the host's clock, before those that have just arrived.
-
-        Parameters
-        ----------
-        index
-            Of the last one that has arrived, as far as known.
-        arrival_ns
-            When it was there.
-        counted
-            Whether the device's own numbers tell losses: then only an interruption hides any.
-        """
+        """Return how many samples were lost, by the host's clock, before those that have just arrived."""
         if self._interrupted:
             self._resume()
         unseen = self._unseen(index, arrival_ns, counted)
@@ -673,11 +577,6 @@ class Decimator:
 
     Output `k` is the filtered value at input `k · factor`: the filter is symmetric, so nothing is delayed. An output
     needs the inputs of 12 output periods around it, so those around a gap are left out.
-
-    Parameters
-    ----------
-    factor
-        1 passes everything through.
     """
 
     def __init__(self, factor: int) -> None:
@@ -688,22 +587,7 @@ class Decimator:
         self._buffer: NDArray[np.float32] | None = None
 
     def feed(self, first: int, samples: NDArray[np.float32]) -> tuple[int, NDArray[np.float32]]:
-        """Return the outputs that have become possible, and the index of the first of them.
-
-        Parameters
-        ----------
-        first
-            Index of the first sample; a jump is a gap.
-        samples : (n_samples, n_channels)
-            The next ones.
-
-        Returns
-        -------
-        int
-            Index of the first output, at the lower rate.
-        (n_outputs, n_channels)
-            May be empty.
-        """
+        """Return the outputs that have become possible, and the index of the first of them."""
         if self._buffer is None or first != self._next:
             self._buffer, self._begin = samples[:0], first
         buffer = np.concatenate([self._buffer, samples])
@@ -720,13 +604,7 @@ class Decimator:
 
 
 def taps(factor: int) -> Array:
-    """Return the coefficients of the low-pass before lowering a rate by `factor`: a sinc in a Kaiser window.
-
-    Returns
-    -------
-    (2 · 12 · factor + 1,)
-        Symmetric, with the sum 1; only [1] for a factor of 1.
-    """
+    """Return the coefficients of the low-pass before lowering a rate by `factor`: a sinc in a Kaiser window."""
     if factor == 1:
         return np.ones(1)
     half = HALF_WIDTH * factor

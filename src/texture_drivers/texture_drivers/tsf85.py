@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Robotiq TSF-85 fingertip: protocol, sample frames, settings, messages of the vendor, the sensor."""
 
@@ -120,11 +121,6 @@ class Tsf85Parser:
     types, index bits 0, a finger that exists, no item twice (a flipped type or finger would make a sample that never
     was), items that end exactly with the payload, and a start byte after it as far as one has come. A flipped value
     byte inside such a packet cannot be seen.
-
-    Parameters
-    ----------
-    layout
-        Kind of fingertip.
     """
 
     def __init__(self, layout: Tsf85Layout = TSF85) -> None:
@@ -225,15 +221,7 @@ class SampleFrame(NamedTuple):
 
 
 class SampleFrameSplitter:
-    """Turn packets into the sample frames of one finger: a dynamic item starts a frame, what came before it joins it.
-
-    Parameters
-    ----------
-    finger
-        Index of the finger, 0 or 1.
-    motion_kinds
-        Kinds of inertial items that are wanted, in order.
-    """
+    """Turn packets into the sample frames of one finger: a dynamic item starts a frame and takes what came before."""
 
     def __init__(self, finger: int, motion_kinds: Sequence[int] = ()) -> None:
         self._finger = finger
@@ -442,17 +430,6 @@ class FingerStream:
     """Number the sample frames of one finger by the device's stamps, time them by the host's clock, cut batches.
 
     Where the firmware sends no stamps, the host's clock also tells what was lost, half a second later.
-
-    Parameters
-    ----------
-    layout
-        Kind of fingertip.
-    settings
-        Of the inertial sensors.
-    static_rate_hz
-        Rate of the taxel images as published; 0: that of the layout.
-    frame_id
-        For the headers.
     """
 
     def __init__(
@@ -522,17 +499,6 @@ class Tsf85MessageConverter:
     """Make the messages about one finger into numbered, timed batches.
 
     A message is handed over with the time at which it was sent, by the clock of the driver's host.
-
-    Parameters
-    ----------
-    finger
-        0 or 1.
-    settings
-        Of the inertial sensors.
-    static_rate_hz
-        Rate of the taxel images as published; 0: 60 Hz.
-    frame_id
-        Frame of the fingertip.
     """
 
     def __init__(
@@ -568,22 +534,7 @@ class Tsf85MessageConverter:
         }
 
     def take(self, topic: str, message: Any, source_ns: int) -> None:
-        """Note a message of a topic, named as in `TOPICS`.
-
-        Parameters
-        ----------
-        topic
-            Name of the topic in `TOPICS`.
-        message
-            Message with the attributes of its type.
-        source_ns
-            Time at which it was sent, ns by the clock of the driver's host.
-
-        Raises
-        ------
-        InvalidData
-            If an image has another number of taxels.
-        """
+        """Note a message of a topic, named as in `TOPICS`."""
         TOPICS[topic](self, message, source_ns)
 
     def batches(self) -> Mapping[str, list[TactileSignal]]:
@@ -662,17 +613,7 @@ REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
 class Tsf85Decoder(Decoder):
-    """Decode the packets of a hub; see `texture_drivers.serial_line.Decoder`.
-
-    Parameters
-    ----------
-    layout
-        Kind of fingertip.
-    params
-        Of the sensor; its `config` means `Tsf85Settings`.
-    prefixes
-        Which fingers are published, and the prefix of the topics of each.
-    """
+    """Decode the packets of a hub; see `texture_drivers.serial_line.Decoder`."""
 
     def __init__(self, layout: Tsf85Layout, params: SensorParams, prefixes: Mapping[int, str]) -> None:
         settings = load_settings(Tsf85Settings, params.config)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Whatever signals and features are like, every recipe, learner and head of roughness gives a finite answer."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Known or not, decided or not: novelty, stopping rule, prediction sets, confidence floor, error bound, domain."""
 
@@ -41,26 +42,6 @@ class ClassDistance:
     The metric is that of the covariance within classes, as in probabilistic linear discriminant analysis.
 
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with slides in place of the mean of a class.
-
-    Parameters
-    ----------
-    projection : (n_features, n_directions)
-        Makes the covariance within classes the identity, and that between them diagonal.
-    references : (n_slides, n_directions)
-        Mean of each training slide, projected; class by class.
-    classes : (n_slides,)
-        Number of the class of each, ascending.
-    centre, weights : (n_directions,)
-        Mean of the classes, projected, and one over the variance about it.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> classes = np.repeat([0, 1], 10)
-    >>> means = 5.0 * classes[:, None] + 0.1 * rng.standard_normal((20, 2))
-    >>> distance = ClassDistance.fit(means, classes)
-    >>> bool(distance.score(np.array([0.0, 0.0]), 0) < distance.score(np.array([0.0, 0.0]), 1))
-    True
     """
 
     projection: Array
@@ -71,15 +52,7 @@ class ClassDistance:
 
     @classmethod
     def fit(cls, means: Array, classes: Codes) -> ClassDistance:
-        """Fit to the means of slides (n_slides, n_features) and the numbers of their classes (n_slides,).
-
-        Parameters
-        ----------
-        means : (n_slides, n_features)
-            Mean features of each slide.
-        classes : (n_slides,)
-            Number of the label of each.
-        """
+        """Fit to the means of slides (n_slides, n_features) and the numbers of their classes (n_slides,)."""
         from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
 
         names, codes = np.unique(classes, return_inverse=True)
@@ -123,15 +96,7 @@ class ClassDistance:
         return 1.0 - self.weights
 
     def score(self, mean: Array, code: int) -> Array:
-        """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides.
-
-        Parameters
-        ----------
-        mean : (..., n_features)
-            Mean features of slides.
-        code
-            Number of the label.
-        """
+        """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides."""
         found = self._own.get(code)
         if found is None:
             return np.full(mean.shape[:-1], np.inf)
@@ -148,15 +113,7 @@ class ClassDistance:
         return nearest
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:
-        """Return the distance with more reference slides, (n_slides, n_features) and (n_slides,).
-
-        Parameters
-        ----------
-        means : (n_slides, n_features)
-            Mean features of each further slide.
-        classes : (n_slides,)
-            Number of the label of each.
-        """
+        """Return the distance with more reference slides, (n_slides, n_features) and (n_slides,)."""
         references = np.concatenate([self.references, means @ self.projection])
         every = np.concatenate([self.classes, classes])
         order = np.argsort(every, kind='stable')
@@ -180,26 +137,6 @@ class ConfidenceFloor:
     slides of both.
 
     Source: Hendrycks & Gimpel 2017 for the confidence as a novelty score; Vovk, Gammerman & Shafer 2005 for its limit.
-
-    Parameters
-    ----------
-    effective_window_counts
-        Lengths of evidence, ascending; none if there is no limit.
-    log_odds
-        Logarithm of p / (1 - p) at each, where p is the smallest confidence of a known surface.
-
-    Raises
-    ------
-    InvalidData
-        If the two have different lengths, the lengths of evidence do not ascend, or a number is not finite.
-
-    Examples
-    --------
-    >>> floor = ConfidenceFloor((1.0, 10.0), (-1.0, 4.0))
-    >>> floor.reached(0.5, effective_windows=1.0), floor.reached(0.5, effective_windows=10.0)
-    (True, False)
-    >>> ConfidenceFloor().reached(0.1, effective_windows=10.0)
-    True
     """
 
     effective_window_counts: tuple[float, ...] = ()
@@ -215,15 +152,7 @@ class ConfidenceFloor:
             )
 
     def reached(self, confidence: float, effective_windows: float) -> bool:
-        """Return whether a known surface may have so little confidence.
-
-        Parameters
-        ----------
-        confidence
-            Probability of the best label, 0 to 1.
-        effective_windows
-            Effective window count so far.
-        """
+        """Return whether a known surface may have so little confidence."""
         return not self.log_odds or confidence >= 1.0 / (1.0 + math.exp(-self._at(effective_windows)))
 
     def _at(self, effective_windows: float) -> float:
@@ -237,22 +166,7 @@ class ConfidenceFloor:
 
 
 def fit_confidence_floor(courses: Sequence[SlideCourse], rate: float, max_error_rate: float = 1.0) -> ConfidenceFloor:
-    """Return the limit that a fraction of the slides over known surfaces stays below, and all but few wrong labels.
-
-    Parameters
-    ----------
-    courses
-        Of slides that were held out of the training; disturbed copies do not count.
-    rate
-        Fraction of the slides that end with the right label and may lie below the limit at each length of evidence.
-    max_error_rate
-        Fraction of the slides whose label may be wrong above the limit; 1 for no limit.
-
-    Returns
-    -------
-    ConfidenceFloor
-        Without a limit if the slides are too few for both fractions.
-    """
+    """Return the limit that a fraction of the slides over known surfaces stays below, and all but few wrong labels."""
     undisturbed = [course for course in courses if not course.disturbance]
     right = [course for course in undisturbed if course.right[-1]]
     rank = int((len(right) + 1) * rate)
@@ -277,22 +191,7 @@ def fit_confidence_floor(courses: Sequence[SlideCourse], rate: float, max_error_
 
 @dataclass(frozen=True)
 class DomainMargins:
-    """How far an exploration may lie outside the conditions of the training.
-
-    Parameters
-    ----------
-    speed, force
-        Relative margins: from low / (1 + margin) to high · (1 + margin) is within.
-    direction_rad
-        Largest angle to a direction of the training.
-    level
-        Relative margin of the signal level.
-
-    Examples
-    --------
-    >>> DomainMargins(speed=0.2).speed
-    0.2
-    """
+    """How far an exploration may lie outside the conditions of the training."""
 
     speed: float = 0.15
     force: float = 0.3
@@ -321,24 +220,6 @@ class ErrorBound:
     allowed error rate lies below the bound.
 
     Source: Hanley & Lippman-Hand 1983 for the rule of three; Clopper & Pearson 1934 for the bound.
-
-    Parameters
-    ----------
-    slides
-        Number of held-out slides, at most MAX_SLIDES; 0 if nothing was held out.
-    max_error_rate
-        Allowed fraction of wrong decisions when slides are ended early, 0 to 1.
-
-    Raises
-    ------
-    InvalidData
-        If a value is out of its range.
-
-    Examples
-    --------
-    >>> few = ErrorBound(slides=12, max_error_rate=0.02)
-    >>> round(few.highest_confidence, 3), few.shown, few.slides_needed
-    (0.779, False, 149)
     """
 
     slides: int
@@ -383,17 +264,7 @@ class ErrorBound:
         return f'too few slides for early stopping: {rate} need {needed}{limit}'
 
     def limited(self, probabilities: Sequence[float]) -> Sequence[float]:
-        """Return the probabilities, mixed with equal ones just so much that none is above the highest confidence.
-
-        Parameters
-        ----------
-        probabilities : (n_labels,)
-            They add up to 1, as the returned ones do; their order stays.
-
-        Returns
-        -------
-        (n_labels,)
-        """
+        """Return the probabilities, mixed with equal ones just so much that none is above the highest confidence."""
         equal, highest = 1.0 / len(probabilities), max(probabilities)
         limit = max(self.highest_confidence, equal)
         if highest <= limit:
@@ -411,15 +282,7 @@ FULL_CIRCLE: Interval = (-math.pi, math.pi)
 
 
 def covered_arcs(directions_rad: Iterable[float], gap_rad: float) -> tuple[Interval, ...]:
-    """Return the arcs that directions cover when gaps of at most `gap_rad` between neighbours count as covered.
-
-    Parameters
-    ----------
-    directions_rad
-        Any angles.
-    gap_rad
-        Largest gap that is bridged.
-    """
+    """Return the arcs that directions cover when gaps of at most `gap_rad` between neighbours count as covered."""
     ordered = sorted({math.remainder(direction, math.tau) for direction in directions_rad})
     if not ordered:
         return ()
@@ -452,17 +315,7 @@ def interval_of(means: Iterable[Iterable[float]]) -> Interval | None:
 
 
 def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
-    """Return whether a value lies outside an interval widened by a relative margin; False for an unknown one.
-
-    Parameters
-    ----------
-    value
-        NaN if not known.
-    interval
-        None if not known.
-    margin
-        Relative, at both ends.
-    """
+    """Return whether a value lies outside an interval widened by a relative margin; False for an unknown one."""
     if interval is None or math.isnan(value):
         return False
     low, high = interval
@@ -487,31 +340,6 @@ class Domain:
     A range goes from the lowest to the highest mean over the first windows of the slides, however many: speed and force
     settle at the start of a slide, and an exploration is compared by the mean over its windows so far. Between two
     trained speeds or forces a model is within its domain.
-
-    Parameters
-    ----------
-    motions, sensors
-        Names of the exploratory motions and of the sensors; empty if unknown.
-    speed_m_s, force_n
-        Lowest and highest mean; None if unknown.
-    directions_rad
-        Arcs (from, to) that the directions of travel cover, from +x towards +y; `to` may exceed π. Empty if unknown.
-    levels
-        Lowest and highest signal level of each channel, root mean square in the unit of the signal; empty if unknown.
-    slides
-        Number of slides of each label.
-    margins
-        How far an exploration may lie outside.
-    reach
-        Number of sessions, places and fingers of each label; what no slide tells counts as one.
-
-    Examples
-    --------
-    >>> domain = Domain(motions=('linear_slide',), speed_m_s=(0.045, 0.055))
-    >>> domain.deviation(SlideConditions('linear_slide', speed_m_s=0.02))
-    'outside what was trained: speed 0.02 m/s, trained 0.045 to 0.055 m/s'
-    >>> domain.deviation(SlideConditions('linear_slide', speed_m_s=0.05))
-    ''
     """
 
     motions: tuple[str, ...] = ()
@@ -537,22 +365,7 @@ class Domain:
     def of_slides(
         cls, conditions: Iterable[SlideConditions], labels: Iterable[str], margins: DomainMargins | None = None
     ) -> Domain:
-        """Return the domain of a model that is trained on slides.
-
-        Parameters
-        ----------
-        conditions
-            Of each slide, as far as they are known.
-        labels
-            Of each slide.
-        margins
-            How far an exploration may lie outside; the defaults if None.
-
-        Returns
-        -------
-        Domain
-            Ranges of speed and force, motions, directions and sensors of the slides.
-        """
+        """Return the domain of a model that is trained on slides."""
         slides, labels = tuple(conditions), tuple(labels)
         margins = margins or DomainMargins()
         return cls(
@@ -578,13 +391,6 @@ class Domain:
         """Return the domain with slides that were added after the training.
 
         They widen what is known of the training; what was unknown there is still not compared.
-
-        Parameters
-        ----------
-        conditions
-            Of each added slide, as far as they are known.
-        labels
-            Of each added slide.
         """
         new = Domain.of_slides(conditions, labels, self.margins)
         return replace(
@@ -705,26 +511,6 @@ class NoveltyDetector:
     are those of split conformal prediction.
 
     Source: Fisher 1932 for the sum of logarithms of tail probabilities; Vovk, Gammerman & Shafer 2005 for thresholds.
-
-    Parameters
-    ----------
-    distances
-        By space, in the order of the scores: mean features, mean outputs of the hidden layer if the classifier has one,
-        mean features of the onset.
-    medians, spreads : (n_levels, n_scores)
-        Of the scores of held-out slides, by the effective window count.
-    thresholds, distance_thresholds : (n_levels,)
-        Largest novelty score of known surfaces at the false rejection rate: of all scores, and of the distances alone.
-    distances_only
-        Whether the distances alone count: the other scores of an incremental classifier are of another size.
-
-    Examples
-    --------
-    >>> held_out = [np.random.default_rng(0).standard_normal((99, 3))] * len(NOVELTY_WINDOWS)
-    >>> detector = NoveltyDetector.fit({}, held_out, false_rejection_rate=0.1)
-    >>> scores = [detector.novelty_score(row.tolist(), 1.0) for row in held_out[0]]
-    >>> sum(score > detector.threshold(1.0) for score in scores) <= 10  # of 99
-    True
     """
 
     distances: Mapping[str, ClassDistance]
@@ -742,25 +528,7 @@ class NoveltyDetector:
         false_rejection_rate: float,
         counted: Collection[str] = SCORES,
     ) -> NoveltyDetector:
-        """Fit tails and thresholds.
-
-        Parameters
-        ----------
-        distances
-            Fitted to all slides.
-        held_out : of each of NOVELTY_WINDOWS (n_slides, n_scores)
-            Scores of slides when they were held out and labelled rightly.
-        false_rejection_rate
-            Fraction of the slides over known surfaces that may be taken for unknown: of new slides like those held out,
-            no more are, on average. With too few slides for the fraction, none of those held out is.
-        counted
-            Which of OTHER_SCORES count; of the spaces, those in `distances` do.
-
-        Returns
-        -------
-        NoveltyDetector
-            With a threshold for each effective window count.
-        """
+        """Fit tails and thresholds."""
         medians = np.stack([np.median(scores, axis=0) for scores in held_out])
         spreads = np.stack([np.quantile(scores, TAIL_QUANTILE, axis=0) for scores in held_out]) - medians
         spreads = np.maximum(spreads, MIN_SPREAD * (1.0 + np.abs(medians)))
@@ -794,37 +562,14 @@ class NoveltyDetector:
         return self._row(effective_windows)[0]
 
     def score_and_threshold(self, scores: Sequence[float], effective_windows: float) -> tuple[float, float]:
-        """Return the novelty score, and the largest one of a known surface.
-
-        Parameters
-        ----------
-        scores
-            Of a slide, as `SlideNovelty.scores` returns them.
-        effective_windows
-            Effective window count of the slide.
-
-        Returns
-        -------
-        float
-            Sum of the tails.
-        float
-            Threshold.
-        """
+        """Return the novelty score, and the largest one of a known surface."""
         row = self._row(effective_windows)
         count = len(row) // 2
         tails = zip(scores, row[1 : 1 + count], row[1 + count :], strict=False)
         return sum((score - median) / spread for score, median, spread in tails if score > median), row[0]
 
     def scores_and_thresholds(self, scores: Array, effective_windows: Array) -> tuple[Array, Array]:
-        """Return what `score_and_threshold` does for each window of a slide, (n_windows,) each.
-
-        Parameters
-        ----------
-        scores : (n_windows, n_scores)
-            As `slide_scores` returns them.
-        effective_windows : (n_windows,)
-            Effective window count after each.
-        """
+        """Return what `score_and_threshold` does for each window of a slide, (n_windows,) each."""
         levels = np.array(self._levels)
         places = np.interp(effective_windows, NOVELTY_WINDOWS, np.arange(len(levels)))
         rows = np.minimum(places.astype(np.intp), len(levels) - 2)
@@ -844,15 +589,7 @@ class NoveltyDetector:
         return [first + share * (second - first) for first, second in pairs]
 
     def with_slides(self, slides: Sequence[Mapping[str, Array]], classes: Codes) -> NoveltyDetector:
-        """Return the detector of an incremental classifier, with added slides.
-
-        Parameters
-        ----------
-        slides
-            Mean of each slide by space, as `space_means` returns it.
-        classes : (n_slides,)
-            Number of the label of each.
-        """
+        """Return the detector of an incremental classifier, with added slides."""
         distances = {
             space: distance.with_slides(np.stack([means[space] for means in slides]), classes)
             for space, distance in self.distances.items()
@@ -861,26 +598,7 @@ class NoveltyDetector:
 
 
 class SlideNovelty:
-    """Accumulate what the scores of one slide depend on, window by window.
-
-    Parameters
-    ----------
-    distances
-        By space, as in `NoveltyDetector`.
-    n_labels
-        Number of labels of the classifier.
-
-    Examples
-    --------
-    >>> classes = np.repeat([0, 1], 10)
-    >>> means = 5.0 * classes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((20, 2))
-    >>> distances = {'features': ClassDistance.fit(means, classes)}
-    >>> novelty = SlideNovelty(distances, n_labels=2)
-    >>> novelty.add(np.array([5.0, 5.0]), None, label=1, effective_windows=1.0)
-    >>> own, other = novelty.scores(1, log_odds=1.0), novelty.scores(0, log_odds=1.0)
-    >>> len(own) == len(other)
-    True
-    """
+    """Accumulate what the scores of one slide depend on, window by window."""
 
     def __init__(self, distances: Mapping[str, ClassDistance], n_labels: int) -> None:
         self._distances = distances
@@ -892,18 +610,7 @@ class SlideNovelty:
         self._found: dict[str, dict[int, float]] = {space: {} for space in distances}
 
     def add(self, values: Array, hidden: Array | None, label: int, effective_windows: float) -> None:
-        """Add a window.
-
-        Parameters
-        ----------
-        values : (n_features,)
-        hidden : (n_hidden,) or None
-            Outputs of the hidden layer.
-        label
-            Number of the best label of this window alone.
-        effective_windows
-            Effective window count including this window.
-        """
+        """Add a window."""
         self._windows += 1
         self._votes[label] += 1
         if effective_windows > NOVELTY_WINDOWS[-1] + 1e-9 and self._sums:
@@ -917,15 +624,7 @@ class SlideNovelty:
             self._found[space].clear()
 
     def scores(self, label: int, log_odds: float) -> list[float]:
-        """Return the scores for a label: distances, then `OTHER_SCORES`; larger ones are rarer.
-
-        Parameters
-        ----------
-        label
-            Number of the best label of the slide.
-        log_odds
-            Mean evidence of it less that of the second best label.
-        """
+        """Return the scores for a label: distances, then `OTHER_SCORES`; larger ones are rarer."""
         distances = [self._distance(space, label) for space in self._distances]
         return [*distances, -log_odds, -self._votes[label] / self._windows]
 
@@ -945,20 +644,7 @@ def slide_scores(
     means: Array,
     effective_windows: Array,
 ) -> Array:
-    """Return what `SlideNovelty` gives window by window for a whole slide at once, (n_windows, n_scores).
-
-    Parameters
-    ----------
-    distances
-        By space, as in `NoveltyDetector`.
-    values : (n_windows, n_features)
-    hidden : (n_windows, n_hidden) or None
-        Outputs of the hidden layer.
-    evidence, means : (n_windows, n_labels)
-        Evidence of each window alone, and its mean after each window.
-    effective_windows : (n_windows,)
-        Effective window count after each window.
-    """
+    """Return what `SlideNovelty` gives window by window for a whole slide at once, (n_windows, n_scores)."""
     counts = np.arange(1, len(values) + 1)
     labels = means.argmax(axis=1)
     highest = np.sort(means, axis=1)[:, -2:]
@@ -977,22 +663,7 @@ def slide_scores(
 
 
 def space_means(values: Array, hidden: Array | None, hop_share: float) -> dict[str, Array]:
-    """Return the mean of the windows of a slide in each space.
-
-    Parameters
-    ----------
-    values : (n_windows, n_features)
-        In temporal order.
-    hidden : (n_windows, n_hidden) or None
-        Outputs of the hidden layer.
-    hop_share
-        Distance of two windows over their length, at most 1.
-
-    Returns
-    -------
-    dict
-        Mean vector of each space, by its name.
-    """
+    """Return the mean of the windows of a slide in each space."""
     by_space = {FEATURES: values, HIDDEN: hidden, ONSET: values}
     return {
         space: own[: window_count(SPACES[space], hop_share)].mean(axis=0)
@@ -1025,20 +696,6 @@ class PredictionSets:
     The coverage holds on average over slides like those held out; not for each texture, and not for a later day.
 
     Source: Vovk, Gammerman & Shafer 2005; Angelopoulos & Bates 2021, section 1.
-
-    Parameters
-    ----------
-    coverage
-        Share of slides whose texture is to be in the set.
-    effective_window_counts, thresholds
-        Effective window count, and the smallest probability of a texture in the set; empty if the held-out slides were
-        too few for the coverage.
-
-    Examples
-    --------
-    >>> sets = PredictionSets(0.9, effective_window_counts=(1.0,), thresholds=(0.15,))
-    >>> sets.members(np.array([0.2, 0.7, 0.1]), effective_windows=1.0)
-    [1, 0]
     """
 
     coverage: float = 0.95
@@ -1056,15 +713,7 @@ class PredictionSets:
         )
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
-        """Return the numbers of the textures in the set, the most probable first; none only for a `reason`.
-
-        Parameters
-        ----------
-        probabilities : (n_labels,)
-            Of each texture after the slide.
-        effective_windows
-            Effective window count of the slide.
-        """
+        """Return the numbers of the textures in the set, the most probable first; none only for a `reason`."""
         if not self.thresholds:
             return []
         threshold = min(
@@ -1081,22 +730,6 @@ def fit_prediction_sets(
     """Return the sets for a coverage from slides held out of the training.
 
     With too few slides for the coverage every texture would be in each set: there are none then.
-
-    Parameters
-    ----------
-    posteriors : of each slide (n_windows, n_labels)
-        Log-probabilities after each window.
-    truths
-        Number of the true texture of each slide.
-    effective_window_counts : of each slide (n_windows,)
-        Length of the evidence after each window.
-    coverage
-        Share of slides whose texture is to be in the set.
-
-    Returns
-    -------
-    PredictionSets
-        With a threshold, or with the reason why there is none.
     """
     thresholds = []
     rank = _rank(len(truths), coverage)
@@ -1142,24 +775,6 @@ class StoppingRule:
 
     Source: Wald 1945 for a decision at a threshold of the evidence; the end after some time, as with one window in a
     hundred that would go on for ever, is fitted with the threshold.
-
-    Parameters
-    ----------
-    confidence
-        Decision threshold on the probability of the best label.
-    max_windows
-        Effective window count at which a slide is stopped whatever the confidence.
-    novelty_score
-        Largest novelty score at which a slide is stopped.
-    early_novelty_score
-        Largest one after the first window, if it is smaller, and EARLY_GROWTH times as much after each further
-        effective window: little evidence shows little of what is novel.
-
-    Examples
-    --------
-    >>> rule = StoppingRule(confidence=0.95, max_windows=10.0)
-    >>> rule.decided(0.9, 2.0), rule.decided(0.96, 2.0), rule.decided(0.5, 10.0)
-    (False, True, True)
     """
 
     confidence: float = 0.95
@@ -1168,17 +783,7 @@ class StoppingRule:
     early_novelty_score: float = NEVER
 
     def decided(self, confidence: float, effective_windows: float, novelty_score: float = 0.0) -> bool:
-        """Return whether the slide may end.
-
-        Parameters
-        ----------
-        confidence
-            Probability of the best label, 0 to 1.
-        effective_windows
-            Effective window count so far.
-        novelty_score
-            Novelty score so far.
-        """
+        """Return whether the slide may end."""
         growing = EARLY_GROWTH ** (min(effective_windows, MAX_EARLY_WINDOWS) - 1.0)
         limit = min(self.novelty_score, self.early_novelty_score * growing)
         confident = confidence >= self.confidence and novelty_score <= limit
@@ -1187,30 +792,7 @@ class StoppingRule:
 
 @dataclass(frozen=True, eq=False)
 class SlideCourse:
-    """What was said of one held-out slide after each window.
-
-    Parameters
-    ----------
-    confidences : (n_windows,)
-        Of the best label.
-    right : (n_windows,)
-        Whether it is the true one.
-    effective_windows : (n_windows,)
-        Length of the evidence.
-    known : (n_windows,)
-        Whether the surface was taken for known; all without a novelty detector.
-    novelty_scores : (n_windows,)
-        0 without a novelty detector.
-    disturbance
-        Kind of the disturbance; '' for none.
-
-    Examples
-    --------
-    >>> right = np.array([False, True])
-    >>> course = SlideCourse(np.array([0.6, 0.99]), right, np.array([1.0, 1.2]), np.array([True, True]), np.zeros(2))
-    >>> fit_stopping_rule([course] * 30, wrong=0.02).decided(0.99, 1.2)
-    True
-    """
+    """What was said of one held-out slide after each window."""
 
     confidences: Array
     right: Mask
@@ -1242,23 +824,6 @@ def fit_stopping_rule(
     A slide is stopped only while its surface is taken for known. Errors under disturbances are counted over all kinds
     together: of each kind alone there are so few that the worst one would decide by chance. If no rule reaches the
     error rates, the one that exceeds them least is returned.
-
-    Parameters
-    ----------
-    courses
-        Of undisturbed slides and of disturbed copies.
-    wrong
-        Share of the undisturbed slides that may be stopped with a wrong label.
-    wrong_disturbed
-        The same of the disturbed copies.
-    early_novelty_score
-        Of the rule, as it is.
-    by_novelty
-        Whether the novelty score counts; without one the length of a slide does, and what is said at its end.
-
-    Returns
-    -------
-    StoppingRule
     """
     # (n_slides, n_windows), the shorter ones filled with what never stops a slide.
     novelty = _filled([course.novelty_scores for course in courses], np.inf)
@@ -1303,23 +868,7 @@ def _filled(rows: Sequence[Array | Mask], value: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Decisions:
-    """What a model decides of a slide, by what was fitted to the slides held out of its training.
-
-    Parameters
-    ----------
-    error_bound
-        What the held-out slides can show; it limits the confidence, and early stopping.
-    stopping_rule
-        Early stopping rule.
-    prediction_sets
-        Conformal prediction sets.
-    confidence_floor
-        Smallest confidence of known surfaces.
-    domain
-        Conditions under which the model was trained; outside them it decides nothing.
-    novelty_detector
-        Rejects unknown surfaces; with None no surface is rejected.
-    """
+    """What a model decides of a slide, by what was fitted to the slides held out of its training."""
 
     error_bound: ErrorBound
     stopping_rule: StoppingRule = field(default_factory=StoppingRule)
@@ -1329,17 +878,7 @@ class Decisions:
     novelty_detector: NoveltyDetector | None = None
 
     def decided(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
-        """Return whether a slide may end: by the stopping rule, if enough slides were held out to show its error rate.
-
-        Parameters
-        ----------
-        confidence
-            Probability of the best label, 0 to 1, as the evidence gives it.
-        effective_windows
-            Effective window count so far.
-        novelty_score
-            Novelty score so far.
-        """
+        """Return whether a slide may end: by the stopping rule, if enough held-out slides show its error rate."""
         return self.error_bound.shown and self.stopping_rule.decided(confidence, effective_windows, novelty_score)
 
     def with_slides(
@@ -1352,17 +891,6 @@ class Decisions:
         """Return the decisions of a model to which slides were added.
 
         There is no smallest confidence then: new labels make all others less probable.
-
-        Parameters
-        ----------
-        means
-            Mean of each slide by space, as `space_means` returns it.
-        codes : (n_slides,)
-            Number of the label of each.
-        conditions
-            Of each, as far as they are known.
-        labels
-            Of each.
         """
         detector = self.novelty_detector
         return replace(

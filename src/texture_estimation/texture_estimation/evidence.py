@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Accumulation of evidence about a surface over the windows of a slide."""
 
@@ -21,22 +22,7 @@ from texture_features.windows import WindowParams
 
 
 def no_window(windows: WindowParams) -> str:
-    """Return why a slide ended without a window, how long it must be, and what to do.
-
-    Parameters
-    ----------
-    windows
-        How the recipe of the model cuts windows.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> no_window(WindowParams(length_s=0.5)).partition('; ')[0]
-    'no window could be used: the slide was shorter than the 0.5 s of a window, or its samples were lost'
-    """
+    """Return why a slide ended without a window, how long it must be, and what to do."""
     skip_s, length_s = windows.skip_s, windows.length_s
     needed = (
         f'{skip_s + length_s:g} s, the first {skip_s:g} s and a window' if skip_s else f'the {length_s:g} s of a window'
@@ -55,11 +41,6 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
     """Return what each window of a slide decides alone or, where windows vote together, what each complete group does.
 
     A slide that is shorter than a group gives one decision.
-
-    Parameters
-    ----------
-    values : (n_windows, n_features)
-        Of the consecutive windows of one slide.
     """
     rule = model.recipe.evidence
     if not rule.group or not len(values):
@@ -83,27 +64,6 @@ class EvidenceAccumulator:
     rejected, and why; it is decided only while it is not. An exploration under conditions that were not trained is
     rejected, and the message says which condition it is. Equally probable labels give no label: unclassified.
     No confidence is above what the slides held out of the training can show.
-
-    Parameters
-    ----------
-    model
-        Trained model; with None each final estimate says that no model is loaded.
-
-    Examples
-    --------
-    >>> from texture_estimation.training import train
-    >>> from texture_estimation.recipe import Recipe
-    >>> from texture_features.feature_set import LabelledFeatures
-    >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
-    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
-    >>> labels = np.repeat(['cork', 'felt'], 20)
-    >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
-    >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
-    >>> model = train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
-    >>> evidence = EvidenceAccumulator(model)
-    >>> window = FeatureVector(0, 'slide', 0.5, 0.1, ('mean',), np.array([0.98]), feature_set='a1')
-    >>> evidence.update(window).label, evidence.update(FeatureVector(0, 'slide', 0.0, 0.1, last=True)).final
-    ('felt', True)
     """
 
     def __init__(self, model: TextureModel | None) -> None:

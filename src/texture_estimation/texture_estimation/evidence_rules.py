@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Rules that combine the window predictions of one slide."""
 
@@ -34,51 +35,15 @@ class EvidenceRule:
         return 0
 
     def window_evidence(self, log_probabilities: Array) -> Array:
-        """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean.
-
-        Parameters
-        ----------
-        log_probabilities : (..., n_labels)
-            As the predictor gives them.
-
-        Returns
-        -------
-        (..., n_labels)
-            What is averaged over the windows.
-        """
+        """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean."""
         return log_probabilities
 
     def window_weight(self, effective_windows: float | Array) -> Any:
-        """Return the weight of windows in the mean evidence.
-
-        Parameters
-        ----------
-        effective_windows : (n_windows,) or a number
-            Effective window count including each window.
-
-        Returns
-        -------
-        (n_windows,) or a number
-            1 for a window that counts fully; one number may hold for all.
-        """
+        """Return the weight of windows in the mean evidence."""
         return 1.0
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
-        """Return the log-probability of each texture given all windows so far, (..., n_labels).
-
-        Parameters
-        ----------
-        mean_evidence : (..., n_labels)
-        effective_windows : (..., 1) or a number
-            Effective window count: sliding time over the length of a window.
-        tempering_exponent
-            Exponent of the effective window count, 0 to 1, fitted on held-out slides.
-
-        Returns
-        -------
-        (..., n_labels)
-            Logarithms of probabilities that add up to 1.
-        """
+        """Return the log-probability of each texture given all windows so far, (..., n_labels)."""
         raise NotImplementedError
 
     def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
@@ -185,28 +150,6 @@ class GroupedEvidence:
     """Sum of the evidence of windows: of all so far, or of the newest complete group.
 
     While the first group grows, it counts as it is.
-
-    Parameters
-    ----------
-    n_labels
-        Length of the evidence of a window.
-    group
-        Windows of a group; 0 sums over all.
-
-    Attributes
-    ----------
-    mean : (n_labels,)
-        Weighted mean evidence of the windows that decide.
-    time_s
-        Sliding time of the windows that decide.
-
-    Examples
-    --------
-    >>> grouped = GroupedEvidence(n_labels=2, group=2)
-    >>> for vote in ([1.0, 0.0], [1.0, 0.0], [0.0, 1.0]):
-    ...     grouped.add(np.array(vote), new_s=0.1)
-    >>> grouped.mean.tolist(), grouped.time_s  # the second group is not complete yet
-    ([1.0, 0.0], 0.2)
     """
 
     def __init__(self, n_labels: int, group: int = 0) -> None:
@@ -217,17 +160,7 @@ class GroupedEvidence:
         self.time_s = 0.0
 
     def add(self, evidence: Array, new_s: float, weight: float = 1.0) -> None:
-        """Add the evidence of a window, (n_labels,), which adds so much new sliding time.
-
-        Parameters
-        ----------
-        evidence : (n_labels,)
-            Evidence of the window.
-        new_s
-            Sliding time that no window before it covers.
-        weight
-            Weight of the window in the mean, above 0 for the first one.
-        """
+        """Add the evidence of a window, (n_labels,), which adds so much new sliding time."""
         if self._count == self._group and self._complete:
             self._sum, self._count, self._weight, self._time_s = np.zeros(len(evidence)), 0, 0.0, 0.0
         self._sum += evidence if weight == 1.0 else weight * evidence
@@ -240,30 +173,7 @@ class GroupedEvidence:
 
 
 def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array, trusted: Array | float = 1.0) -> Array:
-    """Return the weighted mean evidence of a slide after each window, where all windows decide together.
-
-    Parameters
-    ----------
-    rule
-        Weighs the windows.
-    evidence : (n_windows, n_labels)
-        Of each window.
-    effective_windows : (n_windows,)
-        Effective window count including each window.
-    trusted : (n_windows,) or a number
-        How much the classifier trusts each window; weighs it, too. As long as the trusted ones do not add up to one
-        window, their mean counts less in proportion.
-
-    Returns
-    -------
-    (n_windows, n_labels)
-        Mean of the evidence up to each window.
-
-    Examples
-    --------
-    >>> running_means(SoftVote(), np.array([[0.0], [1.0]]), np.array([1.0, 2.0])).tolist()
-    [[0.0], [0.5]]
-    """
+    """Return the weighted mean evidence of a slide after each window, where all windows decide together."""
     weights = np.broadcast_to(trusted * rule.window_weight(effective_windows), len(evidence))[:, None]
     means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
     if np.ndim(trusted):
@@ -275,26 +185,7 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array,
 def followed(
     rule: EvidenceRule, evidence: Array, hop_share: float, trusted: Array | float = 1.0
 ) -> tuple[Array, Array]:
-    """Return the mean evidence of a slide after each window, and the effective window count that it rests on.
-
-    Parameters
-    ----------
-    rule
-        Combines the windows.
-    evidence : (n_windows, n_labels)
-        Of each window.
-    hop_share
-        Time between the starts of two windows over their length, at most 1.
-    trusted : (n_windows,) or a number
-        As in `running_means`.
-
-    Returns
-    -------
-    (n_windows, n_labels)
-        Mean of the evidence: of all windows so far, or of the newest group that is complete.
-    (n_windows,)
-        Length of this evidence.
-    """
+    """Return the mean evidence of a slide after each window, and the effective window count that it rests on."""
     counts = 1 + np.arange(len(evidence))
     if not rule.group:
         effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share

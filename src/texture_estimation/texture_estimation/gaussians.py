@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Class-conditional Gaussians with shrunken covariances, and what they are fitted to."""
 
@@ -28,29 +29,6 @@ class GaussianClasses:
     """Gaussians with the covariance within the trained classes, wider for a class of which few slides are known.
 
     The mean of n slides is uncertain: about it, a further slide has the variance of 1 + 1/n slides.
-
-    Parameters
-    ----------
-    centre : (n_features,)
-        Mean of the trained classes.
-    projection : (n_features, n_features) or (n_features,)
-        Makes the covariance within the trained classes the identity; a vector holds the diagonal of a diagonal one.
-    means : (n_classes, n_features)
-        Of the classes, less the centre, projected.
-    slides : (n_classes,)
-        Number of slides of each class.
-    uncertainty_exponent
-        Of 1 + 1/n in the variance of a class of n slides; 1 would suit slides that do not drift, 0 widens no class.
-    inverse_temperature
-        Of the log-densities: features are no Gaussians, and sessions drift.
-
-    Examples
-    --------
-    >>> samples = np.array([[-1.0], [1.0], [9.0], [11.0]])
-    >>> classes = GaussianClasses.fit(samples, np.array([0, 0, 1, 1]), np.array([2, 2]))
-    >>> with_third = classes.with_classes(np.array([[20.0]]), np.array([1]))
-    >>> with_third.log_probabilities(np.array([[0.0], [9.0], [20.0]])).argmax(axis=1).tolist()
-    [0, 1, 2]
     """
 
     centre: Array
@@ -62,22 +40,7 @@ class GaussianClasses:
 
     @classmethod
     def fit(cls, samples: Array, classes: Codes, slides: Codes) -> GaussianClasses:
-        """Return the Gaussians of labelled samples.
-
-        Parameters
-        ----------
-        samples : (n_samples, n_features)
-            Such as the mean features of slides.
-        classes : (n_samples,)
-            Number of the class of each, from 0, without gaps.
-        slides : (n_classes,)
-            Number of slides of each class.
-
-        Returns
-        -------
-        GaussianClasses
-            More than `MAX_CORRELATED` features are taken for uncorrelated.
-        """
+        """Return the Gaussians of labelled samples."""
         means = group_means(samples, classes)
         deviations = samples - means[classes]
         freedom = len(samples) - len(means)
@@ -87,27 +50,12 @@ class GaussianClasses:
         return cls(centre, projection, _projected(means - centre, projection), slides)
 
     def with_classes(self, means: Array, slides: Codes) -> GaussianClasses:
-        """Return the Gaussians with further classes, given by their means and numbers of slides.
-
-        Parameters
-        ----------
-        means : (n_further, n_features)
-        slides : (n_further,)
-        """
+        """Return the Gaussians with further classes, given by their means and numbers of slides."""
         further = _projected(means - self.centre, self.projection)
         return replace(self, means=np.concatenate([self.means, further]), slides=np.concatenate([self.slides, slides]))
 
     def log_probabilities(self, samples: Array) -> Array:
-        """Return the log-probability of each class.
-
-        Parameters
-        ----------
-        samples : (..., n_features)
-
-        Returns
-        -------
-        (..., n_classes)
-        """
+        """Return the log-probability of each class."""
         projected = _projected(samples - self.centre, self.projection)
         squares = np.add.reduce(projected * projected, axis=-1, keepdims=True)
         distances = squares - 2.0 * (projected @ self.means.T) + np.add.reduce(self.means * self.means, axis=1)
@@ -160,30 +108,6 @@ class SlideGaussians:
 
     The first classes are the trained textures. The further ones are the textures of the added slides, which may include
     trained ones: slides that were added to a trained texture are a class of their own.
-
-    Parameters
-    ----------
-    windows
-        Gaussians of single windows, wherever they lie in a slide.
-    lengths
-        Lengths of slides that have Gaussians, in effective windows, rising.
-    starts
-        Gaussians of slides of each length; those of the last length are of whole slides.
-    spread_floor : (n_features,)
-        Added to the variance within a slide.
-    n_trained
-        Number of trained textures.
-    added : (n_added,)
-        Number of the label of each further class.
-
-    Examples
-    --------
-    >>> values = np.array([0.0, 0.2, 0.1, 0.3, 5.0, 5.2, 5.1, 5.3])[:, None]
-    >>> classes, slides = np.repeat([0, 1], 4), np.repeat([0, 1, 2, 3], 2)
-    >>> gaussians = SlideGaussians.fit(values, classes, slides, hop_share=1.0)
-    >>> three = gaussians.with_added([np.array([[9.0], [9.2]])], np.array([2]))
-    >>> three.combined(np.array([0.5, 0.5]), three.window_shares(np.array([9.1]))).round(2).tolist()
-    [0.0, 0.0, 1.0]
     """
 
     windows: GaussianClasses
@@ -197,24 +121,7 @@ class SlideGaussians:
     def fit(
         cls, values: Array, codes: Codes, slides: Codes, hop_share: float, compared: Array | float = 1.0
     ) -> SlideGaussians:
-        """Return the Gaussians of the trained textures.
-
-        Parameters
-        ----------
-        values : (n, n_features)
-            Features of windows, in temporal order within each slide.
-        codes, slides : (n,)
-            Number of the texture, from 0, and of the slide of each.
-        hop_share
-            Distance of two windows of a slide over their length.
-        compared : (n_features,)
-            0 for features that are left out.
-
-        Returns
-        -------
-        SlideGaussians
-            Without added slides.
-        """
+        """Return the Gaussians of the trained textures."""
         values = compared * values
         order = np.argsort(slides, kind='stable')
         first = np.unique(slides[order], return_index=True)[1]
@@ -242,21 +149,7 @@ class SlideGaussians:
         return replace(fitted, starts=tuple(map(_of_length, starts, lengths)))
 
     def with_added(self, slides: Sequence[Array], codes: Codes, hop_share: float = 1.0) -> SlideGaussians:
-        """Return the Gaussians of the trained textures and of these added slides, in place of others added before.
-
-        Parameters
-        ----------
-        slides : each (n_windows, n_features)
-            Features of the windows of each added slide, in temporal order.
-        codes : (n_slides,)
-            Number of the label of each.
-        hop_share
-            Distance of two windows of a slide over their length.
-
-        Returns
-        -------
-        SlideGaussians
-        """
+        """Return the Gaussians of the trained textures and of these added slides, in place of others added before."""
         added, groups = np.unique(codes, return_inverse=True)
         counts = np.bincount(groups)
         trained = self.trained
@@ -276,50 +169,16 @@ class SlideGaussians:
         return replace(self, windows=windows, starts=tuple(starts), added=self.added[:0])
 
     def shares(self, mean: Array, variance: Array, effective_windows: float) -> Array:
-        """Return the log-probability of each class for a slide so far.
-
-        Parameters
-        ----------
-        mean, variance : (n_features,)
-            Of the features of its windows.
-        effective_windows
-            Effective window count so far.
-
-        Returns
-        -------
-        (n_classes,)
-        """
+        """Return the log-probability of each class for a slide so far."""
         place = max(bisect_right(self.lengths, effective_windows + 1e-9) - 1, 0)
         return self.starts[place].log_probabilities(self._descriptor(mean, variance, self.lengths[place]))
 
     def window_shares(self, X: Array) -> Array:
-        """Return the log-probability of each class for windows alone.
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_classes)
-        """
+        """Return the log-probability of each class for windows alone."""
         return self.windows.log_probabilities(X)
 
     def combined(self, trained: Array, shares: Array) -> Array:
-        """Return the probability of each label: the trained textures share what they have together as they were.
-
-        Parameters
-        ----------
-        trained : (..., n_trained)
-            Probabilities of the trained textures among themselves.
-        shares : (..., n_classes)
-            Log-probabilities of all classes.
-
-        Returns
-        -------
-        (..., n_labels)
-            They add up to 1.
-        """
+        """Return the probability of each label: the trained textures share what they have together as they were."""
         own = np.exp(shares)
         n_labels = max(self.n_trained, int(self.added.max(initial=-1)) + 1)
         probabilities = np.zeros((*own.shape[:-1], n_labels))
@@ -329,17 +188,7 @@ class SlideGaussians:
         return probabilities
 
     def check(self, mean: Array) -> None:
-        """Raise ValueError unless the shares of a slide with this mean, (n_features,), are numbers at every length.
-
-        Parameters
-        ----------
-        mean : (n_features,)
-
-        Raises
-        ------
-        ValueError
-            If an added slide holds values so large that they overflow.
-        """
+        """Raise ValueError unless the shares of a slide with this mean, (n_features,), are numbers at every length."""
         if not all(np.isfinite(self.shares(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
             raise ValueError('its values are too large to be features')
 
@@ -370,24 +219,6 @@ class SlideMoments:
     """Mean and variance of the windows of one slide so far, updated in constant memory.
 
     Source: Welford 1962 for the update without cancellation.
-
-    Parameters
-    ----------
-    n_features
-        Length of a feature vector.
-
-    Attributes
-    ----------
-    mean, variance : (n_features,)
-        Of the windows so far; zero before the first one.
-
-    Examples
-    --------
-    >>> moments = SlideMoments(n_features=1)
-    >>> for value in (1.0, 3.0):
-    ...     moments.add(np.array([value]))
-    >>> moments.mean.tolist(), moments.variance.tolist()
-    ([2.0], [1.0])
     """
 
     def __init__(self, n_features: int) -> None:
@@ -396,13 +227,7 @@ class SlideMoments:
         self._count = 0
 
     def add(self, values: Array) -> None:
-        """Add a window.
-
-        Parameters
-        ----------
-        values : (n_features,)
-            Its features.
-        """
+        """Add a window."""
         self._count += 1
         before = values - self.mean
         self.mean = self.mean + before / self._count

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Learn after the training from a few slides: add one while the model is used, or adapt it to another day."""
 
@@ -46,38 +47,7 @@ class ChangeRefused(InvalidData):
 
 
 class IncrementalClassifier:
-    """Hold a model and the most recent windows, and update the model with slides of them.
-
-    Parameters
-    ----------
-    model
-        Trained model, including the slides added to it before.
-    path
-        Path of the model, beside which added slides are stored; None keeps them in memory only.
-
-    Raises
-    ------
-    ModelMismatch
-        If the model holds no training examples.
-
-    Examples
-    --------
-    >>> from texture_estimation.training import train
-    >>> from texture_estimation.recipe import Recipe
-    >>> from texture_features.feature_set import LabelledFeatures
-    >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
-    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
-    >>> labels = np.repeat(['cork', 'felt'], 20)
-    >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
-    >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
-    >>> model = train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
-    >>> classifier = IncrementalClassifier(model)
-    >>> classifier.observe(FeatureVector(0, 'new', 0.5, 0.1, ('mean',), np.array([3.0]), feature_set='a1'))
-    >>> classifier.add('oak'), classifier.model.labels
-    (1, ('cork', 'felt', 'oak'))
-    >>> classifier.remove_last().label, classifier.model.labels
-    ('oak', ('cork', 'felt'))
-    """
+    """Hold a model and the most recent windows, and update the model with slides of them."""
 
     def __init__(self, model: TextureModel, path: str | Path | None = None) -> None:
         self.model = model.with_added_slides(model.added_slides)  # which fits the Gaussians before a slide is added
@@ -96,16 +66,7 @@ class IncrementalClassifier:
         self._conditions[vector.exploration_id].update(vector)
 
     def add(self, label: str, exploration_id: str = '') -> int:
-        """Add the windows of an exploration, the last one if '', to a label; return the number of its windows now.
-
-        Raises
-        ------
-        InvalidData
-            If there is no label or a forbidden one, nothing usable was measured in that exploration, or it was added
-            before, under this label or another one.
-        OSError
-            If the slide cannot be stored; it has not been added then.
-        """
+        """Add the windows of an exploration, the last one if '', to a label; return the number of its windows now."""
         label = checked_label(label)
         if not label:
             raise ChangeRefused('no label was given; name the texture to add', ChangeError.INVALID_LABEL)
@@ -158,13 +119,7 @@ class IncrementalClassifier:
             )
 
     def remove_last(self) -> AddedSlide:
-        """Remove the slide that was added last, and return it.
-
-        Raises
-        ------
-        InvalidData
-            If no slide was added.
-        """
+        """Remove the slide that was added last, and return it."""
         if not self.model.added_slides:
             raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
         return self._remove([len(self.model.added_slides) - 1])[0]
@@ -173,15 +128,6 @@ class IncrementalClassifier:
         """Remove all slides that were added as a label, from the model and from its folder, and return them.
 
         A texture of the training stays as it was trained.
-
-        Raises
-        ------
-        InvalidData
-            If there is no label, no slide was added at all, or none to this texture of the training.
-        UnknownName
-            If no slide was added under this label, with the nearest label.
-        OSError
-            If a file cannot be removed; the slides whose files are still there stay in the model.
         """
         label = checked_label(label)
         self._refuse_removal(label)
@@ -237,20 +183,6 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     session (two covariances); the slides of today say where the classes are today, and each counts as much as it is
     certain. A surface without a slide of today moves by the mean of those that have some. The answer is a label alone:
     nothing shows which slides of today would be unknown, so no slide is known.
-
-    Parameters
-    ----------
-    model
-        Trained with a recipe whose features `training` and `today` hold.
-    training
-        The slides of the training, with their sessions: several of at least one surface.
-    today
-        Labelled slides of today.
-
-    Raises
-    ------
-    InvalidData
-        If the training has one session of each surface, or a slide of today is of no trained surface.
 
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis"; Prince & Elder 2007.
     """

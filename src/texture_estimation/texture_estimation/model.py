@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A trained model and its files: NAME.npz, the card NAME.json, and the slides added since in the folder NAME.added.
 
@@ -50,22 +51,7 @@ def tree_of(part: Any) -> Any:
 
 
 def part_of(kind: Any, value: Any, where: str) -> Any:
-    """Return what `tree_of` made a tree of.
-
-    Parameters
-    ----------
-    kind
-        Its type: a dataclass, a tuple, a mapping by names, an array, or a plain one.
-    value
-        The tree.
-    where
-        What it is, for the sentence of an error.
-
-    Raises
-    ------
-    InvalidData
-        If something in it is missing, unknown or of another type.
-    """
+    """Return what `tree_of` made a tree of."""
     origin, given = get_origin(kind), get_args(kind)
     found: Any = None
     if is_dataclass(kind):
@@ -115,13 +101,7 @@ BROKEN = (
 
 @contextmanager
 def usable(target: Path) -> Iterator[None]:
-    """Say in one sentence, within a `with` block, that what it makes of the files of a model cannot be used.
-
-    Raises
-    ------
-    ModelMismatch
-        If the block raises what damaged or foreign files cause.
-    """
+    """Say in one sentence, within a `with` block, that what it makes of the files of a model cannot be used."""
     try:
         yield
     except MissingLibrary:
@@ -149,23 +129,6 @@ def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
     """Write NAME.npz and NAME.json, and return NAME.npz.
 
     A reader never sees half a file: both are written beside their places and then moved.
-
-    Parameters
-    ----------
-    path
-        Path of the model, with or without its ending.
-    tree
-        What was trained, and what people may read about it.
-
-    Returns
-    -------
-    Path
-        Of NAME.npz.
-
-    Raises
-    ------
-    InvalidData
-        If the tree holds anything but arrays and plain values; nothing is written then.
     """
     arrays_path, card_path = both_files(path)
     card_path.parent.mkdir(parents=True, exist_ok=True)
@@ -202,20 +165,7 @@ def _without_arrays(tree: Any, place: str, arrays: dict[str, AnyArray]) -> Any:
 
 
 def read_tree(path: str | Path, *, of: str) -> dict[str, Any]:
-    """Return the tree that `write_tree` was given; nothing in the files is run.
-
-    Parameters
-    ----------
-    path
-        Path of either file, or of both without the ending.
-    of
-        What its recipe names: 'learner' or 'regressor'.
-
-    Raises
-    ------
-    ModelMismatch
-        If a file is missing, damaged, of the other kind, or does not belong to the other.
-    """
+    """Return the tree that `write_tree` was given; nothing in the files is run."""
     arrays_path, card_path = both_files(path)
     tree = _read_card(card_path, path)
     if of not in tree['recipe']:
@@ -244,21 +194,7 @@ def read_tree(path: str | Path, *, of: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StoredModel:
-    """What models of textures and of roughness have in common.
-
-    Parameters
-    ----------
-    name
-        Of the model.
-    names, feature_set
-        Features it expects, and their fingerprint.
-    recipe
-        By which it was made.
-    parameters
-        Fitted parameters of the learner or regressor, as the file stores them.
-    training
-        Facts about the training, for the card.
-    """
+    """What models of textures and of roughness have in common."""
 
     name: str
     names: tuple[str, ...]
@@ -344,28 +280,7 @@ ADDED_SLIDES_MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 feat
 
 @dataclass(frozen=True, eq=False)
 class AddedSlide:
-    """One slide over a known surface.
-
-    Parameters
-    ----------
-    label
-        Of the surface.
-    exploration_id
-        Of the slide.
-    values : (n, n_features)
-        Features of its windows.
-    conditions
-        How it was made, as far as it is known.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     _ = write_added_slide(f'{folder}/model', 1, AddedSlide('oak', 'slide', np.ones((3, 1))), 'a1')
-    ...     [slide] = read_added_slides(f'{folder}/model', 'a1', ('mean',))
-    >>> slide.label, slide.values.shape
-    ('oak', (3, 1))
-    """
+    """One slide over a known surface."""
 
     label: str
     exploration_id: str
@@ -374,24 +289,7 @@ class AddedSlide:
 
 
 def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
-    """Write an added slide of a model by its number, from 1, atomically.
-
-    Parameters
-    ----------
-    model
-        Path of the model.
-    number
-        Number of the slide, from 1; an existing one is replaced.
-    added_slide
-        What is written.
-    feature_set
-        Fingerprint of the features.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Write an added slide of a model by its number, from 1, atomically."""
     told = {**tree_of(added_slide), 'values': added_slide.values.tolist()}
     content = {'format': FORMAT, 'feature_set': feature_set, **told}
     path = _folder(model) / f'{number:05d}.json'
@@ -414,25 +312,6 @@ def read_added_slides(model: str | Path, feature_set: str, names: Sequence[str])
     """Return the added slides of a model in their order; none if there is no folder.
 
     They hold features, so they stay valid when the model is trained again with the same features.
-
-    Parameters
-    ----------
-    model
-        Path of the model.
-    feature_set
-        Fingerprint of the features of the model.
-    names
-        Name of each feature.
-
-    Returns
-    -------
-    tuple of AddedSlide
-        In the order in which they were added.
-
-    Raises
-    ------
-    ModelMismatch
-        If one is damaged, or holds features of another kind.
     """
     return tuple(_read(path, feature_set, len(names)) for path in sorted(_folder(model).glob('*.json')))
 
@@ -478,20 +357,7 @@ MAX_EXAMPLES = 400
 
 @dataclass(frozen=True, eq=False)
 class TrainingExamples:
-    """Some of the windows that a model was trained on.
-
-    Parameters
-    ----------
-    values : (n, n_features) float32
-    codes, slides : (n,)
-        Number of the label, 0…, and of the slide of each.
-
-    Examples
-    --------
-    >>> examples = TrainingExamples.of(np.arange(4.0)[:, None], np.array([0, 0, 1, 1]), np.arange(4))
-    >>> examples.codes.tolist()
-    [0, 0, 1, 1]
-    """
+    """Some of the windows that a model was trained on."""
 
     values: NDArray[np.float32]
     codes: Codes
@@ -499,32 +365,13 @@ class TrainingExamples:
 
     @classmethod
     def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
-        """Return what contributes keeping: of each label at most so many that more would hardly help.
-
-        Parameters
-        ----------
-        values : (n, n_features)
-            Features of windows.
-        codes, slides : (n,)
-            Number of the label and of the slide of each.
-
-        Returns
-        -------
-        TrainingExamples
-            At most MAX_EXAMPLES of each label.
-        """
+        """Return what contributes keeping: of each label at most so many that more would hardly help."""
         own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
         kept = np.concatenate([rows[spread(len(rows))] for rows in own])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
     def check(self, n_features: int, n_labels: int) -> None:
-        """Raise ValueError unless they are examples of so many features and labels.
-
-        Raises
-        ------
-        ValueError
-            If shapes or labels do not fit, or a value is not finite.
-        """
+        """Raise ValueError unless they are examples of so many features and labels."""
         n = len(self.codes)
         if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
             raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')

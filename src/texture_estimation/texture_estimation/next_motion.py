@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Choice of the next touch: the motion with the largest expected information gain about the texture."""
 
@@ -31,20 +32,7 @@ class NextTouch(NamedTuple):
 
 
 def log_likelihoods(places: Array, means: Array) -> Array:
-    """Return those of slides under one motion by texture, (..., n_textures), less what all textures share.
-
-    Parameters
-    ----------
-    places : (..., n_axes)
-        Features of slides on axes that make the shared covariance the identity.
-    means : (..., n_textures, n_axes)
-        Of the textures under the motion of each.
-
-    Returns
-    -------
-    (..., n_textures)
-        In nats, up to a constant of each slide.
-    """
+    """Return those of slides under one motion by texture, (..., n_textures), less what all textures share."""
     off = places[..., None, :] - means
     return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
 
@@ -56,20 +44,6 @@ def least_information(means: Array, log_prior: Array) -> float:
 
     Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the Bhattacharyya
     distance, which of all Chernoff distances bounds best where the covariance is shared.
-
-    Parameters
-    ----------
-    means : (n_textures, n_axes)
-        Of the textures under the motion, on axes that make the shared covariance the identity.
-    log_prior : (n_textures,)
-        What is known before the slide.
-
-    Examples
-    --------
-    >>> alike, apart = (np.array([[0.0], [distance]]) for distance in (0.0, 100.0))
-    >>> prior = np.log([0.5, 0.5])
-    >>> round(least_information(alike, prior), 3), round(least_information(apart, prior), 3)  # nothing, and log 2
-    (0.0, 0.693)
     """
     off = means[:, None, :] - means
     distance = np.einsum('ijk,ijk->ij', off, off) / 8.0
@@ -85,35 +59,6 @@ class NextTouchModel:
 
     Source: Fishel & Loeb 2012, "Bayesian exploration for intelligent identification of textures", who choose the motion
     that confuses the candidates least; here by the expected information, which is in nats and has no free exponent.
-
-    Parameters
-    ----------
-    textures
-        Names.
-    projection : (n_features, n_axes)
-        From the mean features of a slide to axes along which textures differ, and on which what is uncertain about a
-        slide of one texture under one motion has the covariance 1.
-    motions
-        Those that were trained.
-    means : (n_motions, n_textures, n_axes)
-        Of the textures under each motion, on the axes.
-
-    Raises
-    ------
-    InvalidData
-        If the shapes of the arrays contradict each other.
-
-    Examples
-    --------
-    >>> across, along = (SlideMotion('linear_slide', angle_rad, 0.05, 1.0, 1.0) for angle_rad in (0.0, 1.57))
-    >>> rng = np.random.default_rng(0)
-    >>> textures, motions = ['cork', 'felt'] * 20, [across, across, along, along] * 10
-    >>> differs = np.array([t == 'felt' and m is across for t, m in zip(textures, motions)])  # only across the ridges
-    >>> values = 2.0 * differs[:, None] + 0.1 * rng.standard_normal((40, 1))
-    >>> model = NextTouchModel.fit(values, textures, motions)
-    >>> touch = model.best_motion(model.uniform_log_prior, [across, along])
-    >>> isinstance(touch, NextTouch), touch.motion.direction_rad
-    (True, 0.0)
     """
 
     textures: tuple[str, ...]
@@ -130,24 +75,7 @@ class NextTouchModel:
 
     @classmethod
     def fit(cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion]) -> NextTouchModel:
-        """Learn from slides.
-
-        Parameters
-        ----------
-        values : (n_slides, n_features)
-            Mean features of each slide.
-        textures, motions : (n_slides,)
-            What was slid over, and how.
-
-        Returns
-        -------
-        NextTouchModel
-
-        Raises
-        ------
-        InvalidData
-            If values are not finite, a motion lacks a texture, or no two slides are alike in texture and motion.
-        """
+        """Learn from slides."""
         values = np.asarray(values, dtype=np.float64)
         if values.ndim != 2 or not len(values) == len(textures) == len(motions) or not len(values):
             raise InvalidData(
@@ -172,18 +100,7 @@ class NextTouchModel:
     def of_slides(
         cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion | None]
     ) -> NextTouchModel | None:
-        """Learn from slides as an arm made them: none is exactly like another, and some motions lack textures.
-
-        Parameters
-        ----------
-        values, textures, motions : (n_slides, n_features), (n_slides,), (n_slides,)
-            As for `training`; None where it is not known how a slide was made.
-
-        Returns
-        -------
-        Explorations or None
-            None if there are fewer than two kinds of motion with two slides over each texture.
-        """
+        """Learn from slides as an arm made them: none is exactly like another, and some motions lack textures."""
         known_motions = [number for number, motion in enumerate(motions) if motion]
         made = dict(zip(known_motions, group_similar([motion for motion in motions if motion]), strict=True))
         often = Counter((kind, textures[number]) for number, kind in made.items())
@@ -200,27 +117,7 @@ class NextTouchModel:
         return np.full(len(self.textures), -math.log(len(self.textures)))
 
     def update(self, log_prior: Array, motion: SlideMotion, values: Array) -> Array:
-        """Return the log-posterior (n_textures,) after a slide with mean features (n_features,).
-
-        Parameters
-        ----------
-        log_prior : (n_textures,)
-            What was known before the slide.
-        motion
-            How it was made.
-        values : (n_features,)
-            Its mean features.
-
-        Returns
-        -------
-        (n_textures,)
-            Logarithms of probabilities that add up to 1.
-
-        Raises
-        ------
-        InvalidData
-            If the values have another shape or are not finite.
-        """
+        """Return the log-posterior (n_textures,) after a slide with mean features (n_features,)."""
         means = self._means(motion)
         values = np.asarray(values, dtype=np.float64)
         if values.shape != self.projection.shape[:1] or not np.isfinite(values).all():
@@ -231,42 +128,11 @@ class NextTouchModel:
         return log_softmax(self._checked(log_prior) + log_likelihoods(values @ self.projection, means))
 
     def information(self, log_posterior: Array, motion: SlideMotion) -> float:
-        """Return the information in nats that a slide is expected to give, by its lower bound in closed form.
-
-        Parameters
-        ----------
-        log_posterior : (n_textures,)
-            What is known so far.
-        motion
-            How it would slide.
-
-        Returns
-        -------
-        float
-            At least 0, at most the entropy of what is known so far.
-        """
+        """Return the information in nats that a slide is expected to give, by its lower bound in closed form."""
         return least_information(self._means(motion), self._checked(log_posterior))
 
     def best_motion(self, log_posterior: Array, motions: Sequence[SlideMotion]) -> NextTouch:
-        """Return the motion with the largest expected information gain; of equal ones the shortest.
-
-        Parameters
-        ----------
-        log_posterior : (n_textures,)
-            What is known so far.
-        motions
-            Those that may be made.
-
-        Returns
-        -------
-        NextTouch
-            The motion and its expected information, in nats.
-
-        Raises
-        ------
-        InvalidParameter
-            If there are no motions.
-        """
+        """Return the motion with the largest expected information gain; of equal ones the shortest."""
         if not motions:
             raise InvalidParameter('there is no motion to choose from; name at least one that was trained')
         choices = [NextTouch(motion, self.information(log_posterior, motion)) for motion in motions]
@@ -274,18 +140,7 @@ class NextTouchModel:
         return min((c for c in choices if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
 
     def check(self, values: Array) -> None:
-        """Raise InvalidData if the update with these mean features, (n_features,), is not finite.
-
-        Parameters
-        ----------
-        values : (n_features,)
-            Mean features of a slide.
-
-        Raises
-        ------
-        InvalidData
-            If it is not.
-        """
+        """Raise InvalidData if the update with these mean features, (n_features,), is not finite."""
         for motion in self.motions:
             if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
                 raise InvalidData(f'what textures look like under {motion} is not finite')
@@ -309,27 +164,7 @@ class NextTouchModel:
 
 
 def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:
-    """Return the mean features of a slide, (n_features,), from those of its windows.
-
-    Parameters
-    ----------
-    vectors
-        Windows of one slide; its end is ignored.
-    feature_set
-        Fingerprint of the features of the model.
-
-    Returns
-    -------
-    (n_features,)
-        In the units of the features.
-
-    Raises
-    ------
-    InvalidData
-        If it has no usable window.
-    ModelMismatch
-        If the features are not those that were trained on.
-    """
+    """Return the mean features of a slide, (n_features,), from those of its windows."""
     for vector in vectors:
         if vector.feature_set != feature_set:
             raise ModelMismatch(f'the model does not fit: {fingerprint_difference(vector.feature_set, feature_set)}')
@@ -357,11 +192,6 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     stays uncertain about them is added to what differs between slides.
 
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with a covariance shrunk as Ledoit and Wolf do.
-
-    Parameters
-    ----------
-    cells : (n_slides,)
-        Number of the motion times the number of textures, and number of the texture.
     """
     from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
     from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who classifies does not need it

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A recipe: windows, inputs and features, learner and evidence rule, in one YAML file."""
 
@@ -47,13 +48,7 @@ def check_keys(content: Mapping[str, Any], known: Sequence[str], where: str) -> 
 
 @dataclass(frozen=True)
 class TrainingParams:
-    """How the examples for training are cut.
-
-    Examples
-    --------
-    >>> TrainingParams(hop_s=0.1).hop_s
-    0.1
-    """
+    """How the examples for training are cut."""
 
     hop_s: float = param(
         0.25,
@@ -66,13 +61,7 @@ class TrainingParams:
 
 @dataclass(frozen=True)
 class DecisionParams(TrainingParams):
-    """How the examples for training are cut, how they count, and how rarely decisions made with them may err.
-
-    Examples
-    --------
-    >>> DecisionParams(speed_margin=0.2).domain_margins.speed
-    0.2
-    """
+    """How the examples for training are cut, how they count, and how rarely decisions made with them may err."""
 
     start_weight: int = param(
         1,
@@ -202,13 +191,7 @@ class DecisionParams(TrainingParams):
             )
 
     def distances_m(self, window_s: float) -> tuple[float, ...]:
-        """Return how far the finger slides in a window at speeds from the slowest to the fastest, m; () without these.
-
-        Parameters
-        ----------
-        window_s
-            Length of a window, s.
-        """
+        """Return how far the finger slides in a window at the slowest to the fastest speed, m; () without speeds."""
         if not self.slowest_m_s:
             return ()
         ratio = self.fastest_m_s / self.slowest_m_s

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Roughness: grades and ratings, regressors, recipe, training, evidence, model."""
 
@@ -41,49 +42,17 @@ QUIET_MARGIN = 0.7  # fall of LEVEL below the training set that counts as too qu
 
 
 def checked_columns(names: Sequence[str], feature: str) -> NDArray[np.intp]:
-    """Return the columns that a feature fills, of values named 'input/feature/value/channel'.
-
-    Parameters
-    ----------
-    names
-        Name of each value.
-    feature
-        Name of the feature in the recipe.
-
-    Returns
-    -------
-    (n_columns,)
-        Indices, ascending.
-    """
+    """Return the columns that a feature fills, of values named 'input/feature/value/channel'."""
     return np.flatnonzero([name.split('/')[1:2] == [feature] for name in names])
 
 
 def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
-    """Return the columns that a regressor sees.
-
-    Returns
-    -------
-    (n_columns,)
-        Indices, ascending.
-    """
+    """Return the columns that a regressor sees."""
     return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
 
 
 def limits_of(names: Sequence[str], values: Array) -> dict[str, float]:
-    """Return the largest STICK_SLIP and the least LEVEL to accept, from training windows (n, n_features).
-
-    Parameters
-    ----------
-    names
-        Name of each value.
-    values : (n, n_features)
-        Features of the training windows.
-
-    Returns
-    -------
-    dict
-        Limits by their names; none of a feature that is missing.
-    """
+    """Return the largest STICK_SLIP and the least LEVEL to accept, from training windows (n, n_features)."""
     limits = {}
     if (columns := checked_columns(names, STICK_SLIP)).size:
         limits[STICK_SLIP] = float(values[:, columns].max()) + STICK_SLIP_MARGIN
@@ -110,22 +79,7 @@ class RoughnessRegressor(Protocol):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
-        """Learn from features `X`, grades `y` and texture numbers `groups`; return plain arrays.
-
-        Parameters
-        ----------
-        X : (n, n_features)
-            Features of windows; finite.
-        y : (n,)
-            Mean grade of the texture of each, 1 to 5.
-        groups : (n,)
-            Number of the texture of each.
-
-        Returns
-        -------
-        mapping
-            Arrays for `predictor` and for the model file.
-        """
+        """Learn from features `X`, grades `y` and texture numbers `groups`; return plain arrays."""
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> RegressorPredictor:
@@ -233,19 +187,6 @@ class Grades:
     """The grade of each texture, and for which each is meant.
 
     A grade is an opinion; the physical roughness of a surface stands elsewhere.
-
-    Parameters
-    ----------
-    grades
-        From 1 (smooth) to 5 (rough), by texture.
-    splits
-        'train' or 'test', by texture; empty if the table does not say.
-
-    Examples
-    --------
-    >>> grades = Grades({'silk': 1.2, 'jute': 4.6}, {'silk': 'train', 'jute': 'test'})
-    >>> grades.of('jute'), grades.used_for('train')
-    (4.6, ('silk',))
     """
 
     grades: Mapping[str, float]
@@ -263,18 +204,7 @@ class Grades:
 
 
 def read_grades(path: str | Path) -> Grades:
-    """Read a CSV file with the columns `texture` and `grade`, and if wanted `split`; others are left alone.
-
-    Parameters
-    ----------
-    path
-        Of the file, or the name of a table that the suite ships, such as 'ets_roughness'.
-
-    Raises
-    ------
-    InvalidData, UnknownName
-        If there is no such file, or with the line that cannot be used.
-    """
+    """Read a CSV file with the columns `texture` and `grade`, and if wanted `split`; others are left alone."""
     place = find_file(str(path), 'texture_simulation', 'config/grades', 'table of grades', '.csv')
     grades: dict[str, float] = {}
     splits: dict[str, str] = {}
@@ -294,20 +224,6 @@ def read_rows(path: Path, columns: Sequence[str], what: str) -> list[tuple[int, 
     """Read a CSV file: number and entries of each line, by the names of the columns in small letters.
 
     Lines that begin with '#' are no lines. An entry that a short line lacks is None.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    columns
-        Names of those that are needed; 'rating' is another name of 'grade'.
-    what
-        What a line holds, for the sentence of an error.
-
-    Raises
-    ------
-    InvalidData
-        If it cannot be read, lacks a column, or has no line.
     """
     needed = f'{", ".join(columns[:-1])} and {columns[-1]} are needed, one {what} a line'
     try:
@@ -334,17 +250,7 @@ def _plain(name: str) -> str:
 def checked_grade(
     text: str | None, where: str, scale: tuple[float, float] = (SMOOTH, ROUGH), advice: str = ''
 ) -> float:
-    """Return a number on a scale of grades; InvalidData with the place if it is none, or beyond an end.
-
-    Parameters
-    ----------
-    text
-        As it was read.
-    where, advice
-        Place of the text, and what else may help, for the sentence of the error.
-    scale
-        Smoothest and roughest grade.
-    """
+    """Return a number on a scale of grades; InvalidData with the place if it is none, or beyond an end."""
     low, high = scale
     try:
         grade = float(text or '')
@@ -375,14 +281,7 @@ class CalibrationParams(TrainingParams):
 
 @dataclass(frozen=True)
 class RoughnessRecipe:
-    """What turns a signal into a grade, before any training.
-
-    Examples
-    --------
-    >>> recipe = RoughnessRecipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}}, 'mine')
-    >>> recipe.training == CalibrationParams()
-    True
-    """
+    """What turns a signal into a grade, before any training."""
 
     name: str
     feature_set: FeatureSet
@@ -398,13 +297,7 @@ class RoughnessRecipe:
 
     @classmethod
     def from_mapping(cls, content: Mapping[str, Any], name: str) -> RoughnessRecipe:
-        """Build from what a recipe file holds.
-
-        Raises
-        ------
-        InvalidParameter, UnknownName
-            With the place in the recipe and what is allowed there.
-        """
+        """Build from what a recipe file holds."""
         where = f"roughness recipe '{name}'"
         check_keys(content, KEYS, where)
         return cls(
@@ -426,13 +319,7 @@ class RoughnessRecipe:
 
 
 def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
-    """Read a recipe that the package ships in config/roughness, or any by path; a model's card holds one too.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        With one sentence that says what is wrong and what is allowed.
-    """
+    """Read a recipe that the package ships in config/roughness, or any by path; a model's card holds one too."""
     name, content = read_recipe(name_or_path, 'config/roughness', 'roughness recipe')
     return RoughnessRecipe.from_mapping(content, name)
 
@@ -445,88 +332,24 @@ NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its
 
 @dataclass(frozen=True)
 class Calibration:
-    """What makes an honest standard deviation of the one that a regressor claims.
-
-    Parameters
-    ----------
-    scale
-        Factor on what is common to all windows of a texture.
-    base_std
-        Standard deviation, in grades, of what the regressor does not know of.
-    within_std
-        Standard deviation of the windows of one texture around their mean, in grades.
-
-    Examples
-    --------
-    >>> calibration = Calibration(scale=2.0, within_std=0.3)
-    >>> float(calibration.window_std(np.array(0.2))).__round__(2)  # √((2 · 0.2)² + 0.3²)
-    0.5
-    """
+    """What makes an honest standard deviation of the one that a regressor claims."""
 
     scale: float = 1.0
     base_std: float = 0.0
     within_std: float = 0.0
 
     def shared_variance(self, regressor_std: Array | float) -> Array:
-        """Return the variance that more sliding over the texture does not lessen.
-
-        Parameters
-        ----------
-        regressor_std
-            Standard deviation that the regressor gives, grades.
-
-        Returns
-        -------
-        array of the same shape
-            Square of grades.
-        """
+        """Return the variance that more sliding over the texture does not lessen."""
         return self.scale**2 * (np.square(regressor_std) + self.base_std**2)
 
     def window_std(self, regressor_std: Array) -> Array:
-        """Return the standard deviation of the grade of a single window.
-
-        Parameters
-        ----------
-        regressor_std : (...)
-            Standard deviation that the regressor gives, grades.
-
-        Returns
-        -------
-        (...)
-            Grades.
-        """
+        """Return the standard deviation of the grade of a single window."""
         return np.sqrt(self.shared_variance(regressor_std) + self.within_std**2)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RoughnessModel(StoredModel):
-    """Fitted parameters, and what is needed to grade a feature vector and to refuse an incompatible one.
-
-    Parameters
-    ----------
-    calibration
-        Of the standard deviation.
-    limits
-        Of the checks.
-    grades
-        Of the training textures.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from texture_estimation.roughness import RoughnessRecipe
-    >>> from texture_estimation.roughness import train_grades
-    >>> from texture_estimation.roughness import Grades
-    >>> from texture_features.feature_set import LabelledFeatures
-    >>> inputs = {'signal': {'features': ['mean']}}
-    >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
-    >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
-    >>> values = np.repeat([1.0, 2.0, 4.0, 5.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
-    >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
-    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 4.0, 'jute': 5.0}))
-    >>> abs(float(model.grade(np.array([2.0]))[0]) - 2.0) < 0.5
-    True
-    """
+    """Fitted parameters, and what is needed to grade a feature vector and to refuse an incompatible one."""
 
     recipe: RoughnessRecipe
     calibration: Calibration
@@ -562,19 +385,7 @@ class RoughnessModel(StoredModel):
         return ''
 
     def grade(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features).
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (...)
-            Grade, 1 to 5.
-        (...)
-            Standard deviation, grades.
-        """
+        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features)."""
         return self.predictor(X.take(self._graded, axis=-1))
 
     @property
@@ -590,13 +401,7 @@ class RoughnessModel(StoredModel):
 
 
 def load_roughness_model(path: str | Path) -> RoughnessModel:
-    """Read a model; `path` is that of either file, or of both without the ending. No code in the file is run.
-
-    Raises
-    ------
-    ModelMismatch
-        With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
-    """
+    """Read a model; `path` is that of either file, or of both without the ending. No code in the file is run."""
     target = model_stem(path)
     tree = read_tree(path, of='regressor')
     with usable(target):
@@ -628,29 +433,6 @@ class RoughnessAccumulator:
     """Join the grades of the windows of one slide; the same code on the robot and on recordings.
 
     A new exploration id, or a vector after the `last` one, starts again.
-
-    Parameters
-    ----------
-    model
-        What grades each window; None answers the end of every slide with a sentence that no model is loaded.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from texture_estimation.roughness import RoughnessRecipe
-    >>> from texture_estimation.roughness import train_grades
-    >>> from texture_estimation.roughness import Grades
-    >>> from texture_features.feature_set import LabelledFeatures
-    >>> inputs = {'signal': {'features': ['mean']}}
-    >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
-    >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
-    >>> values = np.repeat([1.0, 2.0, 4.0, 5.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
-    >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
-    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 4.0, 'jute': 5.0}))
-    >>> grader = RoughnessAccumulator(model)
-    >>> window = FeatureVector(0, 'slide', 0.5, 0.1, ('signal/mean',), np.array([2.0]), feature_set='a1')
-    >>> abs(grader.update(window).grade - 2.0) < 0.5
-    True
     """
 
     def __init__(self, model: RoughnessModel | None) -> None:
@@ -759,27 +541,6 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
     """Return a model that grades as the people did who graded the textures of the examples.
 
     The standard deviation is calibrated on textures held out in turn, of the training alone.
-
-    Parameters
-    ----------
-    recipe
-        Names the head.
-    examples
-        Cut with `recipe.training_windows`.
-    grades
-        Of every texture in the examples.
-    name
-        Of the model; that of the recipe if ''.
-
-    Returns
-    -------
-    RoughnessModel
-        Ready to grade and to be stored.
-
-    Raises
-    ------
-    InvalidData, UnknownName
-        If there are no examples, a value is not finite, or a texture has no grade.
     """
     labels, codes = np.unique(examples.labels, return_inverse=True)
     table = {str(label): grades.of(str(label)) for label in labels}
@@ -815,26 +576,7 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
 def hold_out(
     regressor: RoughnessRegressor, values: Array, true: Array, textures: Codes, folds: int
 ) -> tuple[Array, Array]:
-    """Return grades and deviations, (n,) each, that a regressor gives which trained on other textures; NaN for none.
-
-    Parameters
-    ----------
-    regressor
-        Regressor of the recipe.
-    values : (n, n_features)
-        Features of windows.
-    true : (n,)
-        Grade that people gave the texture of each.
-    textures : (n,)
-        Number of the texture of each.
-    folds
-        Number of parts into which the textures are divided.
-
-    Returns
-    -------
-    (n,), (n,)
-        Grades and their standard deviations.
-    """
+    """Return grades and deviations, (n,) each, that a regressor gives which trained on other textures; NaN for none."""
     codes = np.unique(textures)
     grades, stds = np.empty(len(true)), np.empty(len(true))
     # Textures of like grade go to different parts, so that each part leaves some of every grade.

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Genetic search of a recipe's parameters: what is varied, how an individual is evaluated, what is found.
 
@@ -55,22 +56,7 @@ CHUNK = 64  # windows described in one go: what they and their spectra take shou
 
 @dataclass(frozen=True, eq=False)
 class LabelledWindows:
-    """Windows of labelled slides, all of one rate and length in each input.
-
-    Parameters
-    ----------
-    inputs
-        Topic → windows with samples (n, n_samples, n_channels), speed and force.
-    labels, groups : (n,) of text
-        Surface and slide of each window.
-
-    Examples
-    --------
-    >>> batch = WindowBatch(np.zeros((3, 50, 1)), 100.0, np.full(3, 0.05), np.ones(3))
-    >>> windows = LabelledWindows({'signal': batch}, np.array(['cork', 'felt', 'felt']), np.array(['a', 'b', 'b']))
-    >>> windows.rows(windows.labels == 'felt').labels.tolist()
-    ['felt', 'felt']
-    """
+    """Windows of labelled slides, all of one rate and length in each input."""
 
     inputs: Mapping[str, WindowBatch]
     labels: NDArray[np.str_]
@@ -78,13 +64,7 @@ class LabelledWindows:
 
     @classmethod
     def from_events(cls, events: Iterable[WindowEvent], topics: Sequence[str]) -> LabelledWindows:
-        """Stack the windows of labelled slides.
-
-        Raises
-        ------
-        InvalidData
-            If there is none, or they differ in rate, length or channels.
-        """
+        """Stack the windows of labelled slides."""
         cut = [event for event in events if isinstance(event, CutWindow) and event.surface]
         if not cut:
             raise InvalidData('there is no window of a labelled surface; record slides with a surface named')
@@ -123,13 +103,7 @@ class LabelledWindows:
         return np.asarray(np.unique(self.groups, return_inverse=True)[1]).reshape(-1)
 
     def values(self, features: FeatureSet) -> Array:
-        """Return the features of each window, (n, n_features).
-
-        Raises
-        ------
-        InvalidData
-            If one is not finite.
-        """
+        """Return the features of each window, (n, n_features)."""
         parts = (slice(start, start + CHUNK) for start in range(0, len(self.labels), CHUNK))
         inputs = [self.inputs[name] for name in features.window_names]
         values = np.concatenate([features.values([_rows(item, part) for item in inputs]) for part in parts])
@@ -157,20 +131,6 @@ def random_halves(codes: Codes, groups: Codes, count: int, rng: np.random.Genera
 
     Half of the slides of each label, rounded down, are used for training; all windows of a slide are on one side.
 
-    Parameters
-    ----------
-    codes, groups : (n,)
-        Label and slide number of each example.
-    count
-        How many splits.
-    rng
-        Draws the slides.
-
-    Raises
-    ------
-    InvalidData
-        If a label has fewer than two slides.
-
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
     """
     slides, first = np.unique(groups, return_index=True)
@@ -189,17 +149,7 @@ def random_halves(codes: Codes, groups: Codes, count: int, rng: np.random.Genera
 
 @dataclass(frozen=True, eq=False)
 class SearchSlides:
-    """Windows and halves of the same slides, however the windows are cut.
-
-    Parameters
-    ----------
-    cut
-        Gives the windows of all labelled slides.
-    n_halves, seed
-        How many random halves, and what they are drawn from.
-    labels
-        Surfaces to tell apart; () for all. The halves of some are those of all, less the other surfaces.
-    """
+    """Windows and halves of the same slides, however the windows are cut."""
 
     cut: Cut
     n_halves: int = 20
@@ -249,19 +199,7 @@ def shares_right(decided: Codes, codes: Codes, training: Mask) -> HalfScore:
 
 
 def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share: float) -> tuple[Codes, Codes]:
-    """Return what each slide is taken for by all its windows, (n_slides,), and the row of its first window.
-
-    Parameters
-    ----------
-    scores : (n, n_labels)
-        Of each window; equal highest ones are a tie.
-    slides : (n,)
-        Number of each window's slide.
-    rule
-        Joins the windows; of a slide with several groups that decide by themselves, the newest complete one counts.
-    hop_share
-        Distance of the windows over their length: of what overlaps, only the new part counts.
-    """
+    """Return what each slide is taken for by all its windows, (n_slides,), and the row of its first window."""
     evidence = rule.window_evidence(log_softmax(scores))
     first = np.unique(slides, return_index=True)[1]
     ends = [followed(rule, evidence[slides == slides[row]], min(hop_share, 1.0)) for row in first]
@@ -357,20 +295,7 @@ Change = tuple[str, tuple[str, ...], Any]  # what is done, where, and with which
 
 
 def change_recipe(recipe: dict[str, Any], action: str, path: tuple[str, ...], value: Any = None) -> None:
-    """Change a recipe written as mappings and lists: 'set' a value at a path, or 'use' or 'drop' a feature there.
-
-    Raises
-    ------
-    InvalidParameter
-        If the recipe has no such place.
-
-    Examples
-    --------
-    >>> recipe = {'windows': {'length_s': 0.5}}
-    >>> change_recipe(recipe, 'set', ('windows', 'length_s'), 1.0)
-    >>> recipe
-    {'windows': {'length_s': 1.0}}
-    """
+    """Change a recipe written as mappings and lists: 'set' a value at a path, or 'use' or 'drop' a feature there."""
     place: Any = _place_in(recipe, path[:-1], path)
     last = path[-1]
     if action == 'set':
@@ -400,17 +325,7 @@ def _place_in(content: Any, way: Sequence[str], path: Sequence[str]) -> Any:
 
 @dataclass(frozen=True)
 class Axis:
-    """A variable: its values in an order, and what each does to a recipe.
-
-    Parameters
-    ----------
-    values
-        At least two.
-    path
-        What is set to the value; () if `edits` tell.
-    edits
-        For each option of a choice.
-    """
+    """A variable: its values in an order, and what each does to a recipe."""
 
     values: tuple[Value, ...]
     path: tuple[str, ...] = ()
@@ -423,28 +338,14 @@ class Axis:
 
 @dataclass(frozen=True)
 class RecipeSpace:
-    """The variables of a recipe, of textures or of roughness.
-
-    Examples
-    --------
-    >>> from texture_estimation.recipe import load_recipe
-    >>> space = RecipeSpace.load('svm-rbf', load_recipe('any-speed'))
-    >>> space.recipe(space.individual([0, 0])).learner.c
-    0.1
-    """
+    """The variables of a recipe, of textures or of roughness."""
 
     base: Any
     axes: Mapping[str, Axis]
 
     @classmethod
     def load(cls, name_or_path: str, base: Any) -> RecipeSpace:
-        """Read a table of variables, by the name of a shipped one or by path.
-
-        Raises
-        ------
-        UnknownName, InvalidParameter
-            If there is none, it is wrong, or the recipe lacks what it varies.
-        """
+        """Read a table of variables, by the name of a shipped one or by path."""
         space = cls(base, _read(name_or_path))
         if not space.axes:
             raise InvalidParameter(f"search space '{name_or_path}' has no variables; name one at least")
@@ -486,15 +387,7 @@ class RecipeSpace:
 
 
 def space_for(key: str, name: str) -> str | None:
-    """Return the name of the shipped search space that lists a name under `key`; None if none does.
-
-    Parameters
-    ----------
-    key
-        'recipes', 'learners', or 'pairs_of' where each pair of surfaces of a recipe is searched for by itself.
-    name
-        Of the recipe or learner.
-    """
+    """Return the name of the shipped search space that lists a name under `key`; None if none does."""
     spaces = shipped(PACKAGE, FOLDER)
     return next((stem for stem, path in spaces.items() if name in load_yaml(path, 'search space').get(key, ())), None)
 
@@ -700,31 +593,7 @@ def optimise(
     resume: str | Path | None = None,
     tell: Callable[[Generation], None] = lambda _: None,
 ) -> SearchResult:
-    """Search the space, then evaluate the best on all halves; within `workers`, on several cores.
-
-    Parameters
-    ----------
-    space
-        The recipe, and what of it is varied.
-    slides
-        With as many halves as `params` has, and its seed.
-    params
-        Population, generations and so on.
-    task
-        `ClassificationTask()`, or `RoughnessTask(grades)`.
-    checkpoint, resume
-        File that is written after each generation, and file that is read first. A search is a function of its seed
-        and of the scores: begun again, it finds them all known, and arrives at once where it had stopped.
-    tell
-        Called after each generation.
-
-    Raises
-    ------
-    InvalidParameter
-        If the slides have other halves than `params`.
-    TextureError
-        If slides, features or checkpoint cannot be used.
-    """
+    """Search the space, then evaluate the best on all halves; within `workers`, on several cores."""
     if (slides.n_halves, slides.seed) != (params.halves, params.seed):
         raise InvalidParameter(
             f'the slides have {slides.n_halves} half splits with seed {slides.seed}, the search asks for '
@@ -822,13 +691,7 @@ def write_scores(path: str | Path, identity: str, known: Mapping[Individual, flo
 
 
 def read_scores(path: str | Path, identity: str) -> dict[Individual, float]:
-    """Return what a checkpoint holds.
-
-    Raises
-    ------
-    InvalidData
-        If it cannot be read, or belongs to other data, another search space or another seed.
-    """
+    """Return what a checkpoint holds."""
     try:
         content = load_json(Path(path).expanduser(), MAX_BYTES)
         found = content['search']

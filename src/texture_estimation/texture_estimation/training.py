@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Train a texture model from labelled features: the learner, its calibration, its decisions."""
 
@@ -68,20 +69,6 @@ def fit_learner(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups
 
     Where a label has a single slide, its windows are held out one by one and must not be there twice: then every window
     counts once, and nothing is drawn besides.
-
-    Parameters
-    ----------
-    recipe
-        Its learner fits the examples.
-    examples
-        Windows; those of other lengths train the learner, too, and are not held out.
-    codes, groups : (n,)
-        Numbers of the labels and of the slides.
-
-    Returns
-    -------
-    Fitted
-        With one row of held-out log-probabilities for each window.
     """
     of_load = np.array([name.endswith(LOAD) for name in examples.names])
     if of_load.any():  # what is constant tells nothing, and weighs nothing
@@ -243,27 +230,7 @@ REFERENCE_COPIES = 6
 
 @dataclass(frozen=True, eq=False)
 class HeldOutSlide:
-    """A held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it.
-
-    Parameters
-    ----------
-    truth
-        Number of its label.
-    means : (n_windows, n_labels)
-        Mean evidence after each window.
-    effective_windows : (n_windows,)
-        Length of the evidence.
-    scores : (n_windows, n_scores) or None
-        Of its novelty; None where none were computed.
-    disturbance
-        Kind of the disturbance; '' for none.
-
-    Examples
-    --------
-    >>> slide = HeldOutSlide(0, np.log([[0.7, 0.3], [0.8, 0.2]]), np.array([1.0, 1.2]))
-    >>> bool((slide.means.argmax(axis=1) == slide.truth).all())
-    True
-    """
+    """A held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it."""
 
     truth: int
     means: Array
@@ -272,32 +239,13 @@ class HeldOutSlide:
     disturbance: str = ''
 
     def posterior(self, rule: EvidenceRule, tempering_exponent: float) -> Array:
-        """Return the log-probabilities after each window.
-
-        Returns
-        -------
-        (n_windows, n_labels)
-        """
+        """Return the log-probabilities after each window."""
         return rule.log_posterior(self.means, self.effective_windows[:, None], tempering_exponent)
 
 
 @dataclass(frozen=True, eq=False)
 class _Slide:
-    """A slide or a copy of one, whose windows are rows of examples; only as numbers of double precision when asked for.
-
-    Parameters
-    ----------
-    group, truth
-        Number of the slide, and of its label.
-    examples : (n, n_features)
-        Of all slides.
-    rows
-        Those of this slide.
-    shift : (n_features,) or a number
-        Added to the features.
-    disturbance
-        Kind of the disturbance; '' for none.
-    """
+    """A slide or a copy of one, whose windows are rows of examples; in double precision only when asked for."""
 
     group: int
     truth: int
@@ -328,27 +276,6 @@ def fit_novelty(
 
     Returns None if there are too few slides: MIN_SLIDES of each class are needed, and in all MIN_ALL_SLIDES or one over
     the rate of false rejections.
-
-    Parameters
-    ----------
-    learner
-        Learner of the recipe.
-    fitted
-        What was fitted to the examples.
-    examples
-        Windows of known surfaces.
-    rule
-        Combines the windows of a slide.
-    false_rejection_rate
-        Fraction of slides over known surfaces that may be rejected, above 0.
-    gain_range
-        Largest factor by which copies of the slides are amplified or attenuated.
-    scores
-        Names of the scores that count, of SCORES.
-
-    Returns
-    -------
-    (NoveltyDetector, sequence of HeldOutSlide), or None
     """
     classes = np.unique(examples.labels, return_inverse=True)[1]
     names, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
@@ -497,23 +424,7 @@ DEFAULT_TEMPERING_EXPONENT = 0.5
 def held_out_slides(
     fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_share: float
 ) -> Sequence[HeldOutSlide]:
-    """Return the slides, as evaluated when they were held out; none if nothing was.
-
-    Parameters
-    ----------
-    fitted
-        What was fitted, with the held-out log-probabilities of the windows.
-    codes, groups : (n,)
-        Numbers of the labels and of the slides.
-    rule
-        Combines the windows of a slide.
-    hop_share
-        Time between the starts of two windows over their length, at most 1.
-
-    Returns
-    -------
-    sequence of HeldOutSlide
-    """
+    """Return the slides, as evaluated when they were held out; none if nothing was."""
     if fitted.held_out is None:
         return []
     evidence = rule.window_evidence(fitted.held_out)
@@ -549,23 +460,6 @@ def fit_open_set(
     """Return when a slide may end, the novelty detector, and the smallest confidence of known surfaces.
 
     Without a novelty detector, as none is asked for or there are too few slides, there is no smallest confidence.
-
-    Parameters
-    ----------
-    recipe
-        Names the learner, the evidence rule and the rates of error that are allowed.
-    fitted
-        What was fitted to the examples.
-    examples
-        Windows of known surfaces.
-    slides
-        Held-out slides of the same windows.
-    tempering_exponent
-        How fast evidence grows.
-
-    Returns
-    -------
-    (StoppingRule, NoveltyDetector or None, ConfidenceFloor)
     """
     decisions = recipe.training
     found = None

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import dataclasses
 
@@ -102,5 +103,5 @@ def test_wrong_and_known_is_counted_once_decided_and_at_the_end() -> None:
     never_decided = slide('a', 'aabb')  # known and wrong at its end, but never decided
     strange = slide('a', 'bbbb', decided_from=0, known=False)
     results = [right, soon_wrong, late_wrong, never_decided, strange]
-    assert metrics.wrong_known(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(2 / 5)}
+    assert metrics.accepted_wrong(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(2 / 5)}
     assert metrics.unknown(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(1 / 5)}

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Charts that explain themselves: what is shown stands in the title, units on the axes, colours safe for all eyes."""
 
@@ -34,13 +35,7 @@ MANY = 25  # more labels than this: no numbers in the cells
 
 
 def refuse_chart_format(path: str | Path) -> None:
-    """Refuse a chart whose file has an ending other than those of `CHART_FORMATS`.
-
-    Raises
-    ------
-    InvalidParameter
-        With what is allowed.
-    """
+    """Refuse a chart whose file has an ending other than those of `CHART_FORMATS`."""
     if Path(path).suffix.lower() not in CHART_FORMATS:
         raise InvalidParameter(f"the chart is '{path}'; a file that ends in .png, .svg or .pdf is needed")
 
@@ -59,22 +54,6 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '', points: 
     """Give an empty figure, with a title over all its panels if wanted, and save it at the end.
 
     No display is needed and no global state is touched.
-
-    Parameters
-    ----------
-    path
-        File that is written; its ending says the format.
-    size
-        Width and height, inches.
-    title
-        Above all panels; '' for none.
-    points
-        Size of the text; 11 is read well on a page that shows a picture of 8 inches at 800 pixels.
-
-    Yields
-    ------
-    Figure
-        To be drawn into.
     """
     # Not pyplot, which would keep every figure and ask for a display.
     with mpl.rc_context({**STYLE, 'font.size': points, 'axes.titlesize': points + 1.0}):
@@ -95,17 +74,7 @@ def line_styles() -> Iterator[dict[str, Any]]:
 
 
 def draw_confusion(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
-    """Draw a confusion table into a panel; each row adds up to 100 %.
-
-    Parameters
-    ----------
-    axes
-        Panel of matplotlib.
-    labels
-        Name of each row and column.
-    table : (n, n)
-        Counts, true surfaces in the rows.
-    """
+    """Draw a confusion table into a panel; each row adds up to 100 %."""
     totals = np.maximum(table.sum(axis=1, keepdims=True), 1)
     percent = 100 * table / totals
     image = axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)

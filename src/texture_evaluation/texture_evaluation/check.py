@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Check a finger by a slide over one reference plate: store, compare, correct; adapt a model to a day."""
 
@@ -32,13 +33,7 @@ UNMEASURED = 'noise and drift were not measured, for too little was recorded bef
 
 
 def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
-    """Return what a slide over the reference plate shows of each input.
-
-    Raises
-    ------
-    InvalidData
-        If an input is missing or lost samples, or the slide proves nothing.
-    """
+    """Return what a slide over the reference plate shows of each input."""
     found = {}
     for topic in topics:
         samples = SlideSamples.of(slide, topic)
@@ -66,29 +61,7 @@ def store_reference(
     slides: Sequence[LabelledSlide],
     request: ExplorationRequest | None = None,
 ) -> str:
-    """Store the last slide over the plate as that of the finger of the training, once the one before shows the same.
-
-    Parameters
-    ----------
-    model
-        Path of the model, beside which the reference will lie.
-    topics
-        Inputs of the model.
-    slides
-        Over the reference plate, two or more.
-    request
-        By which they were made; it is stored with the reference. None takes what the last one shows.
-
-    Returns
-    -------
-    str
-        What was stored, in a sentence.
-
-    Raises
-    ------
-    InvalidData
-        If there is one slide only, a slide proves nothing, or the two differ by more than `check_finger` allows.
-    """
+    """Store the last slide over the plate as that of the finger of the training, once the one before shows the same."""
     if len(slides) < 2:
         raise InvalidData('one slide over the plate does not prove itself; record two, and store again')
     before, last = (statistics_of(slide, topics) for slide in slides[-2:])
@@ -110,26 +83,7 @@ def check_finger(
     *,
     correct: bool = False,
 ) -> tuple[bool, str]:
-    """Compare the finger with the one of the training by a slide over the plate; return whether it is, and a sentence.
-
-    Parameters
-    ----------
-    model
-        Path of the model, beside which the correction lies.
-    topics
-        Inputs of the model.
-    reference
-        What the finger of the training showed, by topic.
-    slide
-        Over the reference plate.
-    correct
-        Write the correction, or remove one that is needed no more.
-
-    Raises
-    ------
-    InvalidData
-        If the sensor is another, or the slide proves nothing.
-    """
+    """Compare the finger with that of the training by a slide over the plate; return whether it is, and a sentence."""
     today = statistics_of(slide, topics)
     if missing := sorted(set(today) - set(reference)):
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
@@ -180,17 +134,7 @@ def _numbers(found: Mapping[str, InputComparison]) -> str:
 
 
 def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequence[str | Path]) -> tuple[Path, str]:
-    """Save MODEL-today, adapted by the labelled slides of today; return its path, and in a sentence what it is.
-
-    Parameters
-    ----------
-    model
-        Path of the model.
-    bags
-        Bags that it was trained on, of several days.
-    today
-        Bags of today, with one or more labelled slides of each surface.
-    """
+    """Save MODEL-today, adapted by the labelled slides of today; return its path, and in a sentence what it is."""
     trained = load_model(model)
     features = trained.recipe.feature_set
     shots = SlideDataset.from_bags(today, topics=features.topics)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Collect slides of a surface at many places: where to touch next, how well left-out places are told, when to end."""
 
@@ -84,19 +85,7 @@ USUAL = {('force_low_n', 'force_high_n'): (1.0, 2.0, 'N'), ('speed_low_m_s', 'sp
 
 
 def fitted_range(params: CollectionParams, names: tuple[str, str], allowed: tuple[float, float]) -> tuple[float, float]:
-    """Return the lowest and highest force or speed; what was not asked for is fitted into what the explorer allows.
-
-    Raises
-    ------
-    InvalidParameter
-        If a number was asked for that is not allowed.
-
-    Examples
-    --------
-    >>> forces = ('force_low_n', 'force_high_n')
-    >>> fitted_range(CollectionParams(), forces, (0.1, 6.0)), fitted_range(CollectionParams(), forces, (3.0, 8.0))
-    ((1.0, 2.0), (3.0, 6.0))
-    """
+    """Return the lowest and highest force or speed; what was not asked for is fitted into what the explorer allows."""
     usual_low, span, unit = USUAL[names]
     (least, most), (low, high) = allowed, (getattr(params, name) for name in names)
     for name, asked in zip(names, (low, high), strict=True):
@@ -116,22 +105,7 @@ PLASTIC = 0.7548776662466927  # the same for a second sequence beside it (Robert
 
 
 class PlacePlan:
-    """Choose touches one by one, each far from those before; speeds and forces fill their ranges evenly.
-
-    Raises
-    ------
-    InvalidData
-        If no slide of this length lies on the patch.
-    InvalidParameter
-        If a force or a speed is asked for that is not allowed, or a slide would be too short to recognise it.
-
-    Examples
-    --------
-    >>> plan = PlacePlan('oak', CollectionParams(), Patch(0.0, 0.1, 0.0, 0.1))
-    >>> first, second = plan.next(), plan.next()
-    >>> first.use_start, math.dist((first.start_x_m, first.start_y_m), (second.start_x_m, second.start_y_m)) > 0.03
-    (True, True)
-    """
+    """Choose touches one by one, each far from those before; speeds and forces fill their ranges evenly."""
 
     def __init__(
         self,
@@ -211,17 +185,7 @@ CONFIDENCE = 0.9
 
 @dataclass(frozen=True)
 class PlaceAccuracy:
-    """What a quick classifier says of places that it was not trained at.
-
-    Parameters
-    ----------
-    places, right
-        Places that were left out in turn, and those of them of which most windows were told right.
-    confused
-        The surface taken for it most often, '' if none.
-    others
-        Number of other surfaces.
-    """
+    """What a quick classifier says of places that it was not trained at."""
 
     places: int
     right: int
@@ -248,15 +212,7 @@ class PlaceAccuracy:
 
 
 def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
-    """Return how a discriminant tells the places of a surface, each left out in turn, from all other surfaces.
-
-    Parameters
-    ----------
-    features
-        Windows of all slides of the folder, with their places; a slide without a place counts as one.
-    surface
-        The one that is collected.
-    """
+    """Return how a discriminant tells the places of a surface, each left out in turn, from all other surfaces."""
     own = features.labels == surface
     made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
     places = np.array([made[name].place or name for name in features.groups.tolist()])
@@ -303,17 +259,6 @@ def collect(
     """Touch place after place until the bound is met, the places are used up, or it cannot or shall not go on.
 
     Ctrl-C, a recorder that ends and recordings that cannot be read are such ends, too: the slides so far count.
-
-    Parameters
-    ----------
-    plan, params
-        Where to touch, and when to end.
-    explore
-        Makes one slide; returns why it is no success, and a sentence.
-    evaluate_all
-        Judges what has been recorded so far, given the number of slides.
-    tell
-        Called with a sentence and the number of slides after each accuracy and each failure.
     """
     slides, failures, accuracy = 0, 0, PlaceAccuracy(0, 0)
 
@@ -356,13 +301,7 @@ def collect(
 
 
 def next_bag(existing: Sequence[str], surface: str) -> str:
-    """Return the name of the next bag of a surface: 'oak', 'oak-2', 'oak-3' and so on.
-
-    Examples
-    --------
-    >>> next_bag(['oak', 'felt'], 'oak')
-    'oak-2'
-    """
+    """Return the name of the next bag of a surface: 'oak', 'oak-2', 'oak-3' and so on."""
     number = 1
     while (name := surface if number == 1 else f'{surface}-{number}') in existing:
         number += 1

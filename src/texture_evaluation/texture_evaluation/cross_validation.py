@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Cross-validate recipes on a data set: splits by slide and condition, figures, comparison."""
 
@@ -60,18 +61,7 @@ def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
 
 @contextmanager
 def dask_backend(address: str) -> Iterator[None]:
-    """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block.
-
-    Parameters
-    ----------
-    address
-        Address of its scheduler, such as 'tcp://192.168.1.5:8786'.
-
-    Raises
-    ------
-    InvalidParameter
-        If no scheduler answers there, it has no worker, or one of them lacks the suite or has another version.
-    """
+    """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block."""
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
 
     try:
@@ -112,26 +102,13 @@ RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
 
 def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are.
-
-    Parameters
-    ----------
-    results
-        Of the test slides.
-    clusters : (n_slides,)
-        As in `interval`.
-
-    Returns
-    -------
-    dict
-        A share is None where no slide is long enough, and so is its interval.
-    """
+    """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are."""
     of_clusters = np.arange(len(results)).astype(str) if clusters is None else np.array(clusters, dtype=str)
     counts = {
         'window_accuracy': window_counts(results),
         'slide_accuracy': slide_counts(results),
-        'known_right': _counted([one.end.known and one.end.label == one.surface for one in results]),
-        'known_wrong': _counted([one.end.known and one.end.label != one.surface for one in results]),
+        'accepted_correct': _counted([one.end.known and one.end.label == one.surface for one in results]),
+        'accepted_wrong': _counted([one.end.known and one.end.label != one.surface for one in results]),
     }
     at_s, intervals_at_s, n_at_s = {}, {}, {}
     for seconds in metrics.TIMES_S:
@@ -170,15 +147,6 @@ def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) ->
 
     Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
     the share of clusters, about 3/n wide.
-
-    Parameters
-    ----------
-    counts : (n_slides, 2)
-        Number of right answers and of all answers of each slide, see `window_counts` and `slide_counts`.
-    clusters : (n_slides,)
-        Name of the cluster of each slide, such as its surface and place; None: each slide is one.
-
-    Sources: Efron & Tibshirani 1993, chapter 13 (percentile interval); Clopper & Pearson 1934, at 0 and n of n.
     """
     counts = counts if clusters is None else clustered(counts, clusters)
     right, answers = counts.sum(axis=0)
@@ -189,15 +157,7 @@ def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) ->
 
 
 def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:
-    """Return right and all answers of each cluster, (n_clusters, 2), by the sorted names of the clusters.
-
-    Parameters
-    ----------
-    counts : (n_slides, 2)
-        Of each slide.
-    clusters : (n_slides,)
-        Name of the cluster of each slide.
-    """
+    """Return right and all answers of each cluster, (n_clusters, 2), by the sorted names of the clusters."""
     row = np.unique(clusters, return_inverse=True)[1]
     return np.stack([np.bincount(row, column) for column in counts.T], axis=1)
 
@@ -217,25 +177,13 @@ def _edges(drawn: Array) -> list[float]:
 
 
 def window_counts(results: Sequence[SlideResult]) -> Array:
-    """Return right and all windows of each slide, (n_slides, 2).
-
-    Returns
-    -------
-    (n_slides, 2)
-        Whole numbers.
-    """
+    """Return right and all windows of each slide, (n_slides, 2)."""
     counts = [(sum(label == one.surface for label in one.window_labels), len(one.window_labels)) for one in results]
     return np.array(counts, dtype=np.float64).reshape(-1, 2)
 
 
 def slide_counts(results: Sequence[SlideResult]) -> Array:
-    """Return whether each slide is right, and 1, (n_slides, 2).
-
-    Returns
-    -------
-    (n_slides, 2)
-        0 or 1, and 1.
-    """
+    """Return whether each slide is right, and 1, (n_slides, 2)."""
     return _counted([one.estimates[-1].label == one.surface for one in results])
 
 
@@ -247,24 +195,6 @@ class ChronologicalSplit:
     """One split per label in the order of time, with the interface of scikit-learn's splitters.
 
     Sensors wear and drift: slides that were recorded later are harder than slides drawn at random from the same hours.
-
-    Parameters
-    ----------
-    train_size
-        Fraction of the groups of each label that train, above 0 and below 1. At least one group of each label trains
-        and at least one tests.
-
-    Raises
-    ------
-    InvalidParameter
-        If `train_size` is not between 0 and 1.
-
-    Examples
-    --------
-    >>> labels = ['cork'] * 4 + ['felt'] * 4
-    >>> [(train, test)] = ChronologicalSplit(0.75).split(labels, labels)
-    >>> train.tolist(), test.tolist()
-    ([0, 1, 2, 4, 5, 6], [3, 7])
     """
 
     def __init__(self, train_size: float = 0.75) -> None:
@@ -282,13 +212,7 @@ class ChronologicalSplit:
         y: AnyArray,
         groups: AnyArray | None = None,
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield the rows that train and those that test; rows are in the order of time, those of a group stay together.
-
-        Raises
-        ------
-        InvalidData
-            If a label has a single group.
-        """
+        """Yield the rows that train and those that test, in the order of time; those of a group stay together."""
         labels = np.asarray(y)
         slides = np.arange(len(labels)) if groups is None else np.asarray(groups)
         tests = np.zeros(len(labels), dtype=bool)
@@ -320,21 +244,7 @@ BORDERS: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class FoldResult:
-    """What came out of one split.
-
-    Parameters
-    ----------
-    name
-        Number of the fold from 1, or the condition left out.
-    trained_on
-        Names of the training slides.
-    results
-        By the name of the test slide.
-    model
-        Trained on the training slides.
-    train_s
-        Processor time of the training, from features to the model, s.
-    """
+    """What came out of one split."""
 
     name: str
     trained_on: tuple[str, ...]
@@ -345,25 +255,7 @@ class FoldResult:
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """Results of all folds, and pooled over them.
-
-    Parameters
-    ----------
-    recipe
-        Name of the recipe.
-    labels
-        All surfaces of the data set.
-    folds
-        In their order.
-    unusable
-        Names of test slides without a whole window, which count nowhere.
-    border
-        Which border the test slides cross from those of the training, such as 'other place'.
-    clusters
-        Cluster of each slide, by its name: those of one are no independent draws. One that is missing is a cluster.
-    untested
-        How many slides of a surface train, but are not tested, as no slide of it would be in their training.
-    """
+    """Results of all folds, and pooled over them."""
 
     recipe: str
     labels: tuple[str, ...]
@@ -416,27 +308,7 @@ class CrossValidation:
 
 @dataclass(frozen=True)
 class PairedComparison:
-    """Two recipes on the same test slides.
-
-    Parameters
-    ----------
-    first, second
-        Names of the recipes.
-    n_slides, n_clusters
-        Number of slides that both were tested on, and of clusters of them, see `CrossValidation`.
-    only_first, only_second
-        Number of slides that the one alone recognises. A slide that is tested in several folds is recognised if it is
-        in more than half of them.
-    p_value
-        Probability of at least such a difference if both were equally good: exact sign test over clusters, two-sided,
-        which is the McNemar test where each slide is one.
-    p_value_adjusted
-        The same, adjusted for all comparisons that were made together (Holm).
-    slide_difference, window_difference
-        Second minus first share that is right.
-    slide_interval, window_interval
-        Their 95 % intervals by bootstrap over clusters.
-    """
+    """Two recipes on the same test slides."""
 
     first: str
     second: str
@@ -499,13 +371,6 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
 def compare_all(results: Sequence[CrossValidation]) -> list[PairedComparison]:
     """Compare each recipe with the first, the p values adjusted for their number.
 
-    Returns
-    -------
-    list of PairedComparison
-        In the order of the recipes.
-
-    Notes
-    -----
     Source: Holm 1979, "A simple sequentially rejective multiple test procedure".
     """
     compared = [compare(results[0], other) for other in results[1:]]
@@ -519,18 +384,7 @@ def compare_all(results: Sequence[CrossValidation]) -> list[PairedComparison]:
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
-    """Return the exact two-sided p value of the McNemar (sign) test, 1 if the two never differ.
-
-    Parameters
-    ----------
-    only_first, only_second
-        Number of cases that the one alone gets right.
-
-    Examples
-    --------
-    >>> round(mcnemar(1, 7), 4)
-    0.0703
-    """
+    """Return the exact two-sided p value of the McNemar (sign) test, 1 if the two never differ."""
     differing = only_first + only_second
     return float(binomtest(only_first, differing).pvalue) if differing else 1.0
 
@@ -619,38 +473,12 @@ class Splitter(Protocol):
     """Interface of scikit-learn's splitters."""
 
     def split(self, X: Any, y: Any, groups: Any) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield train and test rows.
-
-        Parameters
-        ----------
-        X : (n, ...)
-            One row for each slide; only their number matters.
-        y, groups : (n,)
-            Label and group of each row.
-
-        Yields
-        ------
-        ((n_train,), (n_test,))
-            Indices.
-        """
+        """Yield train and test rows."""
 
 
 @dataclass(frozen=True)
 class Split:
-    """A splitter by name.
-
-    Parameters
-    ----------
-    name
-        As the user writes it, such as 'leave-one-out:speed'.
-    splitter
-        Divides slides.
-    groups
-        What must not be on both sides: 'slide', a condition of `SlideDataset`, such as 'speed', or an array,
-        (n_slides,).
-    parts
-        Number of parts into which slides are cut first, for places; 1 leaves them whole.
-    """
+    """A splitter by name."""
 
     name: str
     splitter: Splitter
@@ -663,20 +491,7 @@ class Split:
 
 
 def parse_split(text: str, seed: int = 0) -> Split:
-    """Return what a text such as 'stratified:5', 'leave-one-out:speed', 'chronological:0.75' or 'random:20' names.
-
-    Parameters
-    ----------
-    text
-        Name of a split, and after a colon its number or condition.
-    seed
-        Seed of the splits that draw slides.
-
-    Raises
-    ------
-    InvalidParameter
-        With what is allowed.
-    """
+    """Return what a text such as 'stratified:5', 'leave-one-out:speed', 'chronological:0.75' or 'random:20' names."""
     name, _, argument = text.partition(':')
     if name not in SPLITS:
         raise InvalidParameter(f"the split is '{text}': {unknown_name(name, SPLITS, 'split')}; {ALLOWED}")
@@ -728,25 +543,6 @@ def split_slides(
 
     Where parts of one slide would be on both sides, a split becomes two, each of which trains on every other slide of
     a surface and tests on those between.
-
-    Parameters
-    ----------
-    dataset
-        The slides.
-    splitter
-        One of scikit-learn's, or a `ChronologicalSplit`.
-    groups
-        As in `cross_validate`.
-
-    Returns
-    -------
-    list of ((n_train,), (n_test,))
-        Indices of slides.
-
-    Raises
-    ------
-    InvalidData
-        If the slides cannot be split so.
     """
     labels, columns = dataset.labels, slide_groups(dataset, groups)
     if type(splitter).__name__.startswith('Stratified'):
@@ -783,20 +579,7 @@ Rows = NDArray[np.intp]
 
 
 def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -> list[tuple[Rows, Rows]]:
-    """Return splits that test no slide of a surface that they do not train: it could not be right.
-
-    Parameters
-    ----------
-    labels : (n_slides,)
-        Surface of each slide.
-    splits
-        As `split_slides` returns them. One that trains on a single surface is left to the training, which refuses it.
-
-    Raises
-    ------
-    InvalidData
-        With the surfaces, if no slide is left to test.
-    """
+    """Return splits that test no slide of a surface that they do not train: it could not be right."""
     if any(len(np.unique(labels[train])) < 2 for train, _ in splits):
         return list(splits)  # the training says it better: it names the fold
     possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
@@ -817,22 +600,7 @@ def _check_folds(labels: AnyArray, folds: int) -> None:
 
 
 def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
-    """Return the group of each slide.
-
-    Parameters
-    ----------
-    groups
-        'slide', the name of a condition, or one value for each slide.
-
-    Returns
-    -------
-    (n_slides,)
-
-    Raises
-    ------
-    InvalidData
-        If there are not as many values as slides.
-    """
+    """Return the group of each slide."""
     if isinstance(groups, str):
         wholes = np.array([slide.whole_name for slide in dataset])
         return wholes if groups == 'slide' else dataset.condition(groups)

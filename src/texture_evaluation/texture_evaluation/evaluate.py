@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Evaluate a model on labelled bags, slide by slide, as in live operation."""
 
@@ -33,27 +34,7 @@ from texture_recordings.dataset import LabelledSlide, SlideDataset, no_window
 
 @dataclass(frozen=True, eq=False)
 class EvaluationReport:
-    """How well a model recognises the surfaces in bags.
-
-    Parameters
-    ----------
-    labels
-        Surfaces that the model knows.
-    known, unknown
-        Results of the slides over these surfaces, and over others.
-    latency_us : (n_windows,)
-        Computing time of each window, from samples to estimate.
-    unusable
-        Names of slides without a usable window, which count nowhere.
-    tare_faults
-        Streams that are tared and should not be, or the other way round, in sentences.
-    border
-        Which border the slides cross from the training, as far as the names of the bags tell; '' if they do not.
-    trained_on
-        Names of the slides that were in the training.
-    clusters
-        Of the slides in `known`: those of one are no independent draws; None: each is one.
-    """
+    """How well a model recognises the surfaces in bags."""
 
     labels: tuple[str, ...]
     known: Sequence[SlideResult]
@@ -90,7 +71,7 @@ class EvaluationReport:
                 'windows': metrics.unclassified_windows(self.known) if self.known else None,
                 'at_s': metrics.unclassified_at_times(self.known),
             },
-            'wrong_known': metrics.wrong_known([*self.known, *self.unknown]),
+            'accepted_wrong': metrics.accepted_wrong([*self.known, *self.unknown]),
             'unknown': metrics.unknown([*self.known, *self.unknown]),
         }
 
@@ -122,22 +103,7 @@ def evaluate(model: TextureModel, bags: Iterable[str | Path], slides: str = '') 
 
 
 def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationReport:
-    """Return how a model does on labelled slides.
-
-    Parameters
-    ----------
-    model
-        Whose feature set cuts and describes the windows.
-    dataset
-        The slides; surfaces that were not in the training set are unknown ones.
-
-    Raises
-    ------
-    ModelMismatch
-        If inputs, rates or channels are not those that the model was trained on.
-    InvalidData
-        If no slide is usable.
-    """
+    """Return how a model does on labelled slides."""
     tested = {slide: _test(model, slide, events) for slide, events in dataset.windows(model.recipe.feature_set)}
     results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
     if not results:
@@ -240,8 +206,8 @@ def sentence(one: PairedComparison) -> str:
 COLUMNS = {
     'windows right': 'window_accuracy',
     'slides right': 'slide_accuracy',
-    'known and right': 'known_right',
-    'known and wrong': 'known_wrong',
+    'known and right': 'accepted_correct',
+    'known and wrong': 'accepted_wrong',
 }
 
 
@@ -292,7 +258,7 @@ def summary(report: EvaluationReport) -> list[str]:
         else 'as soon as decided: never decided',
         f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
-    wrong, unknown = figures['wrong_known'], figures['unknown']
+    wrong, unknown = figures['accepted_wrong'], figures['unknown']
     lines.append(
         f'known and wrong: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
         f'rejected: {percent(unknown["early"])}, {percent(unknown["final"])}'

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What is measured on the growing evidence of slides."""
 
@@ -17,21 +18,7 @@ TOLERANCE_S = 1e-6  # sums of hops are not exact
 
 @dataclass(frozen=True, eq=False)
 class SlideResult:
-    """What a model said during one slide.
-
-    Parameters
-    ----------
-    surface
-        The true label.
-    window_labels : (n_windows,)
-        What each window alone looks like, or each complete group of windows that vote together; '' if undecided.
-    estimates : (n_windows,)
-        The estimate after each window, from all evidence so far.
-    final
-        The estimate at the end of the slide; None takes the last one for it.
-    voters
-        Number of windows that vote together: a decision is made when that many more have come. 0: each window decides.
-    """
+    """What a model said during one slide."""
 
     surface: str
     window_labels: Sequence[str]
@@ -142,14 +129,8 @@ def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     return _share([result.end.known for result in results])
 
 
-def wrong_known(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the share of slides that ended as known with the wrong label, over any surfaces; None without slides.
-
-    Returns
-    -------
-    mapping
-        'early' counts the slides that ended at the first estimate that is decided and known, 'final' all at their end.
-    """
+def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return the share of slides that ended as known with the wrong label, over any surfaces; None without slides."""
     early = [e.known and e.decided and e.label != surface for surface, e in _early_ends(results)]
     final = [result.end.known and result.end.label != result.surface for result in results]
     return {'early': _share(early), 'final': _share(final)}
@@ -181,18 +162,6 @@ def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray
     """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels).
 
     Unclassified windows stand in no column.
-
-    Parameters
-    ----------
-    results
-        Slides with their estimates.
-    labels
-        Order of rows and columns.
-
-    Returns
-    -------
-    (n_labels, n_labels)
-        Whole numbers.
     """
     place = {label: index for index, label in enumerate(labels)}
     table = np.zeros((len(labels), len(labels)), dtype=int)
@@ -206,13 +175,6 @@ def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
     """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches.
 
     The times are those at which decisions are made: windows that vote together decide when their vote is complete.
-
-    Returns
-    -------
-    (n,)
-        Sliding time, s.
-    (n,)
-        Share recognised, 0 to 1.
     """
     shortest = min((result.estimates[-1].evidence_s for result in results), default=0.0)
     # Sums of hops differ in the last digits from slide to slide.

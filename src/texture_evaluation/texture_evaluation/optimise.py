@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Tune a recipe on labelled bags by a genetic search, and write what was found as recipe files."""
 
@@ -49,13 +50,6 @@ def optimise_pairs(
     """Search for each pair of surfaces by itself, then evaluate all pairs together.
 
     Arguments are those of `optimise`; each pair has its own checkpoint, named after it.
-
-    Returns
-    -------
-    Found
-        The search of each pair.
-    tuple of HalfScore
-        Learning and test accuracy of the most pairs won, over all surfaces, on each half.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
     to each pair of textures.
@@ -117,18 +111,6 @@ def joined_recipe(recipes: Mapping[tuple[str, ...], Recipe], base: Recipe) -> Re
 
     Each input of a pair's recipe becomes an input of the joined one, named 'signal#1' and so on; pairs with the same
     features share one.
-
-    Parameters
-    ----------
-    recipes
-        Recipe of each pair, by the two labels.
-    base
-        From which they were searched: gives windows, evidence rule and training, and decides pairs that are not listed.
-
-    Raises
-    ------
-    InvalidParameter
-        If the pairs differ in what all windows share: their length, the evidence rule or the training.
     """
     contents = {pair: recipe.as_mapping() for pair, recipe in recipes.items()}
     first_pair, first = next(iter(contents.items()))
@@ -172,21 +154,7 @@ NAMED = 10  # lines of more searches than this are not named
 
 
 def convergence_chart(searches: Mapping[str, Sequence[search.Generation]], title: str, path: str | Path) -> Path:
-    """Draw the fitness of the best individual over the generations, a line for each search.
-
-    Parameters
-    ----------
-    searches
-        Name of the search → its generations.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-    """
+    """Draw the fitness of the best individual over the generations, a line for each search."""
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
         for (name, history), style in zip(searches.items(), cycle(line_styles()), strict=False):
@@ -232,47 +200,7 @@ def optimise_from_bags(
     resume: bool = False,
     tell: Tell = lambda *_: None,
 ) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """Tune a recipe and write it as `out`, with checkpoint and chart beside it; within `workers`, on several cores.
-
-    Parameters
-    ----------
-    recipe
-        Name of a shipped recipe, or path of any; of a roughness recipe if there are `grades`.
-    bags
-        Bags, or folders of bags.
-    params
-        Population, generations and so on.
-    out
-        Path of the recipe that is written, such as 'best.yaml'.
-    search_space
-        Name or path of the search space; '' for that of the recipe or its learner.
-    slides
-        Which slides of each surface, such as '1-30'; '' for all.
-    grades
-        CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
-    per_pair
-        Tune the variables of each pair of surfaces by themselves; one recipe joins them.
-    resume
-        Go on from the checkpoint beside `out`.
-    tell
-        Called after each generation with the pair of surfaces ('' for all) and what it brought.
-
-    Returns
-    -------
-    tuple of Path
-        The files.
-    tuple of str
-        What was found, in lines for people.
-
-    Raises
-    ------
-    TextureError
-        With one sentence, if recipe, bags, search space or checkpoint are wrong.
-    InvalidParameter
-        If the folder of `out` does not exist.
-    InvalidData
-        If there is no checkpoint to go on from.
-    """
+    """Tune a recipe and write it as `out`, with checkpoint and chart beside it; within `workers`, on several cores."""
     target = Path(out).expanduser()
     if not target.parent.is_dir():
         raise InvalidParameter(f"there is no folder '{target.parent}' for '{target.name}'; name another place")
@@ -336,31 +264,6 @@ def write_recipes(
     """Write the best recipe; of pairs, theirs and the one that joins them.
 
     Where a recipe comes from and its scores stand at the top of its file.
-
-    Parameters
-    ----------
-    found
-        What was found.
-    together
-        Scores of all pairs together; () of a search that is not by pairs.
-    base
-        Recipe from which the search began.
-    params
-        Parameters of the search.
-    target
-        Path of the recipe.
-
-    Returns
-    -------
-    tuple of Path
-        The files, with the checkpoint of a search that has one.
-    tuple of str
-        What was found, in lines for people.
-
-    Raises
-    ------
-    InvalidParameter
-        If a file cannot be written.
     """
     origin = (
         f'Found by `texture optimise {base.name}`: {params.population} individuals, {params.generations} '

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Human panels: agreement between people, and with a model."""
 
@@ -28,23 +29,7 @@ COLUMNS = ('rater', 'texture', 'grade')
 
 @dataclass(frozen=True, eq=False)
 class Ratings:
-    """What each person says of each texture.
-
-    Parameters
-    ----------
-    raters, textures
-        Names, in the order of their first appearance.
-    grades : (n_raters, n_textures)
-        1 to 5; NaN where a person did not grade a texture.
-    note
-        How the grades were made from what was read; '' if they stood there.
-
-    Examples
-    --------
-    >>> ratings = Ratings(('anna', 'ben'), ('silk', 'jute'), np.array([[1.0, 4.0], [2.0, 5.0]]))
-    >>> ratings.means.tolist(), ratings.votes[0].tolist()
-    ([1.5, 4.5], [1, 1, 0, 0, 0])
-    """
+    """What each person says of each texture."""
 
     raters: tuple[str, ...]
     textures: tuple[str, ...]
@@ -68,22 +53,7 @@ class Ratings:
 
 
 def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH)) -> Ratings:
-    """Read a CSV file with a line for each rating: columns `rater`, `texture` and `grade` (or `rating`).
-
-    Parameters
-    ----------
-    path
-        Of the file; other columns are left alone, and an empty grade means that there is none.
-    scale
-        Smoothest and roughest rating allowed; mapped linearly to 1 and 5.
-
-    Raises
-    ------
-    InvalidData
-        With the line, if the file cannot be read as such.
-    InvalidParameter
-        If the smooth end of the scale is not below the rough one.
-    """
+    """Read a CSV file with a line for each rating: columns `rater`, `texture` and `grade` (or `rating`)."""
     low, high = scale
     if not low < high:
         raise InvalidParameter(f'the scale goes from {low:g} to {high:g}; give the smooth end first, then a larger one')
@@ -121,11 +91,6 @@ def krippendorff_alpha(grades: Array) -> float:
     """Return Krippendorff's alpha for intervals of grades (n_raters, n_textures); NaN if all are the same.
 
     Source: Krippendorff 1980, chapter 12.
-
-    Parameters
-    ----------
-    grades : (n_raters, n_textures)
-        On an interval scale; NaN where a rater gave none.
     """
     # Squared differences of all pairs are twice the variance; a texture that one rater graded alone has no pair.
     compared = grades[:, (~np.isnan(grades)).sum(axis=0) > 1]
@@ -138,11 +103,6 @@ def krippendorff_alpha(grades: Array) -> float:
 
 def intraclass_correlation(table: Array) -> tuple[float, float]:
     """Return ICC(2,1) and ICC(2,k): how far one rater, and the mean of k, agrees with others of their kind.
-
-    Parameters
-    ----------
-    table : (n_targets, n_raters)
-        Targets with a NaN are left out; both are NaN if fewer than two are left, or for a single rater.
 
     Source: Shrout & Fleiss 1979, two-way random effects.
     """
@@ -165,13 +125,7 @@ def intraclass_correlation(table: Array) -> tuple[float, float]:
 
 
 def one_against_rest(grades: Array) -> tuple[float, float]:
-    """Return mean absolute difference and mean correlation of each person with the mean of the others.
-
-    Parameters
-    ----------
-    grades : (n_raters, n_textures)
-        NaN where missing. Both are NaN for a single rater.
-    """
+    """Return mean absolute difference and mean correlation of each person with the mean of the others."""
     errors, correlations = [], []
     for index, own in enumerate(grades):
         others = np.delete(grades, index, axis=0)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Train a model from labelled bags: one that recognises surfaces, or one that grades them as people did."""
 
@@ -67,25 +68,7 @@ def train_grades_from_bags(
     slides: str = '',
     out: str | Path | None = None,
 ) -> RoughnessModel:
-    """Return a roughness model trained on labelled slides, and save it; a TextureError says what is wrong.
-
-    Parameters
-    ----------
-    recipe
-        Name of a shipped roughness recipe, or path of any.
-    bags
-        Bags, or folders of bags.
-    grades
-        CSV file with the grade of every surface in the bags, or the name of a shipped table.
-    slides
-        Which slides of each surface, such as '1-30'; '' for all.
-    out
-        Path of the model, with or without .npz; not saved if None.
-
-    Returns
-    -------
-    RoughnessModel
-    """
+    """Return a roughness model trained on labelled slides, and save it; a TextureError says what is wrong."""
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
     examples = SlideDataset.from_bags(bags, slides, topics=windows.topics).features(windows)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A table to explore on: time, arm and surface stepped by hand, so that every run is the same."""
 

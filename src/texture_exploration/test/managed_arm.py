@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """An arm behind a controller manager, for an explorer in a process of its own: `arm:=managed_arm:ManagedArm`.
 

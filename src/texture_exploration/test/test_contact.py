@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What happens when the finger loses the surface: it is noticed, named, and nothing of it counts as sliding."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What befalls a robot in the middle of a slide: told in time and in words, and the next exploration works."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A force sensor that freezes, drifts or has the wrong sign: it is noticed soon, and the finger is lifted."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Hands: simulated, and of Dynamixel motors through the unmodified dynamixel-sdk on an emulated bus.
 

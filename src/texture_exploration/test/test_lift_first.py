@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """After a fault the finger is lifted until nothing touches it, on every arm, before a motion begins."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What takes and gives back the arm behind ROS controllers: processes that end, the guard, the controller manager."""
 

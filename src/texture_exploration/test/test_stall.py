@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A finger that does not move along the surface as commanded, and slides that are not what was asked for."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The UR arm through the unmodified ur-rtde, on the emulated controller: a process of its own on a loopback address.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Slide with a UR arm until killed: python ur_parent.py IP. Prints the number of the worker process once it slides."""
 

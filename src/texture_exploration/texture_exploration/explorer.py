@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Owner of the arm: runs explorations, one at a time, each in a thread of its own."""
 
@@ -126,20 +127,7 @@ NO_SLIDE_OBSERVED = (
 
 @dataclass(frozen=True)
 class ExplorationOutcome:
-    """How an exploration ended.
-
-    Attributes
-    ----------
-    error
-        Why it was not done as requested; NONE if it was.
-    message
-        What happened, in a sentence.
-    slid
-        Whether the finger slid, so that there are samples.
-    lifted
-        Whether the finger was lifted at the end, and the measured force says so; an arm with a fault can only be
-        stopped.
-    """
+    """How an exploration ended."""
 
     error: ExplorationError
     message: str
@@ -194,30 +182,7 @@ def no_signal_watch(_listening: Listening) -> str:
 
 
 class Exploration:
-    """Step a motion until it ends, whatever happens to the arm.
-
-    Parameters
-    ----------
-    exploration_id, request
-        What is explored; repeated in each state.
-    arm, motion, limits
-        Who moves, how, and what ends it at once.
-    clock
-        CLOCK_MONOTONIC in ns.
-    signal_fault
-        Returns in a sentence why the sensor delivers no samples, '' if it does; it is told since when the loop listens.
-    on_state
-        Called in the thread of `run` with each new phase and 50 times a second; stamps are of `clock`.
-
-    Attributes
-    ----------
-    ended : threading.Event
-        Set by whoever calls `run` when all is over, for those who wait.
-    outcome, state
-        How it ended, and the newest state.
-    gaps
-        How often a step came far too late, because the machine was busy.
-    """
+    """Step a motion until it ends, whatever happens to the arm."""
 
     def __init__(
         self,
@@ -416,24 +381,7 @@ class Exploration:
 
 
 def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Listening = WITHOUT_GAPS) -> str:
-    """Return in words why the arm would not follow a command, '' if it would.
-
-    Parameters
-    ----------
-    arm
-        Newest state of the arm.
-    now_ns
-        Time of the same clock, ns.
-    limits
-        Longest allowed silence of the arm.
-    listening
-        Since when the caller listens, and its newest gap.
-
-    Returns
-    -------
-    str
-        A sentence without a full stop, or ''.
-    """
+    """Return in words why the arm would not follow a command, '' if it would."""
     age_s = listening.silence_s(arm.time_ns, now_ns)
     if arm.fault:
         return f'the arm reports a fault: {arm.fault}'
@@ -473,26 +421,6 @@ def fit_surface(
 
     The origin is the middle of the touches, z the normal, x the direction `along` the surface as far as it lies in the
     plane.
-
-    Parameters
-    ----------
-    touches : (n, 3)
-        Places in the base frame, m; at least three.
-    normal : (3,)
-        Normal of the surface as it was known before, in the base frame.
-    along : (3,)
-        Direction of the x axis in the base frame.
-
-    Returns
-    -------
-    SurfaceFit
-        Pose of the surface in the base frame, and the distances that are left, m.
-
-    Raises
-    ------
-    InvalidData
-        If there are fewer than three touches, if they lie nearly in a line, if they are far from a plane, or if the
-        plane is turned by more than 15 degrees against `normal`.
     """
     points = np.array(touches, dtype=float)
     if len(points) < MAKE_A_PLANE:
@@ -548,22 +476,7 @@ class SurfaceTouches:
         return count
 
     def add(self, place: Sequence[float], normal: Sequence[float], along: Sequence[float]) -> SurfaceFit | None:
-        """Take a touch; return the plane, None if there are too few.
-
-        Parameters
-        ----------
-        place, normal, along : (3,)
-            See `fit_surface`; the normal at the first touch counts for all.
-
-        Returns
-        -------
-        SurfaceFit or None
-
-        Raises
-        ------
-        InvalidData
-            If it is next to another, or they make no plane; the newest touch is not kept.
-        """
+        """Take a touch; return the plane, None if there are too few."""
         newest = np.array(place, dtype=float)
         for number, other in enumerate(self._places, start=1):
             apart_m = float(np.linalg.norm(newest - other))

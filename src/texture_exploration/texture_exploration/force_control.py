@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Press with a wanted force by an arm that knows velocities alone.
 
@@ -46,11 +47,6 @@ class LagEstimate:
 
     From rest the arm is asked for a constant velocity v. After t it has been asked for W = v·t and, following a lag d
     late, has gone v·(t − d): so d = (W − gone) / v, whatever the shape of the start, once it has lasted longer than d.
-
-    Attributes
-    ----------
-    value_s : float
-        The lag; NaN until it is measured. It stays until the next start from rest has lasted long enough.
     """
 
     def __init__(self) -> None:
@@ -62,17 +58,7 @@ class LagEstimate:
         self._lags_s: list[float] = []
 
     def update(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
-        """Take what was measured now, and what is asked for from now on.
-
-        Parameters
-        ----------
-        height_m
-            Of the finger, as measured.
-        asked_m_s
-            Normal velocity.
-        dt_s
-            Time since the last call, in which the velocity of that call was asked for.
-        """
+        """Take what was measured now, and what is asked for from now on."""
         self._way_m += self._asked_m_s * dt_s
         self._constant_s += dt_s
         if self._asked_m_s == 0.0:
@@ -103,17 +89,7 @@ class LagEstimate:
 
 
 def fitted_lag_s(track: Array, samples: Array, noise_n: float) -> float:
-    """Return how much later than the height the force is, 0 if none explains it surely better: F(t) = a − k·z(t − lag).
-
-    Parameters
-    ----------
-    track : (n, 2)
-        Times and heights of the finger, s and m, from before the contact on.
-    samples : (m, 2)
-        Times and forces in contact, s and N.
-    noise_n
-        Standard deviation of the force, N.
-    """
+    """Return how much later than the height the force is, 0 if none explains it better: F(t) = a − k·z(t − lag)."""
     heights = np.interp(samples[:, :1] - LAGS_S, track[:, 0], track[:, 1])
     heights, forces = heights - heights.mean(axis=0), samples[:, 1] - samples[:, 1].mean()
     shared, spread = forces @ heights, (heights**2).sum(axis=0)
@@ -127,11 +103,6 @@ class ForceLag:
 
     Only measurements that are new count: on a busy machine the same one is seen in many periods, which is no force that
     stands.
-
-    Attributes
-    ----------
-    value_s : float
-        How long the force rose after the finger stood, s; NaN until that is known.
     """
 
     def __init__(self, noise_n: float) -> None:
@@ -143,15 +114,7 @@ class ForceLag:
         self._calm = 0  # samples since the force rose
 
     def update(self, time_ns: int, height_m: float, force_n: float) -> bool:
-        """Take a sample; return whether it is over: the force stands, or it never stopped to rise.
-
-        Parameters
-        ----------
-        time_ns
-            When it was measured; a sample that is not newer than the last changes nothing.
-        height_m, force_n
-            As measured, while zero velocity is asked for.
-        """
+        """Take a sample; return whether it is over: the force stands, or it never stopped to rise."""
         time_s = time_ns * 1e-9
         if self._samples and time_s <= self._samples[-1][0]:
             return False
@@ -204,11 +167,6 @@ class SlopeObserver:
 
     A parabola through the last heights over the way tells the slope where the finger will be when the answer comes
     into effect; times the speed that is commanded now, it is the rise then.
-
-    Parameters
-    ----------
-    ahead_s
-        From a height to the middle of the time in which the answer to it is in effect.
     """
 
     def __init__(self, ahead_s: float) -> None:
@@ -227,26 +185,7 @@ class SlopeObserver:
     def update(
         self, travelled_m: float, surface_m: float, speed_m_s: float, noise_m: float, doubt: float = 0.0
     ) -> float:
-        """Return how fast the surface will rise, m/s.
-
-        Parameters
-        ----------
-        travelled_m
-            That the finger has gone along the surface.
-        surface_m
-            Height of the untouched surface, z + F/k.
-        speed_m_s
-            Along the surface, as commanded.
-        noise_m
-            Of the height.
-        doubt
-            Noise as a share of the error that may come of it until the answer is in effect: beyond, less is answered.
-
-        Returns
-        -------
-        float
-            Positive if the surface rises ahead, m/s.
-        """
+        """Return how fast the surface will rise, m/s."""
         self._points.append((travelled_m, surface_m))
         if len(self._points) < MIN_POINTS:
             return 0.0
@@ -292,12 +231,7 @@ class LoopModel:
 
 
 def loop_matrix(loop: LoopModel) -> Array:
-    """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities.
-
-    Returns
-    -------
-    (m + 3, m + 3) or (m + 2, m + 2)
-    """
+    """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities."""
     share, whole = math.modf(round(loop.delay_s / loop.period_s, 9))
     waiting = int(whole) + 1
     matrix = np.zeros((2 + waiting, 2 + waiting))
@@ -351,13 +285,7 @@ TOUCHING_N = 0.03
 
 
 class StiffnessEstimate:
-    """Estimate how stiff a contact is, by the slope of force over height while the force rises: least squares.
-
-    Parameters
-    ----------
-    touching_n
-        A smaller force is none; it must exceed the noise of the force sensor.
-    """
+    """Estimate how stiff a contact is, by the slope of force over height while the force rises: least squares."""
 
     def __init__(self, touching_n: float = TOUCHING_N) -> None:
         self._touching_n = touching_n
@@ -476,22 +404,7 @@ class ForceLoopParams:
     )
 
     def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> LoopModel:
-        """Return the closed loop on a contact.
-
-        Parameters
-        ----------
-        stiffness_n_m
-            Stiffness of the contact, N/m.
-        period_s
-            Time between two commands.
-        gain_m_s_n
-            Gain of the controller, m/s per N.
-
-        Returns
-        -------
-        LoopModel
-            With the delay and the integral time of these parameters.
-        """
+        """Return the closed loop on a contact."""
         return LoopModel(stiffness_n_m, gain_m_s_n, self.loop_delay_s, period_s, self.integral_s)
 
     def default_gain(self, stiffness_n_m: float, period_s: float) -> float:
@@ -505,15 +418,7 @@ class ForceLoopParams:
 
 
 class ForceController:
-    """The PI part, with a limit of the speed and no windup at it.
-
-    Parameters
-    ----------
-    gain_m_s_n, integral_s
-        See the head of this file.
-    max_speed_m_s
-        Of the answer.
-    """
+    """The PI part, with a limit of the speed and no windup at it."""
 
     def __init__(self, gain_m_s_n: float, integral_s: float, max_speed_m_s: float = math.inf) -> None:
         self._gain_m_s_n = gain_m_s_n
@@ -541,22 +446,6 @@ class ForceController:
         """Return the normal velocity, positive away from the surface, for a force error, wanted less measured.
 
         Towards the surface it is at most `down_m_s`.
-
-        Parameters
-        ----------
-        error_n
-            Wanted less measured force, N; positive: press harder.
-        dt_s
-            Time since the last call.
-        feed_forward_m_s
-            Velocity with which the surface rises, m/s.
-        down_m_s
-            Largest speed towards the surface, m/s.
-
-        Returns
-        -------
-        float
-            Normal velocity, m/s, positive away from the surface.
         """
         added = self._sum_ns + error_n * dt_s
         wanted = feed_forward_m_s - self._gain_m_s_n * (error_n + added / self._integral_s)
@@ -577,15 +466,7 @@ class ContactState(NamedTuple):
 
 
 class ForceLoop:
-    """Come down, estimate the stiffness, press with the wanted force: the force mode of an arm that has none.
-
-    Parameters
-    ----------
-    params
-        The loop.
-    period_s
-        How often `velocity_m_s` is called.
-    """
+    """Come down, estimate the stiffness, press with the wanted force: the force mode of an arm that has none."""
 
     def __init__(self, params: ForceLoopParams, period_s: float) -> None:
         self._params = params
@@ -643,40 +524,13 @@ class ForceLoop:
         return max(LEAST_NOISE * supposed_n, self._noise_n) if math.isfinite(self._noise_n) else supposed_n
 
     def asked(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
-        """Take note of the velocity that was asked for in the end: it tells how late the arm follows.
-
-        Parameters
-        ----------
-        height_m
-            Height of the finger when the velocity was asked for, m.
-        asked_m_s
-            Normal velocity, m/s, positive away from the surface.
-        dt_s
-            Time since the last call.
-        """
+        """Take note of the velocity that was asked for in the end: it tells how late the arm follows."""
         self.lag.update(height_m, asked_m_s, dt_s)
         if self.stiffness.empty:  # a gain is not changed in contact
             self._adapt_to_lag()
 
     def velocity_m_s(self, wanted_n: float, contact: ContactState, speed_m_s: float, dt_s: float) -> float:
-        """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface.
-
-        Parameters
-        ----------
-        wanted_n
-            Wanted force, N, above 0.
-        contact
-            Height, force and travelled distance, as measured.
-        speed_m_s
-            Commanded speed along the surface, m/s.
-        dt_s
-            Time since the last call.
-
-        Returns
-        -------
-        float
-            Normal velocity, m/s, positive away from the surface.
-        """
+        """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
         height_m, force_n = contact.height_m, contact.force_n
         if force_n < self._params.touching_n:
             self.restart()

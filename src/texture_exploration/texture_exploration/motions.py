@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The motions by name: linear, circular, cross and surface slides, in-hand sliding, touches."""
 
@@ -164,15 +165,7 @@ def whole_strokes(stroke_m: float) -> StrokeEnds:
 
 
 def random_strokes(longest_m: float, rng: np.random.Generator) -> StrokeEnds:
-    """Return ends that are drawn at each turn: strokes of at least half of the longest, within 0 to `longest_m`.
-
-    Parameters
-    ----------
-    longest_m
-        Way that all strokes stay within.
-    rng
-        Draws the ends, equally distributed over what is allowed.
-    """
+    """Return ends that are drawn at each turn: strokes of at least half of the longest, within 0 to `longest_m`."""
     least_m = LEAST_SHARE * longest_m
 
     def end_of(forth: bool, begin_m: float) -> float:
@@ -188,19 +181,6 @@ class Strokes:
     A turn follows a cosine from full speed one way to full speed the other way, so the finger neither stops with a jolt
     nor rests. Arms follow late: when the finger is seen to move the other way, half of its own turn is still to come,
     and nothing is guaranteed until that is over.
-
-    Parameters
-    ----------
-    heading_rad
-        Direction of the first stroke.
-    ends
-        Where each stroke ends, as seen from where the first begins.
-    speed_m_s
-        Between the turns.
-    turn_s
-        How long a turn takes.
-    length_m
-        The way of all strokes together as if it had no turns: a turn counts as long as it takes.
     """
 
     def __init__(self, heading_rad: float, ends: StrokeEnds, speed_m_s: float, turn_s: float, length_m: float) -> None:
@@ -418,19 +398,6 @@ class CrossLegs:
 
     In the corner the speed stays and the direction follows a cosine, so the finger neither stops nor jolts. Nothing is
     guaranteed there, nor until the arm has become steady after it.
-
-    Parameters
-    ----------
-    heading_rad
-        Direction of the first leg; that of the second is a quarter turn anticlockwise from it.
-    leg_m
-        Length of each leg at constant speed.
-    speed_m_s
-        Along both.
-    corner_s
-        How long the corner takes.
-    arm_lag_s
-        How long the arm takes to follow a command.
     """
 
     def __init__(self, heading_rad: float, leg_m: float, speed_m_s: float, corner_s: float, arm_lag_s: float) -> None:

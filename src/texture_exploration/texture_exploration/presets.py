@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A preset: the motions of a paper or of your own, as a list of requests from one YAML file.
 
@@ -29,15 +30,7 @@ SHORTHANDS = ('direction_deg', 'slide_s')
 
 
 class Preset(NamedTuple):
-    """What a preset file says.
-
-    Parameters
-    ----------
-    requests
-        Each combination once.
-    repeats
-        How often each is to be made.
-    """
+    """What a preset file says."""
 
     name: str
     paper: str
@@ -50,13 +43,7 @@ class Preset(NamedTuple):
 
 
 def load_preset(name_or_path: str) -> Preset:
-    """Return a preset that the package ships (config/presets), or of a file.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        With the nearest name, or the place in the file and what is allowed there.
-    """
+    """Return a preset that the package ships (config/presets), or of a file."""
     path = find_file(name_or_path, 'texture_exploration', 'config/presets', 'preset')
     content = load_yaml(path, 'preset')
     if not isinstance(content, Mapping):
@@ -65,20 +52,7 @@ def load_preset(name_or_path: str) -> Preset:
 
 
 def read_preset(content: Mapping[str, Any], name: str) -> Preset:
-    """Return the preset in what a preset file holds; raises as `load_preset`.
-
-    Parameters
-    ----------
-    content
-        Content of the file.
-    name
-        Name of the preset, for the sentences of errors.
-
-    Raises
-    ------
-    InvalidParameter, UnknownName
-        If a key, the motion, or a number is not one that a preset may have.
-    """
+    """Return the preset in what a preset file holds; raises as `load_preset`."""
     where = f"preset '{name}'"
     vary = content.get('vary', {})
     if not isinstance(vary, Mapping):

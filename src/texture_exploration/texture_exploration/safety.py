@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What may be asked for, of an exploration and by a single command, and what ends it at once: all limits of force."""
 
@@ -28,19 +29,6 @@ class Listening:
 
     Only the newest gap is left out of a silence. If every gap were, a busy machine whose steps are late again and again
     would never notice that an arm or a sensor is silent.
-
-    Parameters
-    ----------
-    since_ns
-        When listening began, ns of CLOCK_MONOTONIC; what was silent before does not count.
-    gap_start_ns, gap_end_ns
-        Newest gap between two steps of the loop, ns of the same clock; both 0 if there was none.
-
-    Examples
-    --------
-    >>> listening = Listening(gap_start_ns=2_000_000_000, gap_end_ns=2_400_000_000)
-    >>> listening.silence_s(heard_ns=1_900_000_000, now_ns=2_500_000_000)  # 0.1 s before the gap, 0.1 s after it
-    0.2
     """
 
     since_ns: int = 0
@@ -48,20 +36,7 @@ class Listening:
     gap_end_ns: int = 0
 
     def silence_s(self, heard_ns: int, now_ns: int) -> float:
-        """Return for how long nothing was heard, s, without the part of it that lies in the newest gap.
-
-        Parameters
-        ----------
-        heard_ns
-            When something was heard last, ns of CLOCK_MONOTONIC.
-        now_ns
-            Time now, ns of the same clock.
-
-        Returns
-        -------
-        float
-            0 or less if something was heard just now.
-        """
+        """Return for how long nothing was heard, s, without the part of it that lies in the newest gap."""
         start_ns = max(heard_ns, self.since_ns)
         slept_ns = max(0, self.gap_end_ns - max(self.gap_start_ns, start_ns))
         return (now_ns - start_ns - slept_ns) * 1e-9
@@ -383,20 +358,7 @@ class CommandLimits:
     )
 
     def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:
-        """Return if the command may be carried out.
-
-        Parameters
-        ----------
-        command
-            What the arm was asked for.
-        stop
-            Called before the error is raised: brings the arm to a standstill, as the command before may still hold.
-
-        Raises
-        ------
-        CommandRefused
-            If a number is not finite or out of its range, with the range.
-        """
+        """Return if the command may be carried out."""
         reason = self._excess(command)
         if not reason:
             return
@@ -451,13 +413,7 @@ class SurfacePatch:
     )
 
     def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
-        """Return where an exploration begins: at `home`, or above its start at the same height.
-
-        Raises
-        ------
-        MotionRefused
-            If it has a start and no patch is taught, or the start is not on the patch, or outside the workspace.
-        """
+        """Return where an exploration begins: at `home`, or above its start at the same height."""
         if not request.use_start:
             return home
         if not (self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m):
@@ -522,15 +478,6 @@ class ForceWatch:
 
     The force in free air is compared before and after the slide: what differs is drift, and the true force of the slide
     was wrong by as much.
-
-    Parameters
-    ----------
-    limits
-        What counts as frozen, and how much drift is allowed.
-    reading
-        How the measured force of the arm behaves.
-    wanted_n
-        The force of the slide.
     """
 
     def __init__(self, limits: SafetyLimits, reading: ForceReading, wanted_n: float) -> None:
@@ -564,17 +511,7 @@ class ForceWatch:
         )
 
     def note(self, phase: Phase, arm: ArmState, command: ArmCommand) -> None:
-        """Take note of the force in free air, before the contact and after it.
-
-        Parameters
-        ----------
-        phase
-            Phase of the exploration; only approach and lift are of use.
-        arm
-            Newest state of the arm.
-        command
-            Last command of the arm.
-        """
+        """Take note of the force in free air, before the contact and after it."""
         if phase is Phase.APPROACH:
             self._note_free(arm, command)
         elif phase is Phase.LIFT:
@@ -636,16 +573,6 @@ class ForceGuard:
     As long as the arm has not zeroed its force sensor, only the change counts: since the start, or since the arm last
     stood still. The way back is that of the last commands: it needs neither the frame nor the sign of the force, nor
     those of the pose.
-
-    Parameters
-    ----------
-    limits
-        What is too much.
-
-    Attributes
-    ----------
-    blocked : str
-        In a sentence, that the force grew while the finger rose: it cannot be lifted.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -677,17 +604,7 @@ class ForceGuard:
         return excess if excess or phase is Phase.LIFT else self._limits.friction_violation(arm)
 
     def yielding(self, arm: ArmState, command: ArmCommand, aborted: bool) -> ArmCommand:
-        """Return the command; or, after an abort, the way back as long as the finger is held.
-
-        Parameters
-        ----------
-        arm
-            Newest state, from `relative`.
-        command
-            What the motion wants.
-        aborted
-            Whether the exploration is over but for the lift.
-        """
+        """Return the command; or, after an abort, the way back as long as the finger is held."""
         now_ns, size_n = arm.time_ns, arm.force_size_n
         held = bool(self._limits.force_violation(arm) or self._limits.friction_violation(arm))
         while self._way and now_ns - self._way[0][0] > WAY_S * 1e9:
@@ -760,24 +677,7 @@ class SignalWatchParams:
 
 
 class SignalWatch:
-    """Remember when each stream came last; `on_samples` and `signal_fault` may be called from different threads.
-
-    Parameters
-    ----------
-    timeout_s
-        The longest silence.
-    clock
-        CLOCK_MONOTONIC in ns.
-    topics
-        The streams, one for each finger.
-
-    Examples
-    --------
-    >>> watch = SignalWatch(0.5, lambda: 2_000_000_000, ('finger0/signal', 'finger1/signal'))
-    >>> watch.on_samples('finger0/signal')
-    >>> print(watch.signal_fault(Listening()).partition(';')[0])
-    no samples have come on 'finger1/signal' for 2000 ms
-    """
+    """Remember when each stream came last; `on_samples` and `signal_fault` may be called from different threads."""
 
     def __init__(self, timeout_s: float, clock: Callable[[], int], topics: Sequence[str] = ('signal',)) -> None:
         self._timeout_s = timeout_s

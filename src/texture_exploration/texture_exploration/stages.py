@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The stages of which motions are made: touch, press, slide, lift; each knows what to command and when it is over."""
 
@@ -135,20 +136,6 @@ def ramp_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float = math.i
     """Return how long `smooth` takes to a speed v within the limits.
 
     Over a time T its acceleration is highest in the middle, π·v / (2·T), its jerk at both ends, π²·v / (2·T²).
-
-    Parameters
-    ----------
-    speed_m_s
-        Speed to be reached from standstill.
-    acceleration_m_s2
-        Largest acceleration.
-    jerk_m_s3
-        Largest jerk.
-
-    Returns
-    -------
-    float
-        s, never below MIN_RAMP_S.
     """
     by_acceleration = 0.5 * math.pi * speed_m_s / acceleration_m_s2
     by_jerk = math.pi * math.sqrt(0.5 * speed_m_s / jerk_m_s3)
@@ -399,13 +386,6 @@ class ContactWatch:
     A force below `lost_force_fraction` of the wanted one counts as no contact. Gaps up to `lost_contact_s` are bounces,
     which a rough surface causes; a longer one is a lost surface. Time is that of the arm's states, so a pause of this
     machine is no loss.
-
-    Parameters
-    ----------
-    force_n
-        The wanted force.
-    touch
-        The limits.
     """
 
     def __init__(self, force_n: float, touch: TouchParams) -> None:
@@ -421,13 +401,7 @@ class ContactWatch:
         return self._lost_ns is None
 
     def update(self, arm: ArmState) -> None:
-        """Take a state of the arm.
-
-        Raises
-        ------
-        ContactLost
-            If the contact has been lost for longer than `lost_contact_s`.
-        """
+        """Take a state of the arm."""
         self._force_now_n = arm.force_n
         # Written so that NaN is no contact.
         if arm.force_n >= self._least_n:
@@ -440,13 +414,7 @@ class ContactWatch:
             self.refuse(lost_s)
 
     def refuse(self, lost_s: float = 0.0) -> None:
-        """Raise ContactLost in a sentence.
-
-        Raises
-        ------
-        ContactLost
-            Always.
-        """
+        """Raise ContactLost in a sentence."""
         since = f' for {lost_s * 1e3:.0f} ms' if lost_s else ''
         raise ContactLost(
             f'the contact with the surface was lost{since}: the force is {self._force_now_n:.2f} N of '
@@ -469,11 +437,6 @@ class StallWatch:
     Only the way in the commanded direction counts, so that noise of the position does not add up, and a finger that
     goes to and fro may turn. Time is that of the arm's states; after a pause of this machine the comparison starts
     again.
-
-    Parameters
-    ----------
-    touch
-        The limits.
     """
 
     def __init__(self, touch: TouchParams) -> None:
@@ -483,13 +446,7 @@ class StallWatch:
         self._place = (0.0, 0.0)
 
     def update(self, arm: ArmState, velocity_m_s: tuple[float, float]) -> None:
-        """Take a state of the arm, and the velocity that is commanded from now on.
-
-        Raises
-        ------
-        MotionAborted
-            If the finger has moved by less than `stall_speed_fraction` of the commanded way.
-        """
+        """Take a state of the arm, and the velocity that is commanded from now on."""
         x, y, _ = arm.position
         if not self._ways or arm.time_ns - self._ways[-1][0] > LONGEST_STEP_NS:
             self._ways.clear()
@@ -528,13 +485,6 @@ class SlideWatch:
 
     The speed is that from place to place, where the path asks for a constant one: not in turns. The tangential force
     counts where the arm measures it.
-
-    Parameters
-    ----------
-    speed_m_s, force_n
-        What was asked for.
-    touch
-        By how much mean and peak may differ.
     """
 
     def __init__(self, speed_m_s: float, force_n: float, touch: TouchParams) -> None:
@@ -551,20 +501,7 @@ class SlideWatch:
         self._peaks = [0.0, 0.0, 0.0]  # normal force, speed, tangential force
 
     def update(self, arm: ArmState, constant: bool) -> bool:
-        """Take a state; return whether what it shows is within what was asked for.
-
-        Parameters
-        ----------
-        arm
-            Newest state; one that was seen before changes nothing.
-        constant
-            Whether the path asks for a constant speed here.
-
-        Returns
-        -------
-        bool
-            Also True if there is too little to tell.
-        """
+        """Take a state; return whether what it shows is within what was asked for."""
         last_ns = self._recent[-1].time_ns if self._recent else 0
         self._states += 1
         self._force_sum_n += arm.force_n
@@ -663,17 +600,7 @@ STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed an
 
 
 class Stage:
-    """One part of a motion.
-
-    Parameters
-    ----------
-    phase
-        What the stage is to the outside.
-    timeout_s
-        The motion aborts when the stage takes longer.
-    goal
-        What is waited for, for the sentence about a timeout.
-    """
+    """One part of a motion."""
 
     def __init__(self, phase: Phase, timeout_s: float, goal: str) -> None:
         self.phase = phase
@@ -691,13 +618,7 @@ class Stage:
         return (time_ns - self._begin_ns) * 1e-9
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached.
-
-        Raises
-        ------
-        NotImplementedError
-            Always; each stage has its own.
-        """
+        """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached."""
         raise NotImplementedError
 
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
@@ -725,13 +646,7 @@ class GoHomeStage(Stage):
         self.timeout_s = self._base_timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Rise first; then speed up and slow down at half the allowed acceleration.
-
-        Raises
-        ------
-        MotionAborted
-            If the finger meets something on its way.
-        """
+        """Rise first; then speed up and slow down at half the allowed acceleration."""
         x, y, z = (goal - at for goal, at in zip(self._home, arm.position, strict=True))
         # A sensor that is zeroed as the arm moves off shows an offset before, and a finger that leaves the surface a
         # contact: what counts is the change from the smallest force.
@@ -766,13 +681,7 @@ class ApproachStage(Stage):
         self._start_m = arm.position[2]
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Go down, but no further than allowed.
-
-        Raises
-        ------
-        MotionAborted
-            If there is no surface within the allowed travel, or the force is not that of a surface.
-        """
+        """Go down, but no further than allowed."""
         if not arm.force_size_n <= self._touch.contact_force_n:
             self._check_normal(arm)
             return None
@@ -908,13 +817,7 @@ class SlideStage(Stage):
         self._finish = True
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Keep on sliding, and update the guaranteed time: 0 while the finger does not touch, or not as asked.
-
-        Raises
-        ------
-        MotionAborted
-            At the end, if the slide was not what was asked for.
-        """
+        """Keep on sliding, and update the guaranteed time: 0 while the finger does not touch, or not as asked."""
         self.along.follower.update(time_ns, arm)
         self.steady_s = 0.0
         self.along.contact.update(arm)
@@ -987,11 +890,6 @@ class LiftStage(Stage):
     The clearance counts from where the finger came free: a soft surface follows it for a while. A force that does not
     fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`. It goes no faster than it
     came down until the force has fallen: only that proves that up is up.
-
-    Attributes
-    ----------
-    free
-        Whether the newest force is that of a finger which touches nothing.
     """
 
     def __init__(self, home: Vector, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
@@ -1016,13 +914,7 @@ class LiftStage(Stage):
         self._lowest_m, self._proven = math.inf, False
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Go up.
-
-        Raises
-        ------
-        MotionAborted
-            If the force grows while the finger rises.
-        """
+        """Go up."""
         self.see(arm)
         self._watch_rise(arm)
         if arm.force_n > self._touch.contact_force_n:
@@ -1090,11 +982,6 @@ class Rise(Stage):
 
     It begins with a probe of half a millimetre, slowly: the finger must follow in direction, and its force must not
     rise. Then it rises no faster than the finger comes down, and slower where the force shows a stiffer contact.
-
-    Attributes
-    ----------
-    free
-        Whether that is proven.
     """
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits, signed: bool = True) -> None:
@@ -1120,17 +1007,7 @@ class Rise(Stage):
         self._first, self._rest_ns = arm, time_ns
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Go up, but no further than a finger may come down to look for the surface.
-
-        Raises
-        ------
-        WrongWay
-            If the finger goes another way, or meets something.
-        WrongSign
-            If the force rises.
-        MotionAborted
-            If the finger does not follow, or the force is not steady within the allowed rise.
-        """
+        """Go up, but no further than a finger may come down to look for the surface."""
         if self._start_ns is None and not self._rests(time_ns, arm):
             return ArmCommand()
         self._check_way(time_ns, arm)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Copies of training windows under computed disturbances, so that a model knows what lies beside its training."""
 
@@ -32,11 +33,6 @@ class Augmentation:
     example: a gain adds a constant to the logarithm of a power or an amplitude, and slide jitter adds a random multiple
     of the deviation of a training slide from the mean of its class, which is noise with the covariance that slides of
     one class have among themselves.
-
-    Examples
-    --------
-    >>> Augmentation().copies, Augmentation(copies=8).speed_range  # off unless a recipe asks for copies
-    (0, 0.15)
     """
 
     copies: int = param(
@@ -91,24 +87,7 @@ RATIO_LIMIT = 40  # numerator and denominator of a speed ratio: the resampling f
 
 @dataclass(frozen=True, eq=False)
 class SlideWindows:
-    """Windows of one input over one slide.
-
-    Parameters
-    ----------
-    samples : (n_windows, n_samples, n_channels)
-    rate_hz
-        Sampling rate.
-    starts_s : (n_windows,)
-        Start of each window after that of the first.
-    vibration
-        Whether this is the vibration input; gain, loss of samples, clipping and the response of a finger act on it.
-
-    Examples
-    --------
-    >>> windows = SlideWindows(np.ones((4, 100, 2)), 1000.0, 0.1 * np.arange(4), vibration=True)
-    >>> amplify(windows, 3.0, np.random.default_rng(0)).mean().item(), windows.rms.tolist()
-    (3.0, [0.0, 0.0])
-    """
+    """Windows of one input over one slide."""
 
     samples: Array
     rate_hz: float
@@ -135,20 +114,6 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
     """Return the first `count` samples of each window as they are at a multiple of the speed.
 
     The windows must hold at least speed · count samples.
-
-    Parameters
-    ----------
-    windows
-        Windows of one input.
-    speed
-        Multiple of the speed at which they were recorded, > 0.
-    count
-        Number of samples of each window to return.
-
-    Returns
-    -------
-    (n_windows, count, n_channels)
-        Resampled and band-limited; the sampling rate stays.
     """
     longer = windows.samples
     ratio = Fraction(1.0 / speed).limit_denominator(RATIO_LIMIT)
@@ -233,22 +198,7 @@ def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generato
 
 
 def smooth_response(count: int, strength_db: float, rng: np.random.Generator) -> Array:
-    """Return a smooth random amplitude response over `count` frequencies from 0 to half the rate.
-
-    Parameters
-    ----------
-    count
-        Number of frequencies, the first at 0 Hz, the last at half the sampling rate.
-    strength_db
-        Standard deviation of the response, dB.
-    rng
-        Source of the response.
-
-    Returns
-    -------
-    (count,)
-        Factors of the amplitude, 1 for no change.
-    """
+    """Return a smooth random amplitude response over `count` frequencies from 0 to half the rate."""
     frequencies = np.linspace(0.0, 1.0, count)
     terms = np.cos(np.pi * np.arange(CURVE_TERMS)[:, None] * frequencies)
     curve = rng.standard_normal(CURVE_TERMS) @ terms / math.sqrt(3.0)  # standard deviation about 1
@@ -282,24 +232,7 @@ Copy = tuple[NDArray[np.float32], str, int, str]  # values (n_windows, n_feature
 
 
 class Augmenter:
-    """Collect the copies of slides, one slide after the other.
-
-    Parameters
-    ----------
-    feature_set
-        Features, and how the windows are cut for training.
-    augmentation
-        What is changed, and how much.
-    seed
-        Of the random changes.
-
-    Examples
-    --------
-    >>> augmenter = Augmenter(FeatureSet.load('fast'), Augmentation(copies=2))
-    >>> augmenter.add('slide', [], lambda params: [])  # a slide without a window has no copies
-    >>> augmenter.result() is None
-    True
-    """
+    """Collect the copies of slides, one slide after the other."""
 
     def __init__(self, feature_set: FeatureSet, augmentation: Augmentation, seed: int = 0) -> None:
         self._features = feature_set
@@ -311,17 +244,7 @@ class Augmenter:
         self._responses: list[Array] = []
 
     def add(self, name: str, events: Sequence[WindowEvent], cut: Cut) -> None:
-        """Add the copies of a slide.
-
-        Parameters
-        ----------
-        name
-            Of the slide, as in the labelled features.
-        events
-            Its windows as the feature set cuts them.
-        cut
-            Returns the windows of the slide for another length.
-        """
+        """Add the copies of a slide."""
         rng = np.random.default_rng([self._seed, self._slides])
         self._slides += 1
         windows = [event for event in events if isinstance(event, CutWindow)]

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Compare a finger with the one of the training by a slide over a reference plate, and correct for the difference."""
 
@@ -32,25 +33,7 @@ FLOOR = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class InputStatistics:
-    """Statistics of one input over a slide on the reference plate and over the rest before its touch.
-
-    Parameters
-    ----------
-    sensor, rate_hz, channels
-        Of the stream.
-    log_power : (n_bands, n_channels)
-        Natural logarithm of the mean power density of the slide in bands of equal width from 0 to half the rate.
-    rms, rest_rms, rest_level : (n_channels,)
-        Standard deviation while sliding, and at rest in free air, and the mean at rest; NaN where no rest was recorded.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> rest, slide = 0.1 * rng.standard_normal((500, 1)), rng.standard_normal((4000, 1))
-    >>> found = InputStatistics.of(slide, rest, 1000.0, ('pac',), 'biotac')
-    >>> bool(abs(found.rms[0] - 1.0) < 0.05), found.log_power.shape
-    (True, (48, 1))
-    """
+    """Statistics of one input over a slide on the reference plate and over the rest before its touch."""
 
     sensor: str
     rate_hz: float
@@ -62,13 +45,7 @@ class InputStatistics:
 
     @classmethod
     def of(cls, samples: Array, rest: Array, rate_hz: float, channels: Sequence[str], sensor: str) -> InputStatistics:
-        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty.
-
-        Raises
-        ------
-        InvalidData
-            If the slide is too short, the sensor is saturated, or the plate hardly shows in the signal.
-        """
+        """Measure them on samples while sliding, (n, n_channels), and at rest, (m, n_channels) or empty."""
         length = round(SEGMENT_S * rate_hz)
         if len(samples) < MIN_SEGMENTS * length:
             raise InvalidData(
@@ -139,21 +116,7 @@ DB = 10.0 / math.log(10.0)
 
 @dataclass(frozen=True, eq=False)
 class InputComparison:
-    """How one input differs from the reference.
-
-    Parameters
-    ----------
-    gain_db : (n_channels,)
-        Mean over the bands of the difference of power, dB.
-    response_db : (n_bands, n_channels)
-        Smooth difference of power over frequency, with the gain, dB.
-    noise_ratio
-        Rms at rest over that of the reference, median over channels; NaN if unknown.
-    drift
-        Change of the level at rest over the rms of the reference slide, median over channels; NaN if unknown.
-    dead
-        Channels that hardly move any more.
-    """
+    """How one input differs from the reference."""
 
     frequencies_hz: Array
     gain_db: Array
@@ -224,23 +187,7 @@ def compare(reference: InputStatistics, today: InputStatistics) -> InputComparis
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """By topic, the frequency response that is taken out of the samples of each window; levels stay.
-
-    Parameters
-    ----------
-    frequencies_hz
-        (n,) by topic.
-    response_db
-        (n, n_channels) by topic.
-
-    Examples
-    --------
-    >>> twice = Correction({'signal': np.array([0.0, 500.0])}, {'signal': np.full((2, 1), 20 * np.log10(2.0))})
-    >>> waves = 5.0 + np.sin(np.arange(1000.0))[:, None]
-    >>> corrected = twice.apply('signal', WindowBatch(waves, rate_hz=1000.0)).samples
-    >>> bool(np.allclose(corrected - corrected.mean(), (waves - waves.mean()) / 2)), round(float(corrected.mean()), 1)
-    (True, 5.0)
-    """
+    """By topic, the frequency response that is taken out of the samples of each window; levels stay."""
 
     frequencies_hz: Mapping[str, Array]
     response_db: Mapping[str, Array]
@@ -303,13 +250,7 @@ def file_beside(model: str | Path, kind: str) -> Path:
 
 
 def read_correction(model: str | Path) -> Correction | None:
-    """Return the correction beside a model; None if there is none.
-
-    Raises
-    ------
-    ModelMismatch
-        If the file is damaged.
-    """
+    """Return the correction beside a model; None if there is none."""
     path = file_beside(model, CORRECTION)
     if not path.exists():
         return None
@@ -343,11 +284,6 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
     """Return what the finger of the training showed on the reference plate, by topic, and how it slid.
 
     The numbers are those of the request that repeats the slide; none if it was not straight.
-
-    Raises
-    ------
-    ModelMismatch
-        If no reference is stored, or the file is damaged.
     """
     path = file_beside(model, REFERENCE)
     if not path.exists():

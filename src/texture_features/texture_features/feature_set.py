@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A feature set, from the recipe that names it to feature vectors; labelled vectors and the conditions of slides."""
 
@@ -79,29 +80,7 @@ T = TypeVar('T')
 
 
 def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) -> tuple[str, T]:
-    """Return name and object of one entry of a recipe; `kind` is the noun for the error sentence.
-
-    Parameters
-    ----------
-    catalogue
-        What can be chosen, by name.
-    entry
-        'name', or {name: {parameter: value}}.
-    kind
-        Noun for the sentence of an error, such as 'feature'.
-    where
-        Where the entry stands, for the same sentence.
-
-    Returns
-    -------
-    str, object
-        Name of the entry and the object that was built.
-
-    Raises
-    ------
-    InvalidParameter, UnknownName
-        If the entry is not of that form, or the name or a parameter is unknown or out of range.
-    """
+    """Return name and object of one entry of a recipe; `kind` is the noun for the error sentence."""
     entry = {entry: {}} if isinstance(entry, str) else entry
     if not isinstance(entry, Mapping) or len(entry) != 1:
         raise InvalidParameter(
@@ -133,25 +112,6 @@ def read_recipe(
     """Return name and content of a recipe (YAML) that texture_estimation ships, or of any file.
 
     A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card beside it.
-
-    Parameters
-    ----------
-    name_or_path
-        Name of a shipped recipe, or path of a recipe (.yaml), a card (.json) or a model (.npz).
-    subfolder
-        Where texture_estimation keeps the shipped ones.
-    kind
-        Noun for the sentence of an error.
-
-    Returns
-    -------
-    str, mapping
-        Name of the file without its ending, and its content.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        If there is no such file or it holds no recipe; `kind` is the noun for the sentence.
     """
     path = find_file(name_or_path, 'texture_estimation', subfolder, kind)
     if path.suffix == '.npz':
@@ -181,14 +141,6 @@ class InputFeatures:
     One input may be described several times, with other features or parameters: what follows a '#' in its name
     distinguishes the descriptions ('signal', 'signal#2').
     An input with an axis, 'signal@x', is a topic while the finger slides along that axis.
-
-    Examples
-    --------
-    >>> item = InputFeatures('signal+signal_static', (('speed', temporal.Speed()),))
-    >>> item.window_names, item.as_mapping()
-    (('signal', 'signal_static'), {'features': [{'speed': {}}]})
-    >>> InputFeatures('signal#2', (('speed', temporal.Speed()),)).window_names
-    ('signal',)
     """
 
     topic: str
@@ -216,13 +168,7 @@ class InputFeatures:
 
 @dataclass(frozen=True)
 class InputOptions:
-    """What an input of a recipe may say besides its features.
-
-    Examples
-    --------
-    >>> InputOptions().stretch_to_m_s  # windows keep the speed at which they were measured
-    0.0
-    """
+    """What an input of a recipe may say besides its features."""
 
     stretch_to_m_s: float = param(
         0.0, 'Speed to which windows are resampled before feature extraction; 0: no resampling.', unit='m/s', low=0.0
@@ -511,13 +457,7 @@ PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
 
 
 def fingerprint_difference(came: str, trained: str) -> str:
-    """Return what differs, in words; '' if nothing does.
-
-    Parameters
-    ----------
-    came, trained
-        Such as '3f9c12ab signal=2200Hz*1': of the feature vectors, and of the model.
-    """
+    """Return what differs, in words; '' if nothing does."""
     if came == trained:
         return ''
     found, wanted = _inputs(came), _inputs(trained)
@@ -561,30 +501,7 @@ SignalLevel = tuple[str, float, float, float]
 
 @dataclass(frozen=True)
 class SlideConditions:
-    """The conditions of one exploration; unknown names are '', unknown numbers NaN.
-
-    Parameters
-    ----------
-    motion, sensor
-        Name of the exploratory motion, and of the sensor that measured.
-    speed_m_s, force_n
-        Means over the windows in which they are known.
-    directions_rad
-        Directions of travel of the windows, to a hundredth of a radian, each once.
-    speed_range_m_s, force_range_n
-        Lowest and highest mean over the first windows, however many: at the start of a slide speed and force settle.
-    levels
-        Of the channels whose moments are among the features.
-    session, place
-        Recording and part of the path of a slide from recordings: what a training may leave out to see how far it
-        reaches.
-
-    Examples
-    --------
-    >>> made = SlideConditions('linear_slide', speed_m_s=0.05)
-    >>> made.speed_m_s, math.isnan(made.force_n)
-    (0.05, True)
-    """
+    """The conditions of one exploration; unknown names are '', unknown numbers NaN."""
 
     motion: str = ''
     sensor: str = ''
@@ -599,16 +516,7 @@ class SlideConditions:
 
 
 class RunningConditions:
-    """The conditions of an exploration, window by window.
-
-    Examples
-    --------
-    >>> running = RunningConditions()
-    >>> for speed_m_s in (0.04, 0.06):
-    ...     running.update(FeatureVector(0, 'a', 0.5, 0.1, speed_m_s=speed_m_s, motion='linear_slide'))
-    >>> round(running.get().speed_m_s, 3), running.get().motion
-    (0.05, 'linear_slide')
-    """
+    """The conditions of an exploration, window by window."""
 
     def __init__(self) -> None:
         self.motion = self.sensor = ''
@@ -678,24 +586,7 @@ def _log_powers(names: Sequence[str]) -> list[tuple[str, int]]:
 
 @dataclass(frozen=True, eq=False)
 class FeatureCopies:
-    """Features of changed copies of slides, copy by copy and in the order of time.
-
-    Parameters
-    ----------
-    values : (n, n_features) float32
-    groups : (n,) of text
-        Slide (exploration id) of which each window is a copy.
-    copies : (n,)
-        Number of the copy of the slide.
-    kinds : (n,) of text
-        Kind of disturbance; in augmented copies NOISE if noise was added, else ''.
-
-    Examples
-    --------
-    >>> copies = FeatureCopies(np.zeros((2, 3), np.float32), np.array(['a', 'b']), np.arange(2), np.array(['', '']))
-    >>> copies.select(copies.groups == 'b').copies.tolist()
-    [1]
-    """
+    """Features of changed copies of slides, copy by copy and in the order of time."""
 
     values: NDArray[np.float32]
     groups: NDArray[np.str_]
@@ -703,37 +594,13 @@ class FeatureCopies:
     kinds: NDArray[np.str_]
 
     def select(self, rows: NDArray[np.bool_]) -> FeatureCopies:
-        """Return these windows, (n,).
-
-        Parameters
-        ----------
-        rows : (n,) bool
-            Which windows are kept.
-        """
+        """Return these windows, (n,)."""
         return FeatureCopies(self.values[rows], self.groups[rows], self.copies[rows], self.kinds[rows])
 
 
 @dataclass(frozen=True, eq=False)
 class AugmentedFeatures:
-    """What augmentation adds to labelled features.
-
-    Parameters
-    ----------
-    copies
-        To train on.
-    disturbed
-        To fit early stopping on.
-    gain_response : (n_features,)
-        Change of each feature per natural logarithm of the gain of the vibration: 2 for the logarithm of a power, 1 for
-        that of an amplitude, 0 for what no gain changes.
-
-    Examples
-    --------
-    >>> nothing = FeatureCopies(np.zeros((0, 1), np.float32), np.array(['']), np.arange(0), np.array(['']))
-    >>> features = AugmentedFeatures(nothing, nothing, gain_response=np.array([2.0]))  # of a logarithm of a power
-    >>> bool(np.isclose(np.log(3.0**2), features.gain_response[0] * np.log(3.0)))
-    True
-    """
+    """What augmentation adds to labelled features."""
 
     copies: FeatureCopies
     disturbed: FeatureCopies
@@ -746,45 +613,7 @@ class AugmentedFeatures:
 
 @dataclass(frozen=True, eq=False)
 class LabelledFeatures:
-    """Feature vectors with their labels, slide by slide and in the order of time.
-
-    Parameters
-    ----------
-    values : (n, n_features)
-    labels, groups : (n,) of text
-        Surface and slide (exploration id) of each window.
-    names
-        Name of each feature.
-    feature_set
-        Fingerprint of what made them.
-    window_s, hop_s
-        Length and distance of the windows.
-    motions
-        How slides were made, as far as it is known.
-    start_ns : (n,) int64 or None
-        Start of each window, ns; without it, the windows of a slide are taken to lie `hop_s` apart.
-    conditions
-        Motion, sensor, speed, force and directions of each slide, as far as its windows tell them.
-    augmented
-        Changed copies of the slides for training; copies of slides that are not among `groups` are ignored.
-    resized
-        Windows of other lengths, for training alone; those of slides that are not among `groups` are ignored.
-    touches
-        Features of the touch before the finger moved, (n_features,), by slide; slides not among `groups` are ignored.
-
-    Raises
-    ------
-    InvalidData
-        If the shapes contradict each other.
-
-    Examples
-    --------
-    >>> means = {'a': 1.0, 'b': 2.0}
-    >>> vectors = [FeatureVector(0, slide, 0.5, 0.1, ('mean',), np.array([mean])) for slide, mean in means.items()]
-    >>> features = LabelledFeatures.from_vectors(vectors, {'a': 'oak', 'b': 'felt'})
-    >>> features.X.tolist(), features.of_slides(['b']).y.tolist()
-    ([[1.0], [2.0]], ['felt'])
-    """
+    """Feature vectors with their labels, slide by slide and in the order of time."""
 
     values: Array
     labels: NDArray[np.str_]
@@ -819,13 +648,7 @@ class LabelledFeatures:
         return self.labels
 
     def take(self, rows: AnyArray) -> LabelledFeatures:
-        """Return the windows of a mask, (n,), or of indices.
-
-        Parameters
-        ----------
-        rows : (n,) bool, or (n_taken,) int
-            Which windows are taken, as a mask or by their indices.
-        """
+        """Return the windows of a mask, (n,), or of indices."""
         return replace(
             self,
             values=self.values[rows],
@@ -865,15 +688,7 @@ class LabelledFeatures:
 
     @classmethod
     def from_vectors(cls, vectors: Iterable[FeatureVector], surfaces: Mapping[str, str]) -> LabelledFeatures:
-        """Gather feature vectors; `surfaces` holds the label of each exploration id, those without one are left out.
-
-        Raises
-        ------
-        InvalidData
-            If no labelled window is left.
-        ModelMismatch
-            If the vectors are not all of one fingerprint.
-        """
+        """Gather feature vectors; `surfaces` holds the label of each exploration id, those without one are left out."""
         used = [vector for vector in vectors if not vector.last and surfaces.get(vector.exploration_id)]
         if not used:
             raise InvalidData('there is no window of a labelled surface; record slides with a surface named')

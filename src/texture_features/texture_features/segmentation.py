@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Find slides and their contact in a continuous recording."""
 
@@ -38,24 +39,6 @@ def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = S
 
     What changes over longer than `smooth_s` is no vibration, what is not finite has none, and a cell in which a channel
     stands at the end of its range is NaN.
-
-    Parameters
-    ----------
-    fast : (n_samples, n_channels)
-        Vibration.
-    rate_hz
-        Its sampling rate.
-    cell_s
-        Wanted length of a cell, s; it is rounded to whole samples.
-    smooth_s
-        Time over which a change counts as vibration, s.
-
-    Returns
-    -------
-    float
-        Length of a cell, s.
-    (n_cells, n_channels)
-        Mean square of the vibration, in the square of its unit; no cell for a very short recording.
     """
     width = max(1, round(cell_s * rate_hz))
     count = len(fast) // width
@@ -71,22 +54,7 @@ def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = S
 
 
 def highpass(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Samples:
-    """Return the samples without what changes over longer than `smooth_s`; 0 for what is not finite.
-
-    Parameters
-    ----------
-    fast : (n_samples, n_channels)
-        Vibration.
-    rate_hz
-        Its sampling rate.
-    smooth_s
-        Time over which a change counts as vibration, s.
-
-    Returns
-    -------
-    (n_samples, n_channels)
-        In the unit of the samples.
-    """
+    """Return the samples without what changes over longer than `smooth_s`; 0 for what is not finite."""
     vibration = median_centred(fast)
     smoothed = _smoothed(rate_hz, smooth_s)
     if len(fast) > smoothed:
@@ -96,18 +64,7 @@ def highpass(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Sampl
 
 
 def baseline_power(powers: Array) -> Array:
-    """Return the power of each channel at rest, (n_channels,), above 0, from the quietest tenth of the recording.
-
-    Parameters
-    ----------
-    powers : (n_cells, n_channels)
-        Power of the vibration in each cell; NaN where it is unknown.
-
-    Returns
-    -------
-    (n_channels,)
-        In the unit of `powers`.
-    """
+    """Return the power of each channel at rest, (n_channels,), above 0, from the quietest tenth of the recording."""
     known = np.isfinite(powers)
     share = uniform_filter1d(known.astype(float), SMOOTHED_CELLS, axis=0)
     smooth = uniform_filter1d(np.where(known, powers, 0.0), SMOOTHED_CELLS, axis=0) / np.maximum(share, 1e-3)
@@ -123,17 +80,7 @@ def _smoothed(rate_hz: float, smooth_s: float) -> int:
 
 
 def median_centred(fast: Samples) -> Samples:
-    """Return the samples about the median of each channel; 0 for what is not finite.
-
-    Parameters
-    ----------
-    fast : (n_samples, n_channels)
-
-    Returns
-    -------
-    (n_samples, n_channels)
-        In the unit of the samples.
-    """
+    """Return the samples about the median of each channel; 0 for what is not finite."""
     known = np.where(np.isfinite(fast), fast, np.nan)
     some = np.isfinite(known).any(axis=0)
     middle = np.nanmedian(np.where(some, known, 0.0), axis=0)
@@ -141,22 +88,7 @@ def median_centred(fast: Samples) -> Samples:
 
 
 def highpass_gain(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Array:
-    """Return the share of power at frequencies that is not taken for the smooth part.
-
-    Parameters
-    ----------
-    frequency_hz : (n,)
-        Frequencies from 0 to half the sampling rate.
-    rate_hz
-        Sampling rate.
-    smooth_s
-        Time over which a change counts as vibration, s.
-
-    Returns
-    -------
-    (n,)
-        Power behind the high-pass filter over that before it.
-    """
+    """Return the share of power at frequencies that is not taken for the smooth part."""
     grid_hz, passed = _highpass_response(rate_hz, smooth_s)
     return np.interp(frequency_hz, grid_hz, passed)
 
@@ -190,12 +122,6 @@ class ContactInterval:
     """One contact, s from the first sample: begins to be pressed, is pressed, is let go, is free.
 
     Times before the first and after the last sample are -inf and inf.
-
-    Examples
-    --------
-    >>> contact = ContactInterval(press_start_s=1.0, press_end_s=1.1, release_start_s=3.0, release_end_s=3.1)
-    >>> round(contact.release_start_s - contact.press_end_s, 1)  # pressed for
-    1.9
     """
 
     press_start_s: float
@@ -205,22 +131,7 @@ class ContactInterval:
 
 
 def find_contacts(levels: Samples, rate_hz: float, vibration: Array) -> list[ContactInterval]:
-    """Return the contacts in their order; none without a clear load.
-
-    Parameters
-    ----------
-    levels : (n_samples, n_channels)
-        Channels of which some follow the load, in whatever direction; what is not finite counts as no change.
-    rate_hz
-        Their sampling rate.
-    vibration : (n_samples,)
-        How much the finger vibrates at the same times: it tells which of the two levels is contact.
-
-    Returns
-    -------
-    list of ContactInterval
-        Times in s from the first sample.
-    """
+    """Return the contacts in their order; none without a clear load."""
     if len(levels) < 3:
         return []
     near = max(1, round(0.5 * CHANGE_S * rate_hz))
@@ -333,28 +244,7 @@ MIN_POWER = 0.01  # of the noise
 
 @dataclass(frozen=True)
 class OnsetModel:
-    """How a finger gains speed, and what its vibration channels make of it.
-
-    Parameters
-    ----------
-    rate_hz
-        Sampling rate.
-    rest : (n_channels,)
-        Power of each channel at rest.
-    ramp_s
-        Time in which the speed grows, in proportion to time.
-    quantity
-        One of `MEASURED_QUANTITIES`.
-    smooth_s
-        What changes over longer is no vibration.
-
-    Examples
-    --------
-    >>> model = OnsetModel(2000.0, np.ones(1), ramp_s=0.2, quantity='force', smooth_s=0.05)
-    >>> steady = np.random.default_rng(0).standard_normal((1000, 1))
-    >>> model.find(steady, np.zeros(1000, dtype=bool), steady, (0.0, 0.4))  # nothing is known: the middle of the range
-    0.2
-    """
+    """How a finger gains speed, and what its vibration channels make of it."""
 
     rate_hz: float
     rest: Array
@@ -367,22 +257,6 @@ class OnsetModel:
 
         All moments of the range, and all ways to grow, are equally likely beforehand; so the middle of the range is
         returned where nothing is known.
-
-        Parameters
-        ----------
-        around : (n_samples, n_channels)
-            Vibration around the onset.
-        known : (n_samples,)
-            Which samples count.
-        steady : (n_steady, n_channels)
-            Vibration at steady speed.
-        between_s
-            Range in which the onset is sought; it may begin before the first sample.
-
-        Returns
-        -------
-        float
-            Time of the onset, s from the first sample of `around`.
         """
         length = HOPS_PER_WINDOW * max(1, round(WINDOW_S * self.rate_hz / HOPS_PER_WINDOW))
         hop = length // HOPS_PER_WINDOW
@@ -495,14 +369,7 @@ NO_CONTACT = ContactInterval(-math.inf, -math.inf, math.inf, math.inf)
 
 @dataclass(frozen=True)
 class SegmentationParams:
-    """How sliding is found. None of it is fitted to recordings: the power of 50 ms of rest scatters by a fifth.
-
-    Examples
-    --------
-    >>> params = SegmentationParams()
-    >>> params.on > params.off  # hysteresis: sliding needs more power to begin than to go on
-    True
-    """
+    """How sliding is found. None of it is fitted to recordings: the power of 50 ms of rest scatters by a fifth."""
 
     on: float = param(
         6.0, 'Start threshold: power over baseline power above which sliding is detected.', low=1.0, high=1e6
@@ -544,17 +411,7 @@ class SegmentationParams:
 
 @dataclass(frozen=True)
 class SlidingInterval:
-    """One stretch of sliding, s from the first sample: when the finger sets off, and where its speed is steady.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> signal = 0.01 * rng.standard_normal((3000, 1))  # 3 s of noise at 1 kHz, and vibration from 1 s to 2 s
-    >>> signal[1000:2000] += rng.standard_normal((1000, 1))
-    >>> [interval] = find_sliding(signal, 1000.0, SegmentationParams(ramp_s=0.01, quantity='force'))
-    >>> abs(interval.start_s - 1.0) < 0.03, abs(interval.end_s - 2.0) < 0.03
-    (True, True)
-    """
+    """One stretch of sliding, s from the first sample: when the finger sets off, and where its speed is steady."""
 
     motion_start_s: float
     start_s: float
@@ -574,31 +431,6 @@ def find_sliding(
     """Return the stretches of sliding in a recording that holds some rest, in order.
 
     A surface that makes no more vibration than the sensor has noise is not found to slide.
-
-    Parameters
-    ----------
-    fast : (n_samples, n_channels)
-        Vibration; what is not finite counts as rest.
-    rate_hz
-        Its sampling rate.
-    slow : (n_slow_samples, n_slow_channels), optional
-        Pressure: tells the end to some milliseconds. Without it the levels of `fast` are looked at.
-    slow_rate_hz, slow_from_s
-        Its sampling rate, and when its first sample was taken after the first of `fast`.
-    rest : (n_channels,), optional
-        Power of each channel at rest, if it is known; see `baseline_power`.
-    params
-        How sliding is found.
-
-    Returns
-    -------
-    list of SlidingInterval
-        Times in s from the first sample of `fast`.
-
-    Raises
-    ------
-    InvalidData
-        If the shape or a rate makes no sense.
     """
     if fast.ndim != 2 or not rate_hz > 0 or (slow is not None and (slow.ndim != 2 or not slow_rate_hz > 0)):
         raise InvalidData(
@@ -646,24 +478,7 @@ def _mean(ratios: Array) -> Array:
 
 
 def channel_means(fast: Samples, rate_hz: float) -> tuple[Samples, float, float]:
-    """Return the means of 10 ms of vibration channels, their rate, and the time of the first.
-
-    Parameters
-    ----------
-    fast : (n_samples, n_channels)
-        Vibration; what is not finite is left out of the means.
-    rate_hz
-        Its sampling rate.
-
-    Returns
-    -------
-    (n_means, n_channels)
-        In the unit of the samples.
-    float
-        Rate of the means, Hz.
-    float
-        Time of the first mean after the first sample, s.
-    """
+    """Return the means of 10 ms of vibration channels, their rate, and the time of the first."""
     width = max(1, round(LEVEL_S * rate_hz))
     count = len(fast) // width
     known = np.isfinite(fast[: count * width])
@@ -678,22 +493,6 @@ def active_runs(
     """Return the stretches of cells, first and one past the last, in which the power stays above that of rest, 1.
 
     NaN for a cell in which a changing load knocks.
-
-    Parameters
-    ----------
-    power : (n_cells,)
-        Power of each cell over that at rest.
-    cell_s
-        Length of a cell, s.
-    contacts
-        When the finger is pressed on; there less power is enough.
-    params
-        Thresholds and durations.
-
-    Returns
-    -------
-    list of (int, int)
-        In order; none is shorter than `params.min_duration_s`.
     """
     known = np.isfinite(power)
     filled = np.where(known, power, 0.0)
@@ -820,30 +619,6 @@ def segment_recording(
     """Return the states of the slides in a recording, a `slide` and a `lift` each, found with all of it in view.
 
     The sensor's noise is estimated at rest, so let the finger rest at first, or give `noise_rms`.
-
-    Parameters
-    ----------
-    signals
-        The batches of `signal`, and of `signal_static` if there is one, in their order.
-    params
-        How sliding is found.
-    exploration_id
-        What the ids of the slides begin with.
-
-    Returns
-    -------
-    list of ExplorationState
-        In the order of time.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> samples = 0.01 * rng.standard_normal((3000, 1)).astype(np.float32)
-    >>> samples[1000:2000] += rng.standard_normal((1000, 1))  # vibration from 1 s to 2 s
-    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, samples)
-    >>> states = segment_recording({'signal': [batch]}, SegmentationParams(ramp_s=0.01, quantity='force'))
-    >>> [state.phase.value for state in states]
-    ['slide', 'lift']
     """
     states: list[ExplorationState] = []
     rest: Array = np.empty(0)

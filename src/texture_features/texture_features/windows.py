@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Windows of a signal while the finger slides, cut and in batches: buffers, axes, coverage, what a feature is."""
 
@@ -134,16 +135,6 @@ class Feature(Protocol):
     variable `joins` that is True; it has `per_channel` False. So has one of pairs of channels, which gives
     (..., n_pairs, n_names) in the order of itertools.combinations and says so by a class variable `per_pair` that is
     True.
-
-    Examples
-    --------
-    >>> class Range:  # the largest less the smallest sample of each channel
-    ...     per_channel, names = True, ('',)
-    ...
-    ...     def __call__(self, windows: WindowBatch) -> Array:
-    ...         return np.ptp(windows.rows, axis=-1)[..., None]
-    >>> Range()(WindowBatch(np.array([[1.0], [4.0]]), rate_hz=1000.0)).tolist()
-    [[3.0]]
     """
 
     per_channel: ClassVar[bool] = True  # whether there are values for each channel
@@ -154,93 +145,38 @@ class Feature(Protocol):
         return ('',)
 
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return the values; finite for finite samples.
-
-        Parameters
-        ----------
-        windows
-            Windows of one input.
-
-        Returns
-        -------
-        (..., n_channels, n_values)
-            Of each channel, or (..., 1, n_values) where there are none for each channel.
-        """
+        """Return the values; finite for finite samples."""
 
 
 def floor_param(added: str = 'Power', unit: str = 'unit²', default: float = 1e-20) -> Any:
-    """Return the parameter `floor` of a feature that is a logarithm.
-
-    Parameters
-    ----------
-    added, unit
-        What it is added to, and the unit of that.
-    default
-        Far below any value of a sensor that works.
-    """
+    """Return the parameter `floor` of a feature that is a logarithm."""
     sentence = f'{added} added before the logarithm, so that silence gives a finite value, {unit}.'
     return param(default, sentence, low=1e-300, high=1e300)
 
 
 def centred(rows: Array) -> Array:
-    """Return rows less their mean, (..., n_samples).
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-
-    Returns
-    -------
-    (..., n_samples)
-        In the unit of the rows.
-    """
+    """Return rows less their mean, (..., n_samples)."""
     # A product with equal shares is the fastest mean, and has the same rounding for one row as for many.
     return rows - (rows @ mean_weights(rows.shape[-1]))[..., None]
 
 
 @lru_cache(maxsize=64)
 def mean_weights(count: int) -> Array:
-    """Return 1 / count, `count` times: what a mean is a product with.
-
-    Returns
-    -------
-    (count,)
-        Read-only, because it is shared.
-    """
+    """Return 1 / count, `count` times: what a mean is a product with."""
     equal = np.full(count, 1.0 / count)
     equal.flags.writeable = False
     return equal
 
 
 def power(rows: Array) -> Array:
-    """Return the mean square of each row, (...).
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-
-    Returns
-    -------
-    (...)
-        In the square of the unit of the rows; the mean is not removed.
-    """
+    """Return the mean square of each row, (...)."""
     # A product of vectors for each row: no array of squares, and the same rounding for one row as for many.
     squares: Array = (rows[..., None, :] @ rows[..., :, None])[..., 0, 0]
     return squares / rows.shape[-1]
 
 
 def first_difference(rows: Array) -> Array:
-    """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-
-    Returns
-    -------
-    (..., max(1, n_samples - 1))
-        In the unit of the rows, per sample step.
-    """
+    """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample."""
     if rows.shape[-1] == 1:
         return np.zeros_like(rows)
     return rows[..., 1:] - rows[..., :-1]
@@ -256,18 +192,7 @@ MOST_WAITING = 100  # windows along one axis that wait for their partners: a lon
 
 
 def split_axis(name: str) -> tuple[str, str]:
-    """Return the topic of an input, and the axis along which the finger slides there; '' for any direction.
-
-    Raises
-    ------
-    InvalidParameter
-        If the axis is not x or y.
-
-    Examples
-    --------
-    >>> split_axis('signal@x'), split_axis('signal')
-    (('signal', 'x'), ('signal', ''))
-    """
+    """Return the topic of an input, and the axis along which the finger slides there; '' for any direction."""
     topic, separator, axis = name.partition(SEPARATOR)
     if separator and (axis not in AXES_RAD or not topic):
         raise InvalidParameter(
@@ -283,13 +208,7 @@ def topic_of(name: str) -> str:
 
 
 def axis_along(direction_rad: float) -> str:
-    """Return the axis to or against which a direction points within 30 degrees; '' if there is none.
-
-    Examples
-    --------
-    >>> axis_along(0.0), axis_along(-math.pi / 2), axis_along(math.pi / 4), axis_along(math.nan)
-    ('x', 'y', '', '')
-    """
+    """Return the axis to or against which a direction points within 30 degrees; '' if there is none."""
     for axis, angle in AXES_RAD.items():
         # Written so that NaN is along none.
         if math.isfinite(direction_rad) and abs(math.remainder(direction_rad - angle, math.pi)) <= WITHIN_RAD:
@@ -298,13 +217,7 @@ def axis_along(direction_rad: float) -> str:
 
 
 def check_axes(names: Iterable[str]) -> None:
-    """Refuse names of inputs that cannot be joined.
-
-    Raises
-    ------
-    InvalidParameter
-        If an axis is not x or y, or some inputs name an axis and others do not.
-    """
+    """Refuse names of inputs that cannot be joined."""
     names = tuple(names)
     axes = [split_axis(name)[1] for name in names]
     if any(axes) and not all(axes):
@@ -315,27 +228,7 @@ def check_axes(names: Iterable[str]) -> None:
 
 
 class AxisJoiner:
-    """Join the n-th window along x with the n-th along y of the same exploration, whichever comes first.
-
-    Parameters
-    ----------
-    names
-        Names of inputs, such as 'signal@x' and 'signal@y'.
-
-    Raises
-    ------
-    InvalidParameter
-        If some inputs name an axis and others do not.
-
-    Examples
-    --------
-    >>> samples = {'signal': Window(np.zeros((10, 1)), 1000.0, ('pac',))}
-    >>> joiner = AxisJoiner(['signal@x', 'signal@y'])
-    >>> joiner.add(CutWindow(0, 'a', 0.01, 0.01, samples, speed_m_s=0.02, direction_rad=0.0))  # waits for its partner
-    >>> joined = joiner.add(CutWindow(9, 'a', 0.01, 0.01, samples, speed_m_s=0.04, direction_rad=math.pi / 2))
-    >>> tuple(joined.windows), round(joined.speed_m_s, 3), joiner.end()
-    (('signal@x', 'signal@y'), 0.03, 0)
-    """
+    """Join the n-th window along x with the n-th along y of the same exploration, whichever comes first."""
 
     def __init__(self, names: Iterable[str]) -> None:
         names = tuple(names)
@@ -349,18 +242,7 @@ class AxisJoiner:
         return bool(self._waiting)
 
     def add(self, window: CutWindow) -> CutWindow | None:
-        """Return the window that is complete with this one; None if its partner is still to come, or it is none.
-
-        Parameters
-        ----------
-        window
-            Its windows are by topic.
-
-        Returns
-        -------
-        window or None
-            With windows by the names of the inputs, speed and force their means, and no direction.
-        """
+        """Return the window that is complete with this one; None if its partner is still to come, or it is none."""
         waiting = self._waiting.get(axis_along(window.direction_rad))
         if waiting is None or len(waiting) >= MOST_WAITING:
             return None
@@ -394,23 +276,7 @@ INDEX_TOLERANCE = 1e-3
 
 
 class SampleBuffer:
-    """Samples of one numbering, rate and set of channels; lost ones are NaN, old ones are forgotten.
-
-    Parameters
-    ----------
-    signal
-        The first batch.
-    keep_s
-        A sample is kept until a batch arrives that begins so much later.
-
-    Examples
-    --------
-    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
-    >>> buffer = SampleBuffer(batch, keep_s=1.0)
-    >>> later = TactileSignal(3_000_000, 'finger', ('pac',), (), 1000.0, 3, np.array([[4.0]], dtype=np.float32))
-    >>> buffer.append(later), buffer.take(0, 4)[:, 0].tolist()  # the third sample is missing
-    (1, [1.0, 2.0, nan, 4.0])
-    """
+    """Samples of one numbering, rate and set of channels; lost ones are NaN, old ones are forgotten."""
 
     def __init__(self, signal: TactileSignal, keep_s: float) -> None:
         self.rate_hz = signal.sampling_rate_hz
@@ -467,20 +333,7 @@ class SampleBuffer:
         return stamp + round((index - first) / self.rate_hz * NANOSECONDS)
 
     def take(self, first_sample: int, count: int) -> Samples:
-        """Return a copy of samples that are kept, (count, n_channels) float64.
-
-        Parameters
-        ----------
-        first_sample
-            Running index of the first one.
-        count
-            How many.
-
-        Returns
-        -------
-        (count, n_channels)
-            Lost samples are NaN.
-        """
+        """Return a copy of samples that are kept, (count, n_channels) float64."""
         row = first_sample - self._origin
         return self._rows[row : row + count].astype(np.float64)
 
@@ -508,13 +361,6 @@ class BufferedStream:
 
     One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are. It also holds what a cutter waits
     for: `due`, the index before whose arrival nothing can happen, and where slides begin in the buffers, `anchors`.
-
-    Examples
-    --------
-    >>> stream = BufferedStream(keep_s=1.0)
-    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, np.zeros((10, 1), dtype=np.float32))
-    >>> stream.add(batch), stream.add(batch), stream.restarts  # index 0 again: the sensor was started again
-    (True, True, 1)
     """
 
     MAX_BUFFERS = 4
@@ -559,14 +405,7 @@ LEAST_FORCE, MOST_FORCE, MOST_SPEED = 0.5, 1.5, 2.0
 
 @dataclass(frozen=True)
 class CoveredSpan:
-    """A covered stretch of time with the mean speed and forces in it.
-
-    Examples
-    --------
-    >>> span = CoveredSpan(0, NANOSECONDS // 2, speed_m_s=0.05, force_n=1.0, direction_rad=0.0)
-    >>> round(span.speed_m_s * (span.end_ns - span.start_ns) / NANOSECONDS, 6)  # m travelled in it
-    0.025
-    """
+    """A covered stretch of time with the mean speed and forces in it."""
 
     start_ns: int
     end_ns: int
@@ -585,25 +424,6 @@ class SlideCoverage:
 
     All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.
-
-    Parameters
-    ----------
-    state
-        The first slide state.
-    length_ns, hop_ns, skip_ns
-        Of the windows; `skip_ns` is left out at the start.
-
-    Examples
-    --------
-    >>> from texture_core.types import Phase
-    >>> state = ExplorationState(0, 'a', 'linear_slide', Phase.SLIDE, steady_s=1.0, speed_m_s=0.05)
-    >>> coverage = SlideCoverage(state, length_ns=NANOSECONDS // 2, hop_ns=NANOSECONDS // 2, skip_ns=0)
-    >>> starts = []
-    >>> while span := coverage.window():
-    ...     starts.append(span.start_ns / NANOSECONDS)
-    ...     _ = coverage.advance()
-    >>> starts  # of 1 s, two windows of 0.5 s
-    [0.0, 0.5]
     """
 
     def __init__(self, state: ExplorationState, length_ns: int, hop_ns: int, skip_ns: int) -> None:
@@ -711,16 +531,7 @@ def _mean(weighted: Sequence[tuple[float, float]]) -> float:
 
 
 class RunningMean:
-    """Mean of the finite values, and the range in which it has been so far.
-
-    Examples
-    --------
-    >>> mean = RunningMean()
-    >>> for value in (1.0, math.nan, 4.0):
-    ...     mean.update(value)
-    >>> mean.value, mean.range
-    (2.5, (1.0, 2.5))
-    """
+    """Mean of the finite values, and the range in which it has been so far."""
 
     def __init__(self) -> None:
         self.value = math.nan
@@ -752,14 +563,7 @@ ALL = 1 << 62
 
 @dataclass(frozen=True)
 class WindowParams:
-    """How the sliding part of a signal is cut.
-
-    Examples
-    --------
-    >>> params = WindowParams(length_s=0.5, hop_s=0.1)
-    >>> 1 + round((2.0 - params.length_s) / params.hop_s)  # windows in 2 s of sliding
-    16
-    """
+    """How the sliding part of a signal is cut."""
 
     length_s: float = param(
         0.5,
@@ -827,35 +631,6 @@ class WindowCutter:
     """Turn signal batches and exploration states into windows, in whatever order they arrive.
 
     What is cut depends on the data alone, as long as signals and states arrive at most `keep_s` apart.
-
-    Parameters
-    ----------
-    params
-        Length and hop of the windows.
-    inputs
-        Topics of which every window needs all samples; batches of other topics are ignored. With an axis, as in
-        'signal@x' and 'signal@y', windows along both axes of one exploration are joined.
-    keep_s
-        How long samples are kept at least, s.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> cutter = WindowCutter(WindowParams(length_s=0.5, hop_s=0.25), ['signal'])
-    >>> cutter.add_state(ExplorationState(0, 'a', 'linear_slide', Phase.SLIDE, steady_s=1.0))
-    >>> samples = np.zeros((1000, 1), dtype=np.float32)
-    >>> cutter.add_signal('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, samples))
-    >>> cutter.add_state(ExplorationState(NANOSECONDS, 'a', 'linear_slide', Phase.LIFT))
-    >>> for event in cutter.take():
-    ...     match event:
-    ...         case CutWindow():
-    ...             print('window at', event.start_ns / NANOSECONDS, 's,', event.windows['signal'].duration_s, 's long')
-    ...         case SlideEnd():
-    ...             print('end at', event.end_ns / NANOSECONDS, 's')
-    window at 0.0 s, 0.5 s long
-    window at 0.25 s, 0.5 s long
-    window at 0.5 s, 0.5 s long
-    end at 1.0 s
     """
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Known answers of the features that the papers add: region peaks, correlation, whole spectra, symbols, wavelets."""
 

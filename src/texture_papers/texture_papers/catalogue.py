@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The papers' experiments by name, rebuilt on simulated surfaces."""
 
@@ -59,39 +60,13 @@ def _run_of(name: str, experiment: Experiment) -> Run:
 
 
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
-    """Run one experiment; return its result and the JSON file, beside which its charts lie.
-
-    Raises
-    ------
-    TextureError
-        If there is no such experiment or it cannot be run.
-    """
+    """Run one experiment; return its result and the JSON file, beside which its charts lie."""
     result = _run_of(name, experiment)(experiment)
     return result, result.write(experiment.out)
 
 
 def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
-    """Run one experiment with so many seeds from its own on; return what `run_experiment` does.
-
-    Parameters
-    ----------
-    name
-        Name of the experiment.
-    experiment
-        First seed, folder and options.
-    count
-        Number of seeds.
-
-    Returns
-    -------
-    (ExperimentResult, Path)
-        Means and intervals over the seeds, and the file they are in.
-
-    Raises
-    ------
-    TextureError
-        If there is no such experiment, it cannot be run, or there are fewer than two seeds.
-    """
+    """Run one experiment with so many seeds from its own on; return what `run_experiment` does."""
     result = over_seeds(_run_of(name, experiment), name, experiment, count, DIGESTS[name]())
     if name in PROTOCOLS:
         result = replace(result, charts=charts_of(PROTOCOLS[name], result.numbers, name, experiment.out))

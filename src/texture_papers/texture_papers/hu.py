@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Fabrics by a finger of PVDF (Hu et al. 2014): power spectrum, principal components, machines by Max Wins.
 
@@ -59,13 +60,6 @@ class Spectrum:
     of a longer one the mean over segments of that length, half overlapping, is taken.
 
     Source: Hu et al. 2014, section 4.1 (12 288 points there).
-
-    Examples
-    --------
-    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None]
-    >>> spectrum = Spectrum(points=500)(WindowBatch(tone, rate_hz=1000.0))  # at 1, 2, … 500 Hz
-    >>> int(spectrum[0].argmax()) + 1
-    100
     """
 
     per_channel: ClassVar[bool] = True
@@ -109,16 +103,6 @@ class SvmMaxWins:
     The label that wins most pairs is taken; ties are broken by the clearer decisions.
 
     Source: Hu et al. 2014, section 4: 99 % of the variance, for each of two directions, joined.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = SvmMaxWins().fit(values, codes, groups)
-    >>> predictor = SvmMaxWins.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     variance: float = param(
@@ -151,13 +135,7 @@ class SvmMaxWins:
     )
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
-        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
-
-        Raises
-        ------
-        InvalidParameter
-            If the features cannot be cut into the blocks.
-        """
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         mean, components = self._components(X)
         projected = (X - mean) @ components
         zero, count = np.zeros(projected.shape[1]), projected.shape[1]
@@ -202,18 +180,6 @@ class SvmMaxWins:
 
 def principal_components(centred: Array, share: float) -> Array:
     """Return the fewest components, (n_features, n_components), that explain a share of the variance; at least one.
-
-    Parameters
-    ----------
-    centred : (n, n_features)
-        Zero mean.
-    share
-        Fraction of the variance that they explain at least, 0 to 1.
-
-    Returns
-    -------
-    (n_features, n_components)
-        Orthonormal columns, the one of the largest variance first.
 
     Source: Hu et al. 2014, eq. 7 to 12.
     """

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Five linens measured along x and along y (Hu et al. 2014)."""
 
@@ -131,25 +132,7 @@ def components(slides: Slides, method: str) -> Mapping[str, Mapping[str, int]]:
 
 
 def kept(values: Array, share: float) -> int:
-    """Return how many components explain a share of the variance, the mean of each example subtracted (eq. 7).
-
-    Parameters
-    ----------
-    values : (n_slides, n_points)
-        Spectra.
-    share
-        Fraction of the variance, 0 to 1.
-
-    Returns
-    -------
-    int
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> kept(np.array([[3.0, -3.0, 0.0, 0.0], [0.0, 0.0, 0.1, -0.1]]), 0.99)
-    1
-    """
+    """Return how many components explain a share of the variance, the mean of each example subtracted (eq. 7)."""
     return principal_components(values - values.mean(axis=1, keepdims=True), share).shape[1]
 
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Materials by surface texture (Jamali & Sammut 2010): peaks grown from regions, naive Bayes.
 
@@ -64,12 +65,6 @@ class RegionPeaks:
     gives the amplitudes of the coefficients, too.
 
     Source: Jamali & Sammut 2010, Algorithm 1.
-
-    Examples
-    --------
-    >>> tone = np.sin(2 * np.pi * 125.0 * np.arange(2048) / 1000.0)[:, None]
-    >>> RegionPeaks(peaks=1)(WindowBatch(tone, rate_hz=1000.0)).item()
-    125.0
     """
 
     per_channel: ClassVar[bool] = True
@@ -106,22 +101,6 @@ def region_peaks(spectrum: Array, count: int, regions: int, *, by_frequency: boo
     Regions are taken in the order of their energy, of equal ones the lowest first. One that touches no peak opens a new
     one; one that touches a peak widens it, and one that touches two makes them one. This ends when there are `count`
     peaks. If there never are, it ends where there first were most: going on would only merge them.
-
-    Parameters
-    ----------
-    spectrum : (..., n_bins)
-        Not negative; bin 0 is left out.
-    count
-        Number of peaks wanted.
-    regions
-        Number of equal parts, at most as many as there are bins.
-    by_frequency
-        Whether the peaks are ranked by their frequency, and not by their strongest region.
-
-    Returns
-    -------
-    (..., count)
-        As whole numbers; ranked by the strongest region of each peak, or by frequency.
     """
     regions = min(regions, max(1, spectrum.shape[-1] - 1))
     starts = 1 + np.arange(regions) * (spectrum.shape[-1] - 1) // regions
@@ -180,11 +159,6 @@ class MeanAmplitude:
     which can be read as the mean of |s - mean(s)|, of |s| or of s itself.
 
     Source: Jamali & Sammut 2010, section VI (the baseline there).
-
-    Examples
-    --------
-    >>> MeanAmplitude()(WindowBatch(np.array([[1.0], [5.0]]), rate_hz=100.0)).item()  # each is 2 from the mean
-    2.0
     """
 
     per_channel: ClassVar[bool] = True
@@ -225,12 +199,6 @@ class WaveletEnergy:
 
     Octave k reaches about from rate / 2^(k+1) to rate / 2^k. A window is continued periodically, after its last sample
     is repeated where their number is odd. Octaves that a window is too short for hold no power.
-
-    Examples
-    --------
-    >>> tone = np.sin(2 * np.pi * 350.0 * np.arange(1024) / 1000.0)[:, None]  # in the first octave, 250 to 500 Hz
-    >>> int(WaveletEnergy()(WindowBatch(tone, rate_hz=1000.0)).argmax()) + 1
-    1
     """
 
     per_channel: ClassVar[bool] = True
@@ -252,19 +220,7 @@ class WaveletEnergy:
 
 
 def wavelet_energies(rows: Array, octaves: int) -> Array:
-    """Return the sum of squares of the coefficients of each octave, the finest first, and of the rest.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-    octaves
-        How often the rows are halved.
-
-    Returns
-    -------
-    (..., octaves + 1)
-        Their sum is that of the squared rows, as long as the length can be halved.
-    """
+    """Return the sum of squares of the coefficients of each octave, the finest first, and of the rest."""
     energies = np.zeros((*rows.shape[:-1], octaves + 1))
     for octave in range(octaves):
         if rows.shape[-1] == 1:
@@ -295,13 +251,6 @@ class OrdinalPatterns:
     too short for one pattern has 0 everywhere.
 
     Source: Bandt & Pompe 2002.
-
-    Examples
-    --------
-    >>> patterns = OrdinalPatterns(length=2, delay=1)
-    >>> window = WindowBatch(np.array([[0.0], [1.0], [2.0], [0.5]]), rate_hz=100.0)  # rises twice, falls once
-    >>> patterns.names, patterns(window)[0].round(2).tolist()
-    (('01', '10'), [0.67, 0.33])
     """
 
     per_channel: ClassVar[bool] = True
@@ -359,16 +308,6 @@ class NaiveBayes:
     """Each feature is distributed for each label independently of the others.
 
     Source: Jamali & Sammut 2010, section IV.B.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = NaiveBayes().fit(values, codes, groups)
-    >>> predictor = NaiveBayes.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     smoothing: float = param(
@@ -435,17 +374,5 @@ class NaiveBayes:
 
 
 def bins_of(values: Array, edges: Array) -> Codes:
-    """Return how many edges, (n_features, n_edges), each value lies above, (..., n_features).
-
-    Parameters
-    ----------
-    values : (..., n_features)
-    edges : (n_features, n_edges)
-        Ascending.
-
-    Returns
-    -------
-    (..., n_features)
-        Whole numbers, 0 to n_edges.
-    """
+    """Return how many edges, (n_features, n_edges), each value lies above, (..., n_features)."""
     return np.count_nonzero(values[..., None] > edges, axis=-1)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Eight surfaces of a floor and a kitchen (Jamali & Sammut 2010)."""
 

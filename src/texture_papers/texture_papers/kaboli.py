@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Objects in a hand by texture (Kaboli et al. 2015): Hjorth parameters, correlations; three learners.
 
@@ -65,12 +66,6 @@ class MeanHjorth:
     """Means over the channels of activity (or its logarithm), mobility and complexity: what `hjorth` gives for each.
 
     Source: Kaboli et al. 2015, eq. 6 (with `log_activity` off, and of a BioTac's slow channels the electrodes alone).
-
-    Examples
-    --------
-    >>> samples = np.array([[1.0, 10.0], [-1.0, -10.0]])  # powers of 1 and 100
-    >>> MeanHjorth(log_activity=False)(WindowBatch(samples, rate_hz=100.0))[0, 0].item()
-    50.5
     """
 
     per_channel: ClassVar[bool] = False
@@ -114,14 +109,6 @@ class Correlation:
     correlation of its channels with each other, 0 for a single channel.
 
     Source: Kaboli et al. 2015, eq. 4 and 5; eq. 6 has the means over the electrodes alone.
-
-    Examples
-    --------
-    >>> rise = np.arange(10.0)[:, None]
-    >>> joined = WindowBatch(rise, rate_hz=100.0, joined=(WindowBatch(-(rise**3), rate_hz=100.0),))
-    >>> pearson, spearman = Correlation()(joined)[0].round(2).tolist()
-    >>> spearman, -1.0 < pearson < -0.9  # monotonic, but not along a straight line
-    (-1.0, True)
     """
 
     per_channel: ClassVar[bool] = False
@@ -146,19 +133,7 @@ class Correlation:
 
 
 def cell_means(rows: Array, count: int) -> Array:
-    """Return the means of `count` equal cells of rows, (..., count); at most as many as there are samples.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-    count
-        Number of cells, at most n_samples.
-
-    Returns
-    -------
-    (..., count)
-        In the unit of the rows.
-    """
+    """Return the means of `count` equal cells of rows, (..., count); at most as many as there are samples."""
     length = rows.shape[-1]
     if length == count:
         return rows
@@ -167,17 +142,7 @@ def cell_means(rows: Array, count: int) -> Array:
 
 
 def ranks(rows: Array) -> Array:
-    """Return the rank of each sample within its row, from 0; equal ones share their mean rank.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-
-    Returns
-    -------
-    (..., n_samples)
-        Whole numbers, or halves for equal samples.
-    """
+    """Return the rank of each sample within its row, from 0; equal ones share their mean rank."""
     from scipy.stats import rankdata  # noqa: PLC0415  # takes a second, and few recipes need it
 
     return rankdata(rows, axis=-1) - 1.0
@@ -332,16 +297,6 @@ class PassiveAggressive:
 
     Source: Crammer et al. 2006, PA-I: section 4 (one label against the others), section 8 (all labels together);
     Kaboli et al. 2015, section V.B.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = PassiveAggressive().fit(values, codes, groups)
-    >>> predictor = PassiveAggressive.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
@@ -371,22 +326,7 @@ class PassiveAggressive:
         return Fitted(parameters, None, 'not calibrated: distances from the planes')
 
     def partial_fit(self, parameters: Mapping[str, Any], X: Array, code: int) -> Mapping[str, Any]:
-        """Return the parameters after one more slide of a label, whose windows each move the planes once.
-
-        Parameters
-        ----------
-        parameters
-            As `fit` returns them; they stay as they are.
-        X : (n, n_features)
-            Features of the windows of one slide.
-        code
-            Number of the label; the next free one adds a plane. The scale stays that of the training.
-
-        Returns
-        -------
-        Mapping
-            For `predictor`.
-        """
+        """Return the parameters after one more slide of a label, whose windows each move the planes once."""
         known = np.asarray(parameters['planes'])
         planes = np.vstack((known, np.zeros((max(0, code + 1 - len(known)), known.shape[1]))))
         for standard in (X - parameters['mean']) / parameters['scale']:
@@ -490,16 +430,6 @@ class EmMixture:
     A label that no cluster is named after is never recognised.
 
     Source: Kaboli et al. 2015, section V.C.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = EmMixture().fit(values, codes, groups)
-    >>> predictor = EmMixture.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     clusters_per_label: int = param(

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Twenty objects in a hand, trained with two fingers and recognised with two others (Kaboli et al. 2015)."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Experiments of papers on simulated surfaces: what was done, by which recipes, over which seeds."""
 
@@ -80,13 +81,7 @@ class Interval:
 
 
 def share(right: Array) -> Interval:
-    """Return the share of slides that are right (Wilson's interval).
-
-    Parameters
-    ----------
-    right : (n_slides,)
-        1 or 0, or between if a slide was evaluated several times.
-    """
+    """Return the share of slides that are right (Wilson's interval)."""
     n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
     reach = NORMAL_95 * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
@@ -95,28 +90,14 @@ def share(right: Array) -> Interval:
 
 
 def mean(values: Array) -> Interval:
-    """Return the mean over slides, such as that of differences between two methods on the same slides.
-
-    Parameters
-    ----------
-    values : (n,)
-        One number a slide.
-    """
+    """Return the mean over slides, such as that of differences between two methods on the same slides."""
     centre = float(np.mean(values))
     reach = NORMAL_95 * math.sqrt(_uncertainty(values))
     return Interval(centre, centre - reach, centre + reach)
 
 
 def apart(first: Array, second: Array) -> Interval:
-    """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,).
-
-    Parameters
-    ----------
-    first : (n,)
-        One number a slide.
-    second : (m,)
-        One number a slide.
-    """
+    """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,)."""
     centre = float(np.mean(first) - np.mean(second))
     reach = NORMAL_95 * math.sqrt(_uncertainty(first) + _uncertainty(second))
     return Interval(centre, centre - reach, centre + reach)
@@ -129,25 +110,7 @@ def _uncertainty(values: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class MethodResult:
-    """Decisions on all slides.
-
-    Parameters
-    ----------
-    surfaces
-        Names.
-    codes : (n_slides,)
-        Number of the surface of each slide.
-    conditions : (n_slides,) of text
-        How it was touched.
-    decided : (n_divisions, n_slides)
-        Number of the surface that it is taken for, or UNDECIDED.
-    trained_on : (n_divisions, n_slides)
-        Whether it was trained on.
-    train_s
-        Mean time of a training and of classifying all slides.
-    note
-        What else is to be reported of the training.
-    """
+    """Decisions on all slides."""
 
     surfaces: tuple[str, ...]
     codes: Codes
@@ -187,57 +150,21 @@ class MethodResult:
         return table / np.maximum(table.sum(axis=1, keepdims=True), 1.0)
 
     def right(self, of: NDArray[np.bool_] | None = None) -> Array:
-        """Return how often each slide was recognised when held out, (n_tested,); `of` (n_slides,) chooses.
-
-        Parameters
-        ----------
-        of : (n_slides,) bool
-            Which slides count; None for all.
-
-        Returns
-        -------
-        (n_tested,)
-            0 to 1.
-        """
+        """Return how often each slide was recognised when held out, (n_tested,); `of` (n_slides,) chooses."""
         return self._tested(self.decided == self.codes, of)
 
     def taken_for(self, first: str, second: str, of: NDArray[np.bool_] | None = None) -> Array:
-        """Return how often each slide was taken for the other one of two surfaces, (n_tested,).
-
-        Parameters
-        ----------
-        first, second
-            Labels of the two surfaces.
-        of : (n_slides,) bool
-            Which slides count; None for all.
-
-        Returns
-        -------
-        (n_tested,)
-            0 to 1.
-        """
+        """Return how often each slide was taken for the other one of two surfaces, (n_tested,)."""
         pair = [self.surfaces.index(first), self.surfaces.index(second)]
         other = np.select([self.codes == pair[0], self.codes == pair[1]], [pair[1], pair[0]], default=UNDECIDED - 1)
         return self._tested(self.decided == other, of)
 
     def wrong(self) -> Array:
-        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not.
-
-        Returns
-        -------
-        (n_tested,)
-            0 to 1.
-        """
+        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not."""
         return self._tested((self.decided != self.codes) & (self.decided != UNDECIDED))
 
     def nothing(self) -> Array:
-        """Return how often each slide was taken for nothing, (n_tested,).
-
-        Returns
-        -------
-        (n_tested,)
-            0 to 1.
-        """
+        """Return how often each slide was taken for nothing, (n_tested,)."""
         return self._tested(self.decided == UNDECIDED)
 
     def pairs(self) -> list[tuple[str, str]]:
@@ -270,23 +197,7 @@ class View:
 
 @dataclass(frozen=True)
 class Visits:
-    """Trials that are alike, over each surface.
-
-    Parameters
-    ----------
-    condition
-        What they have in common, in words.
-    count
-        How many over each surface.
-    sliding
-        How the finger goes.
-    views
-        What a trial consists of.
-    radius_m
-        Radius of curvature of all objects, instead of their own; 0 for their own.
-    random
-        Relative spread of speed and force from trial to trial; above 0, the direction is a random one, too.
-    """
+    """Trials that are alike, over each surface."""
 
     condition: str
     count: int
@@ -310,33 +221,7 @@ BY_SPLIT, BY_WINDOW, ON_ALL = 'slides of the split', 'half of the windows', 'all
 
 @dataclass(frozen=True)
 class Method:
-    """A recipe on trial.
-
-    Parameters
-    ----------
-    recipe
-        Its name.
-    paper
-        What the paper got with it.
-    learner
-        Parameters of the learner that a variation changes; what has no label of its own is the released recipe.
-    features
-        Parameters of features, by the feature's name, that it changes.
-    label
-        Name in the table; '' for that of the recipe.
-    views
-        Which views of a slide it is given; () for all.
-    training
-        What is trained on: the slides of the split, or half of all windows, whatever their slide (data leakage on
-        purpose, to measure its effect), or all slides, for learners that see no labels. Of the last two, all slides
-        are tested.
-    sets
-        Sets of surfaces for which the fraction recognised is reported apart, by name.
-    splits
-        It is tried on so many of the splits; 0 for all.
-    confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)
-        The paper's table; the last column, if there is one more, counts what is unclassified.
-    """
+    """A recipe on trial."""
 
     recipe: str
     paper: Figures = Figures()
@@ -360,19 +245,7 @@ FEW = 2  # splits: enough for a variation that is shown next to the paper's meth
 
 @dataclass(frozen=True)
 class RecognitionTask:
-    """Surfaces to tell apart, how they are touched, and what tries to.
-
-    Parameters
-    ----------
-    name
-        In a few words.
-    visits
-        How each surface is touched.
-    methods
-        What tries to distinguish them.
-    surfaces
-        Names; () for all of the scene.
-    """
+    """Surfaces to tell apart, how they are touched, and what tries to."""
 
     name: str
     visits: tuple[Visits, ...]
@@ -382,21 +255,7 @@ class RecognitionTask:
 
 @dataclass(frozen=True)
 class Finding:
-    """Something a paper found, and whether it is found here.
-
-    Parameters
-    ----------
-    claim
-        In the paper's sense.
-    here
-        What was measured here, in words and numbers.
-    interval
-        What decides, with 95 %.
-    built_in
-        Which choice of the scene makes it so, in a few words; '' where the scene was not made for it.
-    by_texture
-        What decides, texture by texture, where textures and not slides are the draws.
-    """
+    """Something a paper found, and whether it is found here."""
 
     claim: str
     here: str
@@ -415,19 +274,7 @@ MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what
 
 @dataclass(frozen=True)
 class Anchor:
-    """The one stated figure by which the difficulty of a scene is set: so many test slides are right by this method.
-
-    Parameters
-    ----------
-    setting
-        What of the scene was set by it.
-    experiment
-        Whose figure it is, if not of the same experiment.
-    shortfall
-        Why the figure could not be met; '' if it was.
-    parts
-        The paper's figures of the same method on parts of the same slides, by task: set along with it, no findings.
-    """
+    """The one stated figure by which the difficulty of a scene is set: so many test slides are right by this method."""
 
     task: str
     method: str
@@ -446,27 +293,7 @@ class Anchor:
 
 @dataclass(frozen=True)
 class PaperProtocol:
-    """A paper's experiment.
-
-    Parameters
-    ----------
-    name, scene
-        Of the experiment and of what is touched.
-    paper
-        Who did it.
-    tasks
-        What was to be distinguished, by what.
-    divide, split
-        Which slides are used for training, and that in words.
-    anchor
-        What the scene's noise was set by.
-    findings
-        Checks what the paper found.
-    by_condition
-        Whether the share recognised is also reported for each condition of the test.
-    quick_count
-        Trials over each surface, instead of those of each of the visits, for tests.
-    """
+    """A paper's experiment."""
 
     name: str
     scene: str
@@ -525,23 +352,7 @@ def training_in(condition: str) -> Splitter:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Where an experiment writes, its seed, and whether to hurry.
-
-    Parameters
-    ----------
-    out
-        Folder for the JSON and the charts.
-    seed
-        Of everything random.
-    quick
-        Fewer slides, for tests; such numbers are not for publishing.
-    tune
-        Search the parameters first, as the paper does; refused where the paper has no search.
-    splits
-        Try each method on at most so many of the splits, and measure nothing but the paper's table; 0 for all.
-    search
-        Size of the search; None for the paper's.
-    """
+    """Where an experiment writes, its seed, and whether to hurry."""
 
     out: Path
     seed: int = 0
@@ -618,11 +429,6 @@ def digest_of(recipe: str) -> str:
     """Return eight letters of what of a shipped recipe, by its name, decides the label after a whole slide.
 
     Descriptions, the tare of inputs, and rules for ending a slide early do not count.
-
-    Raises
-    ------
-    UnknownName
-        If there is no such recipe.
     """
     try:
         definition = load_recipe(recipe).as_mapping()
@@ -637,17 +443,6 @@ def digest_of_row(recipe: Any, scene: Scene, task: RecognitionTask, *settings: A
 
     The recipe as it is run, the motions and their number, the settings, and what the simulator makes of one slide of
     each kind over each surface: this changes with the scene, with the sensor's model and with the simulation.
-
-    Parameters
-    ----------
-    recipe
-        With the overrides of the method.
-    scene
-        What is touched.
-    task
-        How.
-    settings
-        What else decides, such as the split.
     """
     definition = _decisive(recipe.as_mapping())
     visits = [{**asdict(visits), 'sliding': _set(visits.sliding)} for visits in task.visits]
@@ -739,13 +534,7 @@ class TunedRecipe:
         }
 
     def write(self, path: Path) -> Path:
-        """Write the recipe as a file that training reads; return its path.
-
-        Raises
-        ------
-        InvalidParameter
-            If the file cannot be written.
-        """
+        """Write the recipe as a file that training reads; return its path."""
         text = yaml.safe_dump(self.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -756,23 +545,7 @@ class TunedRecipe:
 def tune(
     space: RecipeSpace, scans: SlideArrays, task: ClassificationTask | RoughnessTask, params: SearchParams
 ) -> TunedRecipe:
-    """Return the best recipe of a space on these scans, and what it took to find it.
-
-    Parameters
-    ----------
-    space
-        The recipe, and what of it is varied.
-    scans
-        Slides that the search may use.
-    task
-        Classification or roughness.
-    params
-        Size and seed of the search.
-
-    Returns
-    -------
-    TunedRecipe
-    """
+    """Return the best recipe of a space on these scans, and what it took to find it."""
     began, cpu_began = time.perf_counter(), time.process_time()
     with workers():
         found = optimise(space, SearchSlides(scans, params.halves, params.seed), params, task)
@@ -793,24 +566,7 @@ class ArrayStream:
 
 @dataclass(frozen=True, eq=False)
 class SlideArrays:
-    """Equally long scans of known surfaces, such as simulated ones; called with window parameters it cuts them.
-
-    Parameters
-    ----------
-    streams
-        By topic.
-    labels : (n_scans,) of text
-        Surface of each scan.
-    speed_m_s, force_n : (n_scans,)
-        As the exploration tells them.
-
-    Examples
-    --------
-    >>> stream = ArrayStream(np.zeros((2, 100, 1)), rate_hz=100.0)
-    >>> slides = SlideArrays({'signal': stream}, np.array(['cork', 'felt']), np.full(2, 0.05), np.ones(2))
-    >>> slides(WindowParams(length_s=0.5, hop_s=0.5)).labels.tolist()  # two windows of each
-    ['cork', 'cork', 'felt', 'felt']
-    """
+    """Equally long scans of known surfaces, such as simulated ones; called with window parameters it cuts them."""
 
     streams: Mapping[str, ArrayStream]
     labels: NDArray[np.str_]
@@ -824,13 +580,7 @@ class SlideArrays:
         return SlideArrays(streams, self.labels[chosen], self.speed_m_s[chosen], self.force_n[chosen])
 
     def __call__(self, windows: WindowParams) -> LabelledWindows:
-        """Return the windows, scan by scan.
-
-        Raises
-        ------
-        InvalidData
-            If a scan is shorter than a window.
-        """
+        """Return the windows, scan by scan."""
         if windows not in self._known:
             self._known[windows] = self._cut(windows)
         return self._known[windows]
@@ -925,21 +675,6 @@ def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Sli
     """Return the slides of a task.
 
     A slide is the same in all tasks that hold it: its randomness follows from seed, surface and condition.
-
-    Parameters
-    ----------
-    scene
-        What is touched.
-    task
-        How.
-    seed
-        Of everything random.
-    slow
-        Whether the slow stream is needed.
-
-    Returns
-    -------
-    Slides
     """
     surfaces = task.surfaces or tuple(scene.surfaces)
     kinds = [(surface, visits) for surface in surfaces for visits in task.visits]
@@ -1010,28 +745,7 @@ NONE: TunedRecipes = {}
 def outcomes(
     protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE, splits: int = 0
 ) -> MethodResults:
-    """Return what comes out of each method in each task.
-
-    Parameters
-    ----------
-    protocol
-        Methods and tasks of the paper.
-    scene
-        Surfaces, sensor and effects.
-    seed
-        Of everything random.
-    quick
-        Whether fewer slides will do.
-    tuned
-        Recipes that were searched for.
-    splits
-        Each method is tried on at most so many splits; 0 for all.
-
-    Returns
-    -------
-    MethodResults
-        By task and method.
-    """
+    """Return what comes out of each method in each task."""
     return {
         (task.name, method): outcome
         for task in protocol.tasks
@@ -1053,28 +767,6 @@ def of_task(
 
     One with a recipe that was searched for is tried on the first split alone: in the others it would be tested on
     slides that the search has seen.
-
-    Parameters
-    ----------
-    protocol
-        Methods and tasks of the paper.
-    task
-        The task.
-    scene
-        Surfaces, sensor and effects.
-    seed
-        Of everything random.
-    quick
-        Whether fewer slides will do.
-    tuned
-        Recipes that were searched for.
-    splits
-        Number of splits that are run; 0 for all.
-
-    Yields
-    ------
-    (str, MethodResult)
-        Name of the method, and its result.
     """
     slides, trained_on = _gathered(protocol, task, scene, seed, quick=quick)
     for method in task.methods:
@@ -1085,24 +777,7 @@ def of_task(
 
 
 def searched(protocol: PaperProtocol, scene: Scene, params: SearchParams, *, quick: bool) -> TunedRecipes:
-    """Return the recipes for which the paper has a genetic search, found on what the first split is trained on.
-
-    Parameters
-    ----------
-    protocol
-        Methods and tasks of the paper.
-    scene
-        Surfaces, sensor and effects.
-    params
-        Size and seed of the search.
-    quick
-        Whether fewer slides will do.
-
-    Returns
-    -------
-    TunedRecipes
-        By task and recipe; empty if the paper searches for none.
-    """
+    """Return the recipes for which the paper has a genetic search, found on what the first split is trained on."""
     methods = {
         (task.name, method.recipe): (task, method)
         for task in protocol.tasks
@@ -1160,28 +835,7 @@ def evaluate_method(
     training: str = BY_SPLIT,
     beside: Array | None = None,
 ) -> MethodResult:
-    """Learn from the slides of each split and evaluate all.
-
-    Parameters
-    ----------
-    recipe
-        What learns and classifies.
-    slides
-        What was measured.
-    trained_on : (n_divisions, n_slides)
-        Which are used for training.
-    views
-        Which views of the slides are used; () for all.
-    training
-        See `Method`.
-    beside : (n_slides, n_values) or None
-        Values of each slide that its windows have beside the features.
-
-    Returns
-    -------
-    MethodResult
-        Of all splits together.
-    """
+    """Learn from the slides of each split and evaluate all."""
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     trained, owner = slides.extract(to_learn, views)
     asked, slide = slides.extract(recipe.feature_set, views)
@@ -1227,29 +881,6 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests:
 
     The first seed is run as the experiment asks, and written. Each further one is run on at most two splits and kept
     in the folder `seeds`. What is there already, with the digests of now, is not run again.
-
-    Parameters
-    ----------
-    run
-        Runs the experiment with one seed.
-    name
-        Name of the experiment.
-    experiment
-        First seed, folder and options.
-    count
-        Number of seeds, at least 2.
-    digests
-        Of all rows, as they are now.
-
-    Returns
-    -------
-    ExperimentResult
-        That of the first seed, with means and intervals over all.
-
-    Raises
-    ------
-    InvalidParameter
-        If fewer than two seeds are asked for.
     """
     if count < 2:
         raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Figures of the papers beside ours: tables, charts, and whether the claims hold."""
 
@@ -42,61 +43,20 @@ GRANTED = 0.05  # loss of accuracy that counts as none
 
 
 def higher(claim: str, first: MethodResult, second: MethodResult) -> Finding:
-    """Check that one method recognises more than another, slide by slide.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    first, second
-        Results on the same slides.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that one method recognises more than another, slide by slide."""
     both = first.tested & second.tested
     gain = mean(first.right(both) - second.right(both))
     return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain)
 
 
 def higher_elsewhere(claim: str, first: MethodResult, second: MethodResult) -> Finding:
-    """Check that more slides of one kind are recognised than of another kind.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    first, second
-        Results on different slides.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that more slides of one kind are recognised than of another kind."""
     gain = apart(first.right(), second.right())
     return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain)
 
 
 def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
-    """Check that slides of one condition are recognised less often than all others.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    outcome
-        Result of the method.
-    condition
-        Name of the condition.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that slides of one condition are recognised less often than all others."""
     here = outcome.conditions == condition
     loss = apart(outcome.right(~here), outcome.right(here))
     names = dict.fromkeys(outcome.conditions.tolist())
@@ -106,64 +66,19 @@ def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
 
 
 def kept_in(claim: str, outcome: MethodResult, changed: str, reference: str) -> Finding:
-    """Check that slides of one condition are recognised at most five points less often than those of another.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    outcome
-        Result of the method.
-    changed, reference
-        Names of the conditions.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that slides of one condition are recognised at most five points less often than those of another."""
     here, before = (outcome.right(outcome.conditions == name) for name in (changed, reference))
     reported = f'{percent(share(here))} against {percent(share(before))}, {100 * GRANTED:g} points granted'
     return Finding(claim, reported, apart(here, before).less(-GRANTED))
 
 
 def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
-    """Check that a figure is reached; undecided where the interval holds it.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    outcome
-        Result of the method.
-    border
-        Share, 0 to 1.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that a figure is reached; undecided where the interval holds it."""
     return Finding(claim, percent(outcome.test), outcome.test.less(border))
 
 
 def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Finding:
-    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    outcome
-        Result of the method.
-    pairs
-        Pairs of surfaces.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here.
-    """
+    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused."""
     own = sum((outcome.taken_for(*pair) for pair in pairs), start=np.zeros(1))
     others = [pair for pair in outcome.pairs() if frozenset(pair) not in {frozenset(one) for one in pairs}]
     rivals = sum((outcome.taken_for(*pair) for pair in others[: len(pairs)]), start=np.zeros(1))
@@ -174,22 +89,7 @@ def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Fin
 
 
 def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
-    """Check that one surface is recognised more often than the others together.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    outcome
-        Result of the method.
-    surface
-        Label of the surface.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that one surface is recognised more often than the others together."""
     here = outcome.codes == outcome.surfaces.index(surface)
     gain = apart(outcome.right(here), outcome.right(~here))
     reported = (
@@ -199,24 +99,7 @@ def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
 
 
 def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Finding:
-    """Check that two surfaces are taken for each other in fewer than a share of their slides.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    outcome
-        Result of the method.
-    pair
-        Two surfaces.
-    border
-        Share, 0 to 1.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that two surfaces are taken for each other in fewer than a share of their slides."""
     of_pair = np.isin(outcome.codes, [outcome.surfaces.index(name) for name in pair])
     taken = share(outcome.taken_for(*pair, of=of_pair))
     below = Interval(border - taken.value, border - taken.high, border - taken.low)
@@ -224,22 +107,7 @@ def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Find
 
 
 def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Sequence[Pair]) -> Finding:
-    """Check that by the first method more slides are taken for a surface that is not alike than by the second.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    first, second
-        Results on the same slides.
-    alike
-        Pairs of surfaces that are alike.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
+    """Check that by the first method more slides are taken for a surface that is not alike than by the second."""
     novel = [one.wrong() - sum((one.taken_for(*pair) for pair in alike), start=np.zeros(1)) for one in (first, second)]
     more = mean(novel[0] - novel[1])
     reported = ' against '.join(f'{100 * part.mean():.1f} %' for part in novel)
@@ -265,24 +133,7 @@ def _of_errors(part: Array, outcome: MethodResult) -> str:
 def accuracy_chart(
     panels: Mapping[str, Mapping[str, tuple[float | None, Interval]]], title: str, path: str | Path, drawn: str
 ) -> Path:
-    """Draw the share of test slides recognised by each method: the paper's as a cross, the simulated with its interval.
-
-    Parameters
-    ----------
-    panels
-        Task → method → the paper's share, if it tells, and the simulated one.
-    title
-        Above the chart.
-    path
-        File that is written.
-    drawn
-        What is drawn, for the legend.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Draw the accuracy of each method: the paper's as a cross, the simulated with its interval."""
     heights = [len(methods) + 1 for methods in panels.values()]
     with chart(path, (7.0, 1.2 + 0.3 * sum(heights)), title) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
@@ -297,22 +148,7 @@ def accuracy_chart(
 def confusions_chart(
     tables: Mapping[str, tuple[Sequence[str], AnyArray, AnyArray]], title: str, path: str | Path
 ) -> Path:
-    """Draw tables of confusion: the paper's on the left, the simulated on the right, in % of each row.
-
-    Parameters
-    ----------
-    tables
-        Method → surfaces, and two tables of shares with a last column for what is unclassified.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Draw tables of confusion: the paper's on the left, the simulated on the right, in % of each row."""
     side = 2.2 + 0.3 * max(len(surfaces) for surfaces, _, _ in tables.values())
     with chart(path, (2.0 * side + 1.5, side * len(tables)), title) as figure:
         rows = figure.subplots(len(tables), 2, squeeze=False)
@@ -433,21 +269,7 @@ def _difficulty(protocol: PaperProtocol, found: MethodResults) -> dict[str, Any]
 
 
 def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = False) -> dict[str, Any]:
-    """Return the figures of one method as an experiment's JSON holds them.
-
-    Parameters
-    ----------
-    method
-        With the paper's figures.
-    outcome
-        What came out.
-    by_condition
-        Whether the share recognised is given for each condition of the test, too.
-
-    Returns
-    -------
-    dict
-    """
+    """Return the figures of one method as an experiment's JSON holds them."""
     paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
     return {
         'paper': {name: value for name, value in paper.items() if value is not None},
@@ -496,23 +318,7 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
 
 
 def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, out: Path) -> tuple[Path, ...]:
-    """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several.
-
-    Parameters
-    ----------
-    protocol
-        With the paper's figures.
-    numbers
-        Of the experiment.
-    name
-        Of the experiment, for titles and files.
-    out
-        Folder.
-
-    Returns
-    -------
-    tuple of Path
-    """
+    """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several."""
     stem = f'experiment_{name.replace("-", "_")}'
     seeds = len(numbers.get('seeds', [0]))
     drawn = f'mean of {seeds} seeds, 95 % interval' if seeds > 1 else 'one seed, 95 % interval over slides'
@@ -549,18 +355,7 @@ def _interval(figures: Mapping[str, Any]) -> Interval:
 
 
 def shares_of(table: Table | None) -> AnyArray:
-    """Return a paper's table as shares of each row, with a last column for what is unclassified.
-
-    Parameters
-    ----------
-    table
-        Counts or per cents as printed; None if the paper has none.
-
-    Returns
-    -------
-    (n_labels, n_labels + 1)
-        0 to 1.
-    """
+    """Return a paper's table as shares of each row, with a last column for what is unclassified."""
     counts = np.asarray(table, dtype=np.float64)
     if counts.shape[1] == counts.shape[0]:
         counts = np.column_stack((counts, np.zeros(len(counts))))

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Roughness by dynamic tactile sensing (Rispal et al.): three regressors of grades.
 
@@ -62,16 +63,6 @@ def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C, where 0 stands
     for none.
-
-    Parameters
-    ----------
-    votes : (..., 5) bool
-        Whether each whole grade fired.
-
-    Returns
-    -------
-    (...)
-        Grades 1 to 5, or NaN.
     """
     count = votes.sum(axis=-1)
     total = votes @ GRADES
@@ -79,17 +70,7 @@ def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
 
 
 def grade_membership(grades: Array) -> NDArray[np.bool_]:
-    """Return to which of the five whole grades each grade belongs, (n, 5).
-
-    Parameters
-    ----------
-    grades : (n,)
-        1 to 5.
-
-    Returns
-    -------
-    (n, 5) bool
-    """
+    """Return to which of the five whole grades each grade belongs, (n, 5)."""
     return np.rint(grades)[:, None] == GRADES
 
 
@@ -100,30 +81,7 @@ HELD_OUT = 7
 def fit_networks(
     values: Array, targets: Sequence[Array], groups: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
 ) -> Mapping[str, Any]:
-    """Return the fields of `Networks`, one network for each target, (n,), of values (n, n_features).
-
-    Parameters
-    ----------
-    values : (n, n_features)
-        Features of windows.
-    targets : of each network (n,)
-        What it is to answer.
-    groups : (n,)
-        Number of the texture of each window; whole textures are held out to stop early.
-    hidden
-        Neurons of the hidden layer.
-    iterations
-        Largest number of steps.
-    seed
-        Seed of the first weights and of what is held out.
-    transfer
-        Name of the transfer function of the hidden layer.
-
-    Returns
-    -------
-    dict
-        Arrays by the names of the fields.
-    """
+    """Return the fields of `Networks`, one network for each target, (n,), of values (n, n_features)."""
     mean, scale = standardisation(values)
     standard = (values - mean) / scale
     rng = np.random.default_rng(seed)
@@ -151,15 +109,6 @@ class Ann1:
     `transfer` gives either.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
-    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
-    >>> predictor = Ann1.predictor(Ann1().fit(values, grades, textures))
-    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    True
     """
 
     hidden: int = param(
@@ -195,15 +144,6 @@ class Ann5(Ann1):
     """A network for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
-    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
-    >>> predictor = Ann5.predictor(Ann5().fit(values, grades, textures))
-    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    True
     """
 
     iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
@@ -228,15 +168,6 @@ class Svm5:
     """An RBF machine for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
-    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
-    >>> predictor = Svm5.predictor(Svm5().fit(values, grades, textures))
-    >>> bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
-    True
     """
 
     c: float = param(

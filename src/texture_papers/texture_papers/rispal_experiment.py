@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Grades of roughness of textures never touched (Rispal et al.)."""
 
@@ -126,17 +127,7 @@ SPEED_M_S, FORCE_N, SCAN_S, USED_S = 0.15, 2.5, 0.7, 0.5
 
 
 class SimulatedTextures:
-    """Scans of textures, described: each texture, speed and force is simulated once.
-
-    Parameters
-    ----------
-    scene
-        What is touched.
-    seed
-        Of where, and of all effects.
-    quick
-        Whether fewer scans and splits will do.
-    """
+    """Scans of textures, described: each texture, speed and force is simulated once."""
 
     def __init__(self, scene: Scene, seed: int, *, quick: bool = False) -> None:
         self.seed, self.quick = seed, quick
@@ -149,49 +140,13 @@ class SimulatedTextures:
     def extract(
         self, features: FeatureSet, textures: Sequence[str], count: int, speed_m_s: float, force_n: float
     ) -> LabelledFeatures:
-        """Return one window of so many scans over each texture.
-
-        Parameters
-        ----------
-        features
-            What is computed of the windows.
-        textures
-            Labels.
-        count
-            Slides over each.
-        speed_m_s
-            Speed of the finger.
-        force_n
-            Normal force.
-
-        Returns
-        -------
-        LabelledFeatures
-            One window a slide.
-        """
+        """Return one window of so many scans over each texture."""
         events = [event for texture in textures for event in self.events(texture, count, speed_m_s, force_n)]
         vectors = features.extract_many(events)
         return LabelledFeatures.from_vectors(vectors, {event.exploration_id: event.surface for event in events})
 
     def events(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Iterator[CutWindow]:
-        """Yield the window of each scan, USED_S long.
-
-        Parameters
-        ----------
-        texture
-            Label.
-        count
-            Number of slides.
-        speed_m_s
-            Speed of the finger.
-        force_n
-            Normal force.
-
-        Yields
-        ------
-        CutWindow
-            One for each slide.
-        """
+        """Yield the window of each scan, USED_S long."""
         for number, samples in enumerate(self._measured(texture, count, speed_m_s, force_n)):
             window = Window(samples, self._fast.rate_hz, self._fast.channels, 0, speed_m_s, force_n)
             yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, speed_m_s, force_n, texture)
@@ -206,23 +161,7 @@ class SimulatedTextures:
         return self._scans[key]
 
     def slides(self, textures: Sequence[str], count: int, speed_m_s: float, force_n: float) -> SlideArrays:
-        """Return the same scans as plain arrays, for a search.
-
-        Parameters
-        ----------
-        textures
-            Labels.
-        count
-            Slides over each.
-        speed_m_s
-            Speed of the finger.
-        force_n
-            Normal force.
-
-        Returns
-        -------
-        SlideArrays
-        """
+        """Return the same scans as plain arrays, for a search."""
         samples = np.concatenate([self._measured(texture, count, speed_m_s, force_n) for texture in textures])
         same = np.ones(len(samples))
         streams = {'signal': ArrayStream(samples, self._fast.rate_hz)}
@@ -231,23 +170,7 @@ class SimulatedTextures:
     def examples(
         self, recipe: RoughnessRecipe, textures: Sequence[str], speed_m_s: float = SPEED_M_S, force_n: float = FORCE_N
     ) -> LabelledFeatures:
-        """Return scans described for a recipe; fewer at other speeds and forces than the trained ones.
-
-        Parameters
-        ----------
-        recipe
-            Names the features.
-        textures
-            Labels.
-        speed_m_s
-            Speed of the finger.
-        force_n
-            Normal force.
-
-        Returns
-        -------
-        LabelledFeatures
-        """
+        """Return scans described for a recipe; fewer at other speeds and forces than the trained ones."""
         trained = (speed_m_s, force_n) == (SPEED_M_S, FORCE_N)
         count = self.scans if trained else self.other_scans
         return self.extract(recipe.feature_set, textures, count, speed_m_s, force_n)
@@ -277,22 +200,6 @@ def grades_chart(
     """Draw the estimates of each texture beside its human grade, a panel for each head (the paper's Fig. 7).
 
     The thick bar is one standard deviation over the windows, the thin one the 90 % interval of a window.
-
-    Parameters
-    ----------
-    panels
-        Regressor → name of the series → its estimates.
-    textures
-        Labels, in the order of their human grades.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
     """
     human = {name: row['human'] for series in panels.values() for one in series.values() for name, row in one.items()}
     order = sorted(textures, key=lambda name: (human[name], list(textures).index(name)))
@@ -312,22 +219,7 @@ def grades_chart(
 
 
 def coverage_chart(nominal: Array, covered: Array, title: str, path: str | Path) -> Path:
-    """Draw the share of grades within the intervals over the share claimed.
-
-    Parameters
-    ----------
-    nominal, covered : (n,)
-        Share claimed and share found, 0 to 1.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Draw the share of grades within the intervals over the share claimed."""
     with chart(path, (5.2, 4.6)) as figure:
         axes = figure.subplots()
         axes.plot([45, 100], [45, 100], color=COLOURS[6], linewidth=0.8, linestyle='--', label='exact coverage')

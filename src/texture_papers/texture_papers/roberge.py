@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures.
 
@@ -72,12 +73,6 @@ class SignalEnergy:
     """Integral of the squared, zero-mean signal over the window, unit² s.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", eq. 1.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> SignalEnergy()(WindowBatch(np.array([[2.0], [-2.0]]), rate_hz=10.0)).item()  # 4 unit² for 0.2 s
-    0.8
     """
 
     per_channel: ClassVar[bool] = True
@@ -94,12 +89,6 @@ class ArcLength:
     """Length of the line through the samples, with time in s and the signal in its unit.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", eq. 2.
-
-    Examples
-    --------
-    >>> still = WindowBatch(np.zeros((1001, 1)), rate_hz=1000.0)  # 1 s without any change
-    >>> round(ArcLength()(still).item(), 6)
-    1.0
     """
 
     per_channel: ClassVar[bool] = True
@@ -159,37 +148,13 @@ class SpectralPeaks:
 
 
 def by_frequency(peaks: Array) -> Array:
-    """Return peaks, the one of the lowest frequency first and those that are lacking last.
-
-    Parameters
-    ----------
-    peaks : (..., n_peaks, 2)
-        Frequency (Hz) and amplitude of each; amplitude 0 for a peak that is lacking.
-
-    Returns
-    -------
-    (..., n_peaks, 2)
-        The same in another order.
-    """
+    """Return peaks, the one of the lowest frequency first and those that are lacking last."""
     found = np.where(peaks[..., 1:] > 0, peaks[..., :1], np.inf)
     return np.take_along_axis(peaks, np.argsort(found, axis=-2, kind='stable'), axis=-2)
 
 
 def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array]:
     """Return bins and heights of the highest local maxima, highest first; 0 and 0 for those that are lacking.
-
-    Parameters
-    ----------
-    spectrum : (..., n_bins)
-        Not negative.
-    count
-        Number of peaks wanted.
-    gap
-        A maximum closer than so many bins to a higher one is left out.
-
-    Returns
-    -------
-    two arrays of shape (..., count)
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
     """
@@ -223,23 +188,6 @@ def pairs_won(decisions: Array | NDArray[np.float32], ties: str = TIES[0]) -> Ar
     """Return how many pairs each label wins, of decisions in the pairs (0, 1), (0, 2), …, (1, 2), ….
 
     Whole numbers without rounding: labels that tie are equal to the last bit, which means unclassified.
-
-    Parameters
-    ----------
-    decisions : (..., n_pairs)
-        Positive for the first label of a pair.
-    ties
-        'unclassified' leaves ties; 'nearest' adds less than half a pair for clearer decisions, as scikit-learn's SVC
-        does with `break_ties`.
-
-    Returns
-    -------
-    (..., n_labels)
-
-    Examples
-    --------
-    >>> pairs_won(np.array([0.5, 2.0, -1.0])).tolist()  # of three labels
-    [2.0, 0.0, 1.0]
     """
     swing, lost = _pairs(decisions.shape[-1])
     won: Array = (decisions > 0) @ swing + lost
@@ -251,15 +199,7 @@ def pairs_won(decisions: Array | NDArray[np.float32], ties: str = TIES[0]) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class PairsPredictor:
-    """Log softmax of the number of pairs won, (..., n_labels) of (..., n_features).
-
-    Parameters
-    ----------
-    decisions
-        Takes (..., n_features), returns the decision of each pair, (..., n_pairs), positive for its first label.
-    ties
-        One of TIES.
-    """
+    """Log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
 
     decisions: Callable[[Array], Array]
     ties: str
@@ -283,24 +223,7 @@ SLOPES: Mapping[str, Callable[[Array], Array]] = {
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """One hidden layer and one linear output: out · f(hidden · x + hidden_bias) + out_bias.
-
-    Parameters
-    ----------
-    hidden : (n_hidden, n_features)
-    hidden_bias, out : (n_hidden,)
-    out_bias
-    transfer
-        Transfer function f of the hidden layer, one of TRANSFERS: 'sigmoid' is tanh, 'linear' leaves its input.
-
-    Examples
-    --------
-    >>> values = np.linspace(-2.0, 2.0, 40)[:, None]
-    >>> start = Network.random(3, 1, np.random.default_rng(0))
-    >>> trained = fit_network(start, values, np.tanh(2.0 * values[:, 0]), np.zeros(40, dtype=bool), 100)
-    >>> bool(np.abs(trained(values) - np.tanh(2.0 * values[:, 0])).max() < 0.01)
-    True
-    """
+    """One hidden layer and one linear output: out · f(hidden · x + hidden_bias) + out_bias."""
 
     hidden: Array
     hidden_bias: Array
@@ -310,53 +233,17 @@ class Network:
 
     @classmethod
     def random(cls, n_hidden: int, n_features: int, rng: np.random.Generator, transfer: str = SIGMOID) -> Network:
-        """Return a network before its training, for inputs of unit variance.
-
-        Parameters
-        ----------
-        n_hidden
-            Neurons of the hidden layer.
-        n_features
-            Number of inputs.
-        rng
-            Draws the weights.
-        transfer
-            Transfer function of the hidden layer, one of TRANSFERS.
-
-        Returns
-        -------
-        Network
-        """
+        """Return a network before its training, for inputs of unit variance."""
         hidden = rng.normal(size=(n_hidden, n_features)) / np.sqrt(n_features)
         bias = rng.uniform(-1.0, 1.0, n_hidden)
         return cls(hidden, bias, rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5, transfer)
 
     def active(self, X: Array) -> Array:
-        """Return what the hidden layer gives, (n, n_hidden) of (n, n_features).
-
-        Parameters
-        ----------
-        X : (n, n_features)
-            Standardised.
-
-        Returns
-        -------
-        (n, n_hidden)
-        """
+        """Return what the hidden layer gives, (n, n_hidden) of (n, n_features)."""
         return TRANSFERS[self.transfer](X @ self.hidden.T + self.hidden_bias)
 
     def slope(self, active: Array) -> Array:
-        """Return the derivative of the transfer function where it gives `active`, (n, n_hidden).
-
-        Parameters
-        ----------
-        active : (n, n_hidden)
-            As `active` gives it.
-
-        Returns
-        -------
-        (n, n_hidden)
-        """
+        """Return the derivative of the transfer function where it gives `active`, (n, n_hidden)."""
         return SLOPES[self.transfer](active)
 
     def __call__(self, X: Array) -> Array:
@@ -364,20 +251,7 @@ class Network:
         return self.active(X) @ self.out + self.out_bias
 
     def jacobian(self, values: Array) -> tuple[Array, Array]:
-        """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`.
-
-        Parameters
-        ----------
-        values : (n, n_features)
-            Standardised.
-
-        Returns
-        -------
-        (n,)
-            Output for each example.
-        (n, n_weights)
-            Derivative of each output by each weight.
-        """
+        """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`."""
         active = self.active(values)
         by_bias = self.slope(active) * self.out
         by_hidden = by_bias[:, :, None] * values[:, None, :]
@@ -385,13 +259,7 @@ class Network:
         return active @ self.out + self.out_bias, np.concatenate(columns, axis=1)
 
     def moved(self, step: Array) -> Network:
-        """Return the network with a step, (n_weights,), added to its weights.
-
-        Parameters
-        ----------
-        step : (n_weights,)
-            In the order of `jacobian`.
-        """
+        """Return the network with a step, (n_weights,), added to its weights."""
         n_hidden = len(self.out)
         hidden, bias, out, out_bias = np.split(step, np.cumsum([self.hidden.size, n_hidden, n_hidden]))
         return Network(
@@ -405,22 +273,6 @@ class Network:
 
 def fit_network(network: Network, values: Array, targets: Array, held: NDArray[np.bool_], iterations: int) -> Network:
     """Return the network after its training; of its states, the one with the least error on what is held out.
-
-    Parameters
-    ----------
-    network
-        Where to start.
-    values, targets : (n, n_features), (n,)
-        Examples.
-    held : (n,) bool
-        Examples held out, which tell when to stop; none to stop by `iterations` alone.
-    iterations
-        At most so many.
-
-    Returns
-    -------
-    Network
-        With the shape of `network`.
 
     Source: Hagan & Menhaj 1994; early stopping as in MATLAB's trainlm.
     """
@@ -495,24 +347,7 @@ def _error(network: Network, values: Array, targets: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Networks:
-    """Networks with one hidden layer and one linear output each, over the same standardised features.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    hidden : (n_networks, n_hidden, n_features)
-    hidden_bias, out : (n_networks, n_hidden)
-    out_bias : (n_networks,)
-    transfer
-        One of TRANSFERS.
-
-    Examples
-    --------
-    >>> zero, one = np.zeros(1), np.ones(1)
-    >>> Networks(zero, one, one[None, None], zero[None], one[None], zero)(np.array([[0.5]])).round(3)  # tanh(0.5)
-    array([[0.462]])
-    """
+    """Networks with one hidden layer and one linear output each, over the same standardised features."""
 
     mean: Array
     scale: Array
@@ -680,22 +515,7 @@ OF_PAIRS: Mapping[str, type[SvmPairs] | type[AnnPairs]] = {
 
 @dataclass(frozen=True)
 class TunedPair:
-    """The variables of one pair of textures.
-
-    Parameters
-    ----------
-    labels
-        The two textures, in any order.
-    inputs
-        Inputs of the recipe whose features it sees, such as 'signal#2'; () for all.
-    learner_name, learner
-        What decides, of OF_PAIRS.
-
-    Examples
-    --------
-    >>> TunedPair(('felt', 'cork'), ('signal#2',), 'texture_papers.roberge:SvmPairs', SvmPairs()).as_recipe()['pair']
-    ['felt', 'cork']
-    """
+    """The variables of one pair of textures."""
 
     labels: tuple[str, str]
     inputs: tuple[str, ...]
@@ -704,20 +524,7 @@ class TunedPair:
 
     @classmethod
     def from_recipe(cls, entry: Any, where: str) -> TunedPair:
-        """Build from one entry of the list `pairs` of a recipe.
-
-        Parameters
-        ----------
-        entry
-            Mapping with `pair`, `learner` and, if not all inputs are used, `inputs`.
-        where
-            Where it stands, for the sentence of an error.
-
-        Raises
-        ------
-        InvalidParameter, UnknownName
-            If it is no such mapping, or names no learner of pairs.
-        """
+        """Build from one entry of the list `pairs` of a recipe."""
         if not isinstance(entry, Mapping):
             raise InvalidParameter(f'{where}: came {safe_repr(entry)}; a mapping with pair and learner is needed')
         check_keys(entry, PAIR_KEYS, where)
@@ -742,39 +549,6 @@ class TunedPairs:
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
     to each pair of textures.
-
-    Parameters
-    ----------
-    learner_name, learner
-        What decides the pairs that are not listed.
-    pairs
-        Variables of single pairs.
-    ties
-        One of TIES: 'unclassified' returns no label, 'nearest' the one with larger margins.
-    names, labels
-        Of the features and the textures of the training; `of_examples` sets them.
-
-    Examples
-    --------
-    In a recipe::
-
-        inputs:
-          signal: {features: [{spectral_peaks: {peaks: 3}}]}
-          signal#2: {features: [{spectral_peaks: {peaks: 9}}, arc_length]}
-        learner:
-          tuned_pairs:
-            learner: {svm_pairs: {kernel_scale: 4.0}}
-            pairs:
-              - {pair: [cork, felt], inputs: [signal#2], learner: {svm_pairs: {kernel_scale: 7.0}}}
-
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> pairs = [{'pair': ['cork', 'felt'], 'inputs': ['signal#2'], 'learner': 'texture_papers.roberge:AnnPairs'}]
-    >>> learner = TunedPairs.from_recipe({'pairs': pairs}, 'recipe')
-    >>> learner = learner.of_examples(['signal#1/a', 'signal#2/a', 'signal#2/b'], ['cork', 'felt'])
-    >>> predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     learner_name: str = 'texture_papers.roberge:SvmPairs'
@@ -794,20 +568,7 @@ class TunedPairs:
 
     @classmethod
     def from_recipe(cls, values: Mapping[str, Any], where: str) -> TunedPairs:
-        """Build from the section of a recipe.
-
-        Parameters
-        ----------
-        values
-            The section: `learner`, `pairs`, `ties`.
-        where
-            Where it stands, for the sentence of an error.
-
-        Raises
-        ------
-        InvalidParameter, UnknownName
-            If a key, a label or a learner is wrong.
-        """
+        """Build from the section of a recipe."""
         if not isinstance(values, Mapping) or not isinstance(values.get('pairs') or [], list):
             raise InvalidParameter(f'{where}: came {safe_repr(values)}; a mapping with a list of pairs is needed')
         check_keys(values, KEYS, where)
@@ -828,33 +589,14 @@ class TunedPairs:
         }
 
     def of_examples(self, names: Sequence[str], labels: Sequence[str]) -> TunedPairs:
-        """Return the learner for examples with these features and textures.
-
-        Parameters
-        ----------
-        names : (n_features,)
-            Of the features, each beginning with its input.
-        labels : (n_labels,)
-            Of the textures, in the order of their numbers.
-
-        Raises
-        ------
-        InvalidParameter
-            If a pair sees an input that the examples lack.
-        """
+        """Return the learner for examples with these features and textures."""
         bound = replace(self, names=tuple(names), labels=tuple(labels))
         for pair in self.pairs:
             bound._columns(pair)
         return bound
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
-        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
-
-        Raises
-        ------
-        InvalidParameter
-            If pairs have variables of their own, and nothing has told the names of features and textures.
-        """
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         if self.pairs and (len(self.names), len(self.labels)) != (X.shape[1], int(y.max()) + 1):
             raise InvalidParameter(
                 'the pairs of the recipe have variables of their own, and the names of the features and textures are '

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Textures by linear and circular motion (Roberge et al.): four, five and ten textures, and friction."""
 
@@ -333,23 +334,7 @@ def friction_digests() -> dict[str, str]:
 
 
 def measured_friction(scene: Scene, slides: Slides, error_n: float, rng: np.random.Generator) -> Array:
-    """Return tangential over normal force of each slide, (n_slides, 1), of steady sliding and a wrench with errors.
-
-    Parameters
-    ----------
-    scene
-        Gives the friction of each sheet.
-    slides
-        With speed and force of each.
-    error_n
-        Standard deviation of the error of each force, N.
-    rng
-        Draws the errors.
-
-    Returns
-    -------
-    (n_slides, 1)
-    """
+    """Return tangential over normal force of each slide, (n_slides, 1), of steady sliding and a wrench with errors."""
     normal_n, speed_m_s = slides.views[0].force_n, slides.views[0].speed_m_s
     frictions = [scene.surfaces[name].friction for name in slides.surfaces]
     coefficients = np.array([sliding_coefficient(friction, speed_m_s) for friction in frictions])

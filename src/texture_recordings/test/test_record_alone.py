@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A machine that only records needs the messages, the core, the drivers and this package, and no numerical library."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Both nodes as real processes: what is replayed into the graph and recorded from it is what was in the bag."""
 

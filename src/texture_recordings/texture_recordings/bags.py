@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Read and write bags (MCAP) of the suite's messages, of any origin."""
 
@@ -76,17 +77,7 @@ FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
-    """A path from which only regular files are read, whoever opens them; files of text are short.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     path = CheckedPath(folder, 'metadata.yaml')
-    ...     _ = Path(path).write_bytes(b'version: 9')
-    ...     print(path.read_text())
-    version: 9
-    """
+    """A path from which only regular files are read, whoever opens them; files of text are short."""
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
@@ -218,13 +209,7 @@ TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
 
 @cache
 def typestore() -> Typestore:
-    """Return the message types of ROS 2 Jazzy and of the suite.
-
-    Raises
-    ------
-    InvalidData
-        If the message definitions of the suite are not installed.
-    """
+    """Return the message types of ROS 2 Jazzy and of the suite."""
     store = get_typestore(Stores.ROS2_JAZZY)
     directory = folder('texture_msgs', 'msg')
     definitions = sorted(directory.glob('*.msg'))
@@ -251,13 +236,7 @@ def encode(value: Any) -> bytes:
 
 
 def decode(raw: bytes, msgtype: str) -> Any:
-    """Return the data class in the CDR of a message of texture_msgs; arrays are views of `raw`.
-
-    Raises
-    ------
-    InvalidData
-        If the bytes are not such a message, or it contradicts itself.
-    """
+    """Return the data class in the CDR of a message of texture_msgs; arrays are views of `raw`."""
     try:
         return CODEC.from_message(typestore().deserialize_cdr(raw, msgtype), MESSAGES[msgtype])
     except (SerdeError, struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError) as error:
@@ -276,26 +255,7 @@ def short_name(topic: str) -> str:
 
 
 def connections_below(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
-    """Return the connections of the suite's messages in a namespace, and those of the diagnostics.
-
-    Parameters
-    ----------
-    path
-        The bag, for messages.
-    connections
-        All connections of the bag.
-    namespace
-        Namespace of the sensor; None if there is only one.
-
-    Returns
-    -------
-    list of Connection
-
-    Raises
-    ------
-    InvalidData
-        If the bag has other messages, other definitions of them, several namespaces or not this one.
-    """
+    """Return the connections of the suite's messages in a namespace, and those of the diagnostics."""
     ours = [c for c in connections if c.msgtype in MESSAGES]
     if not ours:
         named = ', '.join(sorted({c.msgtype for c in connections})) or 'nothing'
@@ -324,11 +284,6 @@ def topic_names(topics: Iterable[str]) -> dict[str, str]:
 
     Several fingers of one explorer stream on 'finger0/signal' and so on; a topic without an explorer above it belongs
     to the folder in which it is.
-
-    Examples
-    --------
-    >>> topic_names(['/left/exploration', '/left/finger0/signal', '/right/signal'])
-    {'/left/exploration': 'exploration', '/left/finger0/signal': 'finger0/signal', '/right/signal': 'signal'}
     """
     given = list(topics)
     explorers = {_folder(topic) for topic in given if short_name(topic) == EXPLORATION}
@@ -356,14 +311,7 @@ BROKEN = (
 
 
 class RawMessage(NamedTuple):
-    """One message as it lies in a bag.
-
-    Examples
-    --------
-    >>> message = RawMessage('/signal', 'texture_msgs/msg/TactileSignal', 7, b'')
-    >>> message.topic, message.log_ns
-    ('/signal', 7)
-    """
+    """One message as it lies in a bag."""
 
     topic: str
     msgtype: str
@@ -386,13 +334,7 @@ def _cut_off_file(path: Path) -> Path | None:
 
 
 def find_bags(paths: Iterable[str | Path]) -> list[Path]:
-    """Return the bags among `paths`, each a bag or a folder of bags, in the order given and by name.
-
-    Raises
-    ------
-    InvalidData
-        If one is missing or neither.
-    """
+    """Return the bags among `paths`, each a bag or a folder of bags, in the order given and by name."""
     found: list[Path] = []
     for path in map(Path, paths):
         inside = [path] if is_bag(path) else sorted(filter(is_bag, path.glob('*')))
@@ -415,27 +357,7 @@ def _no_bag(path: Path) -> str:
 def read_named(
     path: str | Path, namespace: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
 ) -> Iterator[tuple[str, RawMessage]]:
-    """Yield every message of a bag in the order of its log times, undecoded, with the name of its topic.
-
-    Parameters
-    ----------
-    path
-        The bag.
-    namespace
-        Only topics of this namespace; None if the bag has but one.
-    start_ns, stop_ns
-        Only messages logged from `start_ns` to before `stop_ns`.
-
-    Yields
-    ------
-    (str, RawMessage)
-        Name below the namespace, 'signal' or 'finger0/signal', and the message: topic, type, log time in ns and bytes.
-
-    Raises
-    ------
-    InvalidData
-        If there is no bag, it is damaged or foreign, or has several namespaces and none was named.
-    """
+    """Yield every message of a bag in the order of its log times, undecoded, with the name of its topic."""
     return _read(Path(path), lambda connection, name: True, namespace, start_ns, stop_ns)
 
 
@@ -451,27 +373,6 @@ def read_bag(
     Only messages of the suite are read. Topics are named as below their namespace, 'signal' for '/left/signal' and
     'finger0/signal' for the first of several fingers, in `topics` as in the answer; samples are views of the bytes
     read. The other arguments are those of `read_named`.
-
-    Parameters
-    ----------
-    path
-        The bag.
-    topics
-        Names of the topics to read below their namespace; None for all.
-    namespace
-        Only topics of this namespace; None if the bag has but one.
-    start_ns, stop_ns
-        Only messages logged from `start_ns` to before `stop_ns`.
-
-    Yields
-    ------
-    (str, int, object)
-        Name of the topic below its namespace, log time in ns, and data class.
-
-    Raises
-    ------
-    InvalidData
-        If there is no bag, or it is damaged.
     """
     wanted = None if topics is None else set(topics)
 
@@ -487,18 +388,7 @@ def read_bag(
 
 
 def topics_in(path: str | Path, namespace: str | None = None) -> list[str]:
-    """Return the names of the topics of the suite in a bag, below their namespace, sorted.
-
-    Parameters
-    ----------
-    path, namespace
-        As of `read_named`.
-
-    Raises
-    ------
-    InvalidData
-        As `read_named` does.
-    """
+    """Return the names of the topics of the suite in a bag, below their namespace, sorted."""
     names: set[str] = set()
 
     def note(connection: Connection, name: str) -> bool:
@@ -511,20 +401,7 @@ def topics_in(path: str | Path, namespace: str | None = None) -> list[str]:
 
 
 def read_foreign(path: str | Path, chosen: Callable[[Connection], bool]) -> Iterator[RawMessage]:
-    """Yield messages of a bag that the suite did not record, undecoded, in the order of their log times.
-
-    Parameters
-    ----------
-    path
-        The bag.
-    chosen
-        Says of a connection whether its messages are wanted.
-
-    Raises
-    ------
-    InvalidData
-        If there is no bag or it is damaged.
-    """
+    """Yield messages of a bag that the suite did not record, undecoded, in the order of their log times."""
     found = _read(Path(path), lambda connection, name: chosen(connection), None, None, None, foreign=True)
     return (message for _, message in found)
 
@@ -583,20 +460,7 @@ def _files(path: Path) -> list[Path]:
 
 
 class Continuity:
-    """Count lost samples and restarts of streams, from the running index of their batches.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> continuity = Continuity()
-    >>> for first_sample in (0, 10, 25, 0):  # five samples are missing, then the driver was started again
-    ...     samples = np.zeros((10, 1), dtype=np.float32)
-    ...     continuity.update('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, first_sample, samples))
-    >>> continuity.lost['signal'], continuity.restarts['signal']
-    (5, 1)
-    >>> continuity.losses
-    '5 samples lost, and unknown losses in 1 restart of a driver or bridge'
-    """
+    """Count lost samples and restarts of streams, from the running index of their batches."""
 
     def __init__(self) -> None:
         self.samples: Counter[str] = Counter()
@@ -637,23 +501,7 @@ def slide_batches(
     batch_s: float = BATCH_S,
     edges: Iterable[int] = (),
 ) -> Iterator[TactileSignal]:
-    """Yield the samples of a slide in batches; each loss and each edge begins a new one.
-
-    Parameters
-    ----------
-    like
-        Names sensor, channels, units, rate and frame; its first sample is the running index of the start.
-    samples : (n, n_channels)
-        Of the whole slide.
-    index : (n,)
-        Place of each on an even grid from the start of the slide on; it jumps where samples were lost.
-    start_ns
-        Start of the slide.
-    batch_s
-        Longest time that a batch covers.
-    edges
-        Rows at which phases begin.
-    """
+    """Yield the samples of a slide in batches; each loss and each edge begins a new one."""
     rate_hz, first = like.sampling_rate_hz, like.first_sample
     step = max(1, round(batch_s * rate_hz))
     borders = {0, *edges, *(np.flatnonzero(np.diff(index) != 1) + 1).tolist(), len(index)}
@@ -695,36 +543,7 @@ def quality_of(topic: str) -> Quality | None:
 
 
 class BagWriter:
-    """Write a new bag; use it in a `with` block, at the end of which the bag is complete.
-
-    Parameters
-    ----------
-    path
-        Folder to make; nothing may exist there.
-    namespace
-        Put before topics that do not start with '/': 'signal' becomes '/left/signal' in '/left'.
-
-    Each chunk carries its checksum, and `flush` ends one: a bag whose writer was killed is read up to the last.
-
-    Raises
-    ------
-    InvalidData
-        If something exists at `path`, or it cannot be made.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from tempfile import TemporaryDirectory
-    >>> from texture_core.types import TactileSignal
-    >>> from texture_recordings.bags import read_bag
-    >>> batch = TactileSignal(5, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
-    >>> with TemporaryDirectory() as folder:
-    ...     with BagWriter(f'{folder}/bag') as bag:
-    ...         bag.write('signal', batch, log_ns=7)
-    ...     [(topic, log_ns, signal)] = read_bag(f'{folder}/bag')
-    >>> topic, log_ns, signal.samples[:, 0].tolist()
-    ('signal', 7, [1.0, 2.0])
-    """
+    """Write a new bag; use it in a `with` block, at the end of which the bag is complete."""
 
     def __init__(self, path: str | Path, namespace: str = '/') -> None:
         self.path = Path(path)
@@ -747,17 +566,7 @@ class BagWriter:
         self._storage.close_chunk = self._close_with_checksum
 
     def write(self, topic: str, value: Any, log_ns: int) -> None:
-        """Write a data class of texture_core as received at `log_ns`.
-
-        Parameters
-        ----------
-        topic
-            Name of the topic, such as 'signal'.
-        value
-            Data class of texture_core that has a message.
-        log_ns
-            Time at which it is logged, ns.
-        """
+        """Write a data class of texture_core as received at `log_ns`."""
         self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
 
     def write_all(self, messages: Iterable[tuple[int, str, Any]]) -> None:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Labelled slides from bags, tables or public sets: `SlideDataset`, its conditions, its samples."""
 
@@ -50,38 +51,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LabelledSlide:
-    """One exploration with a slide: its label, its conditions, and its signals if they were read.
-
-    Parameters
-    ----------
-    bag
-        Bag in which it lies, or the name of the recording of arrays.
-    exploration_id
-        As recorded.
-    surface
-        The label.
-    number
-        Counts the slides of this surface from 1 in the order recorded.
-    start_ns, stop_ns
-        What belongs to the slide was logged from `start_ns` to before `stop_ns` (None: the end of the bag).
-    namespace
-        Namespace of the finger; None if the bag has but one.
-    motion
-        How the slide was made; None if that is unknown or it was not straight.
-    signals
-        Batches of each topic in the order of time; empty if only the places of the slides were read.
-    states
-        Exploration states, in the order of time.
-    place
-        Which part of the path it covers, such as '1/2' (see `SlideDataset.in_parts`), or where a whole slide touched,
-        'at -12,8 mm', if slides of its surface touched at several places; else ''.
-
-    Examples
-    --------
-    >>> slide = LabelledSlide(Path('monday.mcap'), 'id', 'cork', number=3, start_ns=0, stop_ns=None)
-    >>> slide.name, slide.session
-    ('cork/3', 'monday')
-    """
+    """One exploration with a slide: its label, its conditions, and its signals if they were read."""
 
     bag: Path
     exploration_id: str
@@ -158,13 +128,7 @@ STRAIGHT = 'linear_slide'  # of other motions, states do not tell all that is ne
 
 
 def motion_made(states: Sequence[ExplorationState]) -> SlideMotion | None:
-    """Return how a slide was made; None if it was not straight, or its speed, force or direction are unknown.
-
-    Parameters
-    ----------
-    states
-        Of one exploration, in the order of time.
-    """
+    """Return how a slide was made; None if it was not straight, or its speed, force or direction are unknown."""
     sliding = [state for state in states if state.phase is Phase.SLIDE and state.motion == STRAIGHT]
     if not sliding:
         return None
@@ -287,13 +251,7 @@ STREAMS, STATES = ('signal', 'signal_static'), 'exploration'
 
 
 def parse_selection(text: str) -> frozenset[int] | None:
-    """Return the numbers in '1-30' or '1,3,5-7'; None, meaning all, for ''.
-
-    Raises
-    ------
-    InvalidData
-        If the text is no such list.
-    """
+    """Return the numbers in '1-30' or '1,3,5-7'; None, meaning all, for ''."""
     if not text.strip():
         return None
     numbers: set[int] = set()
@@ -312,27 +270,6 @@ def find_slides(
     """Return the labelled slides in bags, by bag and time, with the signals of topics; each bag is read once.
 
     Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
-
-    Parameters
-    ----------
-    bags
-        Bags, or folders of bags.
-    slides
-        Slides of each surface to keep, such as '1-30', counted from 1 in the order recorded; '' keeps all.
-    namespace
-        Namespace of the finger, if bags hold several.
-    topics
-        Signals to read; none by default.
-
-    Returns
-    -------
-    list of LabelledSlide
-        Counted for each surface.
-
-    Raises
-    ------
-    InvalidData
-        If a bag cannot be read, no slide is labelled, or none has a number asked for.
     """
     wanted = parse_selection(slides)
     paths = find_bags(bags)
@@ -412,13 +349,7 @@ TOUCHING = (Phase.CONTACT, Phase.SLIDE)
 
 
 def with_places(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
-    """Return slides with the place of their touch, where slides of one surface touched at several.
-
-    Parameters
-    ----------
-    slides
-        Whole slides; without reported positions they keep no place.
-    """
+    """Return slides with the place of their touch, where slides of one surface touched at several."""
     touched: dict[str, list[tuple[float, float]]] = defaultdict(list)
     found: list[tuple[float, float] | None] = []
     for slide in slides:
@@ -899,13 +830,7 @@ class SlideDataset:
 
 
 def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:
-    """Return the windows of a slide and its end, as the feature extractor on the robot cuts them.
-
-    Raises
-    ------
-    ModelMismatch
-        If the slide has nothing of an input.
-    """
+    """Return the windows of a slide and its end, as the feature extractor on the robot cuts them."""
     missing = [topic for topic in feature_set.topics if not slide.signals.get(topic)]
     if missing:
         raise ModelMismatch(

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Write labelled slides as others read them: Parquet, HDF5, a LeRobot data set; and cards for data sets and models."""
 
@@ -24,35 +25,7 @@ FACTS = ('slide', 'surface', 'number', 'session', *CONDITION_COLUMNS.values(), '
 
 
 def export_slides(dataset: SlideDataset, out: str | Path, kind: str, licence: str = 'other') -> list[str]:
-    """Write the slides of a data set, all streams that each slide has, into a new folder with a data card.
-
-    Parameters
-    ----------
-    dataset
-        The slides.
-    out
-        Folder to make; nothing may exist there.
-    kind
-        One of `KINDS`.
-    licence
-        Licence as hubs name it, such as 'cc-by-4.0', for the card.
-
-    Returns
-    -------
-    list of str
-        What was written, and what was left out, in lines.
-
-    Raises
-    ------
-    InvalidData
-        If no slide has all its samples, or the slides differ in rate or channels.
-    InvalidParameter
-        If the folder exists or cannot be written.
-    UnknownName
-        If there is no such kind.
-    MissingLibrary
-        If h5py or pyarrow is needed and missing.
-    """
+    """Write the slides of a data set, all streams that each slide has, into a new folder with a data card."""
     write = find(KINDS, kind, 'format')
     slides, lost = _whole(dataset)
     folder = Path(out)
@@ -219,13 +192,7 @@ INDICES = ('frame_index', 'episode_index', 'index', 'task_index')
 
 
 def frame_rate_hz(rates_hz: Sequence[float]) -> int:
-    """Return the frames a second in which streams of these rates have whole numbers of samples, or 50.
-
-    Examples
-    --------
-    >>> frame_rate_hz([1000.0, 60.0]), frame_rate_hz([2200.0, 100.0]), frame_rate_hz([1000.0]), frame_rate_hz([99.8])
-    (20, 100, 200, 50)
-    """
+    """Return the frames a second in which streams of these rates have whole numbers of samples, or 50."""
     if any(rate_hz != round(rate_hz) for rate_hz in rates_hz):
         return 50
     common = math.gcd(*map(round, rates_hz))
@@ -392,17 +359,7 @@ FORMS = {
 
 
 def data_card(slides: Slides, kind: str, licence: str) -> str:
-    """Return the card of an exported data set.
-
-    Parameters
-    ----------
-    slides
-        Samples of the same slides, by topic.
-    kind
-        One of `KINDS`.
-    licence
-        As hubs name it.
-    """
+    """Return the card of an exported data set."""
     first = next(iter(slides.values()))
     facts: dict[str, Any] = {
         'license': licence,
@@ -434,20 +391,7 @@ def data_card(slides: Slides, kind: str, licence: str) -> str:
 
 
 def model_card(path: str | Path, licence: str = 'other') -> str:
-    """Return the card of a trained model of the suite, from its JSON card.
-
-    Parameters
-    ----------
-    path
-        The JSON card beside the model.
-    licence
-        As hubs name it.
-
-    Raises
-    ------
-    InvalidData
-        If it is no card of a texture model.
-    """
+    """Return the card of a trained model of the suite, from its JSON card."""
     try:
         card = parse_json(read_bounded(Path(path), MAX_CARD_BYTES).decode())
         labels, recipe, training = (card[name] for name in ('labels', 'recipe', 'training'))

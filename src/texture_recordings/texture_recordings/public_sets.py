@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Importers of the public recordings."""
 
@@ -37,15 +38,7 @@ NORMAL_FORCE = 2  # column of `wrench`: y of the tool, the one component that pr
 
 @dataclass(frozen=True, eq=False)
 class BiotacSlide:
-    """One slide as recorded; the fields of the arrays are named as in the files.
-
-    Examples
-    --------
-    >>> frames, velocity, wrench = np.zeros((3, 44)), np.zeros((5, 4)), np.zeros((5, 7))
-    >>> slide = BiotacSlide('material01', '1', frames, np.array([0.0, 0.01, 0.05]), velocity, wrench, epoch=0.0)
-    >>> slide.frames.shape
-    (3, 44)
-    """
+    """One slide as recorded; the fields of the arrays are named as in the files."""
 
     surface: str
     slide: str
@@ -153,18 +146,7 @@ def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[BiotacSli
 
 
 def frame_indices(frame_time: AnyArray) -> AnyArray:
-    """Return the running index of each frame on the 10 ms grid: it jumps where frames are missing.
-
-    Parameters
-    ----------
-    frame_time : (n_frames,)
-        Time of each frame, s, rising.
-
-    Returns
-    -------
-    (n_frames,)
-        Whole numbers, the first 0.
-    """
+    """Return the running index of each frame on the 10 ms grid: it jumps where frames are missing."""
     steps = np.diff(np.asarray(frame_time, dtype=float))
     missing = np.where(steps > LOST_AFTER_S, np.rint(steps / (FRAME_NS / NANOSECONDS)) - 1, 0)
     return np.concatenate([[0], np.cumsum(1 + missing)]).astype(int)
@@ -174,16 +156,6 @@ def restore_sign(rectified: AnyArray) -> Array:
     """Return a vibration from its rectified samples, up to one sign for the whole.
 
     The sign of each sample is the one that continues the straight line through the two before it.
-
-    Parameters
-    ----------
-    rectified : (n_samples,)
-        |PAC − offset|, ≥ 0, a whole slide.
-
-    Returns
-    -------
-    (n_samples,)
-        In the unit of the samples.
     """
     x = np.asarray(rectified, dtype=float)
     # Where the line through two samples of equal sign crosses zero, the sign turns; right after a crossing the line
@@ -262,20 +234,6 @@ class SlideSet:
 
     Call it with the folder of the files, the folder for the bags, the numbers of the slides of each surface ('' for
     all), and surfaces (none for all); it returns the bags.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from texture_recordings.dataset import find_slides
-    >>> own = SlideSet(
-    ...     'slides.npz', r'([a-z]+)-(\d+)', 'signal', 'finger', ('pac',), 'count', 100.0,
-    ...     order=lambda surface, number: (surface, (int(number),)),
-    ...     slide=lambda order, samples: SteadySlide(samples, 0.05, 1.0, 0.0),
-    ... )
-    >>> with TemporaryDirectory() as folder:
-    ...     np.savez(f'{folder}/slides.npz', **{'cork-1': np.zeros((200, 1)), 'cork-2': np.zeros((200, 1))})
-    ...     print([item.name for item in find_slides(own(folder, f'{folder}/bags'))])
-    ['cork/1', 'cork/2']
     """
 
     files: str  # a name or a pattern, such as '2021-*.npz'
@@ -297,24 +255,7 @@ class SlideSet:
         slides: str = '',
         materials: Sequence[str] = (),
     ) -> list[Path]:
-        """Write the bags, and return their paths.
-
-        Parameters
-        ----------
-        source
-            Folder of the files.
-        out
-            Folder for the bags; made if missing.
-        slides
-            Numbers of the slides of each surface, such as '1-30'; '' for all.
-        materials
-            Labels of the surfaces; none for all.
-
-        Raises
-        ------
-        InvalidData, UnknownName
-            If the folder `source` lacks the files, slides or a surface, the channels are not there, or a bag exists.
-        """
+        """Write the bags, and return their paths."""
         arrays, wanted = self._read(Path(source)), parse_selection(slides)
         found: defaultdict[str, list[tuple[tuple[Any, ...], str]]] = defaultdict(list)
         for key in arrays:
@@ -466,25 +407,7 @@ def _ntp21_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
 
 
 def evenly(samples: Array, duration_s: float) -> Array:
-    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels).
-
-    Parameters
-    ----------
-    samples : (n_recorded, n_channels)
-        Evenly spaced over the duration.
-    duration_s
-        Time from the first to the last sample.
-
-    Returns
-    -------
-    (n, n_channels)
-        In the unit of the samples.
-
-    Raises
-    ------
-    ValueError
-        If there are too few samples, or the duration makes no sense.
-    """
+    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 – nothing else in this package needs scipy
 
     if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Topics of the suite that are recorded and replayed."""
 
@@ -32,13 +33,7 @@ class Topic(NamedTuple):
 
 
 def message_class(msgtype: str) -> Any:
-    """Return the class of a type of messages, such as 'tf2_msgs/msg/TFMessage'.
-
-    Raises
-    ------
-    InvalidData
-        If its package is not installed.
-    """
+    """Return the class of a type of messages, such as 'tf2_msgs/msg/TFMessage'."""
     package, _, name = msgtype.split('/')
     try:
         return getattr(importlib.import_module(f'{package}.msg'), name)

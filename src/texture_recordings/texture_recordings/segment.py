@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Give a bag the exploration states that its signals tell: for bags without them, or with wrong ones."""
 
@@ -27,29 +28,6 @@ def segment_bags(
 
     Surface, speed and force of a slide are those of the last state before its middle, if there is one. All other
     messages are copied as they are.
-
-    Parameters
-    ----------
-    bags
-        Bags, or folders of bags.
-    out
-        Folder for the copies, each named as its bag; made if missing.
-    params
-        How sliding is found.
-    surface
-        Label of all slides; '' keeps those of the states.
-    namespace
-        Of the finger, if bags hold several.
-
-    Returns
-    -------
-    dict
-        Number of slides, by the path of the copy.
-
-    Raises
-    ------
-    InvalidData
-        If a bag cannot be read, has no vibration, or a copy exists already.
     """
     paths = find_bags(bags)
     return {

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Import foreign tables by a mapping file: readers, columns, borders of slides, bags."""
 
@@ -89,11 +90,6 @@ def template_pattern(template: str) -> tuple[re.Pattern[str], Sequence[str]]:
 
     A field in braces is one character or more, holds no '/', and ends where the text behind it comes first; '*' and
     '{}' stand for any text that is not kept.
-
-    Raises
-    ------
-    InvalidParameter
-        If two fields follow each other without text between them, or a name occurs twice.
     """
     first, *literals = FIELD.sub('\0', template).split('\0')
     if '' in literals[:-1]:
@@ -111,20 +107,7 @@ def template_pattern(template: str) -> tuple[re.Pattern[str], Sequence[str]]:
 
 
 def template_fields(template: str, name: str) -> dict[str, str] | None:
-    """Return the fields of a name; None if it is not of the form of the template.
-
-    Parameters
-    ----------
-    template
-        Such as '{material}/{speed}mms_*.csv'; see `template_pattern`.
-    name
-        Path of a file, or name of an array.
-
-    Examples
-    --------
-    >>> template_fields('{material}/{speed}mms_*.csv', 'felt/20mms_first.csv')
-    {'material': 'felt', 'speed': '20'}
-    """
+    """Return the fields of a name; None if it is not of the form of the template."""
     pattern, names = template_pattern(template)
     match = pattern.fullmatch(name)
     return {key: text for key, text in zip(names, match.groups(), strict=True) if key} if match else None
@@ -246,14 +229,7 @@ CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
 
 @dataclass(frozen=True)
 class TableMapping:
-    """Parameters that map the columns of tables to signals and slides.
-
-    Examples
-    --------
-    >>> mapping = mapping_from({'streams': {'signal': {'columns': ['ax']}}, 'label': {'column': 'material'}})
-    >>> mapping.slides.by, mapping.streams['signal'].columns
-    ('file', ['ax'])
-    """
+    """Parameters that map the columns of tables to signals and slides."""
 
     files: str = param('*', "Gives the template of the paths below the source, such as '{material}/run{run}.csv'.")
     tables: str = param(
@@ -346,23 +322,7 @@ MAX_TEXT = 200  # characters of a cell that is shown or a label
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What was read of a table.
-
-    Parameters
-    ----------
-    numbers
-        By name: (n,) float64, NaN where a row is malformed.
-    texts
-        By name: (n,) texts.
-    rows
-        Number in the file of each row, from 1, for sentences; None if rows count from 0.
-    malformed
-        What is wrong with the first malformed rows, by their numbers in the file.
-    place, fields, rate_hz, clocks
-        Of the table, see `Table`; the fields in the name of the file are among them.
-    chosen
-        Names of the columns of each stream.
-    """
+    """What was read of a table."""
 
     numbers: Mapping[str, Array]
     texts: Mapping[str, NDArray[np.str_]]
@@ -381,29 +341,7 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns that belong together.
-
-    Parameters
-    ----------
-    place
-        File, and array in it, for sentences.
-    names
-        Columns that there are.
-    read
-        Called with the names of the columns that are numbers, and of those that are texts.
-    fields
-        Values that hold for the whole table, by name: from the names of file and array.
-    rate_hz
-        Sampling rate if the file states it, else 0.
-    clocks
-        Name of the column of time by the name of a column, where the file states that.
-
-    Examples
-    --------
-    >>> table = Table('a.csv', ('t', 'taxel1', 'taxel2'), read=lambda numbers, texts: Columns({}, {}))
-    >>> table.chosen(['taxel*'])
-    ['taxel1', 'taxel2']
-    """
+    """Columns that belong together."""
 
     place: str
     names: Sequence[str]
@@ -413,13 +351,7 @@ class Table:
     clocks: Mapping[str, str] = field(default_factory=dict)
 
     def chosen(self, wanted: Sequence[str]) -> list[str]:
-        """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order.
-
-        Raises
-        ------
-        InvalidData
-            If one means none, with the nearest name.
-        """
+        """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
         known = frozenset(self.names)
         found = []
         for name in wanted:
@@ -431,13 +363,7 @@ class Table:
         return found
 
     def mapped(self, mapping: TableMapping, fields: Mapping[str, str]) -> Columns:
-        """Return the columns that a mapping uses; `fields` are those of the name of the file.
-
-        Raises
-        ------
-        InvalidData
-            If one is missing, with the nearest name.
-        """
+        """Return the columns that a mapping uses; `fields` are those of the name of the file."""
         fields = {**self.fields, **fields}
         chosen = {name: self.chosen(stream.columns) for name, stream in mapping.streams.items()}
         wanted = [column for columns in chosen.values() for column in columns] + mapping.numbers()
@@ -478,31 +404,7 @@ class TableFiles:
     def tables(
         self, kind: str, path: Path, place: str, mapping: TableMapping, fields: Mapping[str, str] | None = None
     ) -> Iterator[Columns]:
-        """Yield the tables of a file, of each the columns that a mapping uses.
-
-        Parameters
-        ----------
-        kind
-            One of `READERS`.
-        path
-            The file, or the folder of a bag.
-        place
-            Its name for sentences.
-        mapping
-            Says how the file is read and what is wanted of it.
-        fields
-            Values in its name.
-
-        Yields
-        ------
-        Columns
-            With what holds for the whole table.
-
-        Raises
-        ------
-        InvalidData
-            If it is no file of its kind, lacks a column, is damaged, or takes more memory or time than the limit.
-        """
+        """Yield the tables of a file, of each the columns that a mapping uses."""
         size = _checked_size(path, place)
         if self._child is None:
             self._begin()
@@ -576,13 +478,7 @@ def _checked_size(path: Path, place: str) -> int:
 
 
 def serve(number: int) -> None:
-    """Read files as asked for over an inherited connection, until it ends: the work of the child process.
-
-    Parameters
-    ----------
-    number
-        File descriptor of the connection.
-    """
+    """Read files as asked for over an inherited connection, until it ends: the work of the child process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, whose end is ours
     connection = Connection(number)
     while True:
@@ -1184,18 +1080,7 @@ GAP = 1.75  # steps of time longer than so many sampling intervals are gaps, who
 
 
 def estimated_rate_hz(time_s: Array) -> float:
-    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other.
-
-    Parameters
-    ----------
-    time_s : (n,)
-        Time of each row, NaN where it is unknown.
-
-    Examples
-    --------
-    >>> estimated_rate_hz(np.array([0.0, 0.011, 0.019, 0.03, 0.53, 0.54]))
-    100.0
-    """
+    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other."""
     steps = np.diff(_spread(time_s[np.isfinite(time_s)]))
     steps = steps[steps > 0]
     if not len(steps):
@@ -1210,24 +1095,6 @@ def on_grid(samples: Array, time_s: Array | None, rate_hz: float) -> tuple[Array
     """Return the rows of one slide on a grid that begins with its first row, evenly spaced between gaps.
 
     Jitter of the times is that of the host that stamped them, and not of the device that sampled.
-
-    Parameters
-    ----------
-    samples : (n, n_channels)
-        Rows in their order; NaN for bad values.
-    time_s : (n,)
-        Time of each row, NaN where it is unknown; None: rows are evenly spaced.
-    rate_hz
-        Rate of the grid.
-
-    Returns
-    -------
-    (m, n_channels)
-        Rows whose time comes after that of all before.
-    (m,)
-        Place of each on the grid from 0; it jumps where samples were lost.
-    Counter
-        `samples`, `gaps`, samples `lost` in them, and `disordered` rows that are left out.
     """
     if time_s is None or len(samples) < 2:
         return samples, np.arange(len(samples)), Counter(samples=len(samples))
@@ -1299,21 +1166,7 @@ class ImportReport:
 
 
 def spans(time_s: Array, rate_hz: float, keys: AnyArray | None, borders: SlideBorders, place: str) -> list[slice]:
-    """Return the rows of each slide in their order, the ends that are left out already taken away.
-
-    Parameters
-    ----------
-    time_s : (n,)
-        Of the rows by which slides are cut; NaN where unknown.
-    rate_hz
-        Of the rows.
-    keys : (n,)
-        Values of the column that changes between slides, if one does.
-    borders
-        What ends a slide.
-    place
-        For sentences.
-    """
+    """Return the rows of each slide in their order, the ends that are left out already taken away."""
     changes: NDArray[np.intp] = np.empty(0, dtype=np.intp)
     if borders.by == 'column' and keys is not None:  # without, it is a field of the name, which the whole file has
         changes = np.flatnonzero(keys[1:] != keys[:-1]) + 1
@@ -1375,13 +1228,6 @@ class SlideBags:
 
     Stamps are made up: each slide begins a second after the one before, in whatever bag that is, so slides keep their
     order over all bags.
-
-    Parameters
-    ----------
-    mapping
-        Names sensor and motion.
-    out
-        Folder for the bags; made if missing.
     """
 
     def __init__(self, mapping: TableMapping, out: str | Path) -> None:
@@ -1397,24 +1243,7 @@ class SlideBags:
         return [bag.path for bag in self._bags.values()]
 
     def write(self, session: str, named: ExplorationState, streams: SlideStreams, conditions: Conditions) -> None:
-        """Write a slide into the bag of a session.
-
-        Parameters
-        ----------
-        session
-            Names the bag.
-        named
-            State with the names of the slide; its times are made up.
-        streams
-            What was measured.
-        conditions
-            In the order of time; the first begins at 0.
-
-        Raises
-        ------
-        InvalidData
-            If the bag exists already, cannot be made, or is one too many.
-        """
+        """Write a slide into the bag of a session."""
         bag = self._bag(session)
         duration_s = min(float(index[-1] + 1) / stream.rate_hz for stream, _, index in streams.values())
         messages: list[Message] = [*self._states(named, conditions, duration_s)]

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Friction: the Stribeck curve, the tip that sticks and slips, its energy, and what a finger senses of it."""
 

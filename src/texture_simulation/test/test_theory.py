@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What must come out whatever the sensor: lines of ridges, exponents, power, and no harm from odd movements."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Let the unmodified ur-rtde do all that the arm asks of it with the emulated controller; print the result as JSON.
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Simulated surfaces, contact and sensors, and devices emulated at the wire, so that drivers run unchanged.
 

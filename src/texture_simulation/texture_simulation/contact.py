@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Force on the skin of a finger along a trajectory: the chain from positions to the variation of the force."""
 
@@ -22,21 +23,7 @@ MIN_BLUR_PER_STEP = 0.6
 
 
 class SkinContact:
-    """Follow the skin over one surface, block by block.
-
-    Parameters
-    ----------
-    scene, surface
-        How the finger senses, and what; the surface may be changed between blocks.
-    rng
-        All randomness: where a sample is touched, what the effects do.
-    rate_hz
-        Points of the path a second.
-    finger
-        Which individual of the sensor.
-    batch_shape
-        () for one slide at a time, (count,) for many at once.
-    """
+    """Follow the skin over one surface, block by block."""
 
     def __init__(
         self,
@@ -103,20 +90,7 @@ class SkinContact:
     def variation_n(
         self, placed: Trajectory, own_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
     ) -> Array:
-        """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air.
-
-        Parameters
-        ----------
-        placed
-            The next piece of the way, as `placed` returns it; n points.
-        own_blur_m, offset_m : (n_elements, 1)
-            Over what length each element of the finger averages by itself, and where it lies; of one element in the
-            middle of the finger, which may be as sharp as the contact, if not given.
-
-        Returns
-        -------
-        (..., n) or (..., n_elements, n)
-        """
+        """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air."""
         if not len(placed):
             return np.empty((*placed.x_m.shape[:-1], *np.shape(own_blur_m)[:-1], 0))
         force_n = constant(placed.force_n)
@@ -141,22 +115,7 @@ class SkinContact:
         return np.asarray(variation_n)
 
     def static_variation_n(self, placed: Trajectory, blur_m: float, offset_m: tuple[Array, Array]) -> Array:
-        """Return the same of slow elements at chosen points, (..., n_elements, n): without what shakes the skin.
-
-        Parameters
-        ----------
-        placed
-            Points of the trajectory on the sample, n of them.
-        blur_m
-            Length over which each element averages.
-        offset_m : (n_elements, 1)
-            Position x and y of each element in the finger.
-
-        Returns
-        -------
-        (..., n_elements, n)
-            N.
-        """
+        """Return the same of slow elements at chosen points, (..., n_elements, n): without what shakes the skin."""
         _, gain = self._blur_and_stiffness(placed.force_n)
         for factor in self._gains:
             gain = gain * factor(placed, self._finger)
@@ -169,18 +128,6 @@ class SkinContact:
 
         Over a curved object the place wanders as the finger slides on: the normal of the object turns by the way over
         the sum of both radii, as the finger keeps its direction.
-
-        Parameters
-        ----------
-        placed
-            Points of the trajectory on the sample, n of them.
-
-        Returns
-        -------
-        (..., n), or a number
-            x, m.
-        (..., n), or a number
-            y, m.
         """
         radius_m, tip_m = self._surface.shape.radius_m, self._contact.tip_radius_m
         if np.isinf(radius_m):
@@ -223,14 +170,5 @@ class SkinContact:
 
 
 def constant(values: Array) -> Array:
-    """Return (..., 1) of values that numpy repeats without a copy, as `numpy.broadcast_to` does, else the values.
-
-    Parameters
-    ----------
-    values : (..., n)
-
-    Returns
-    -------
-    (..., 1) or (..., n)
-    """
+    """Return (..., 1) of values that numpy repeats without a copy, as `numpy.broadcast_to` does, else the values."""
     return values[..., :1] if values.strides and values.strides[-1] == 0 and values.shape[-1] else values

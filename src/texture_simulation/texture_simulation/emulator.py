@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The emulated rig: one scene, its finger, its devices, driven by the motion that an arm reports."""
 
@@ -33,19 +34,7 @@ LONGEST_BURST_S = 0.25
 
 
 class LiveSensor:
-    """Follow the finger with one sensor.
-
-    Parameters
-    ----------
-    model, device
-        What senses, and what sends.
-    send
-        Sends what the model has measured along a piece of path.
-    skip
-        Lets so many steps pass of which nothing is sent.
-    pace
-        Steps a second: samples, or frames of them; and points of the path in a step.
-    """
+    """Follow the finger with one sensor."""
 
     def __init__(
         self,
@@ -221,20 +210,7 @@ BURST_S = 0.005
 
 
 class Emulator:
-    """Run a scene and its devices in a thread; usable as a context manager.
-
-    Parameters
-    ----------
-    params
-        See `EmulatorParams`.
-    now_ns
-        Clock of the finger states: CLOCK_MONOTONIC.
-
-    Raises
-    ------
-    TextureError
-        If the scene or the surface is unknown, or the pipe or the link cannot be had.
-    """
+    """Run a scene and its devices in a thread; usable as a context manager."""
 
     def __init__(self, params: EmulatorParams, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
         rng = np.random.default_rng(params.seed)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Friction between finger and surface: Coulomb, Stribeck, stick-slip, and their integration in time."""
 
@@ -26,13 +27,7 @@ PASSIVE = 4 * math.sqrt(2 * math.e)
 
 @dataclass(frozen=True)
 class Stribeck:
-    """A Stribeck curve: friction that falls from its value at rest to that of fast sliding.
-
-    Raises
-    ------
-    InvalidParameter
-        If friction is lower at rest than in fast sliding.
-    """
+    """A Stribeck curve: friction that falls from its value at rest to that of fast sliding."""
 
     static: float = param(
         0.9,
@@ -222,22 +217,7 @@ MARGIN = 0.5  # share of the border up to which a step is accepted
 
 
 def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
-    """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    speed_m_s
-        Speed of the base along the surface.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float
-        s.
-    """
+    """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface."""
     # A slipping tip reaches at most the speed of the base and that of the skin let go.
     drop_n = (friction.static - friction.kinetic) * force_n
     fastest_m_s = speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
@@ -247,24 +227,7 @@ def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> 
 
 
 def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
-    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    step_s
-        Length of an integration step.
-    speed_m_s
-        Speed of the base along the surface.
-    force_n
-        Normal force, at least 0.
-
-    Raises
-    ------
-    InvalidParameter
-        If the step is not above 0 or too long.
-    """
+    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all."""
     if not step_s > 0:
         raise InvalidParameter(f'a step of {step_s} s; it must be above 0')
     allowed_s = MARGIN * max_stable_step_s(friction, speed_m_s, force_n)
@@ -291,28 +254,7 @@ def drag(
     start: Tip = AT_REST,
     force_before_n: Value = 0.0,
 ) -> Tip:
-    """Return the state at the end of each step.
-
-    Parameters
-    ----------
-    speed_m_s, force_n : (..., n)
-        Speed of the base along the path and normal force, at the end of each of n steps. Leading axes are scans.
-    step_s
-        Length of a step.
-    start, force_before_n
-        State of the tip and force before the first step, (...).
-    friction
-        Friction of the surface, and the skin.
-
-    Returns
-    -------
-    Tip of arrays (..., n)
-
-    Raises
-    ------
-    InvalidParameter
-        If the step is beyond the border of the integrator.
-    """
+    """Return the state at the end of each step."""
     if not speed_m_s.size:
         return Tip(*(np.zeros_like(speed_m_s) for _ in range(3)))
     check_step(friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
@@ -325,22 +267,7 @@ def drag(
 
 
 def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
-    """Return the force of the skin on the tip: what the finger senses along the surface.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    tip
-        State of the tip, arrays (..., n).
-    speed_m_s : (..., n)
-        Speed of the base.
-
-    Returns
-    -------
-    (..., n)
-        Force in N.
-    """
+    """Return the force of the skin on the tip: what the finger senses along the surface."""
     return np.asarray(friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s))
 
 
@@ -386,38 +313,13 @@ def coefficient(friction: Stribeck, speed_m_s: Array) -> Array:
 
     kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
     Source: Bo & Pavelescu 1982; Armstrong-Hélouvry et al. 1994.
-
-    Parameters
-    ----------
-    speed_m_s : (...)
-        Speed of the tip over the surface, of either sign.
-
-    Returns
-    -------
-    (...)
-        Coefficient at each speed.
     """
     share: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
     return friction.kinetic + (friction.static - friction.kinetic) * share
 
 
 def steady_force_n(friction: Stribeck, speed_m_s: Array, force_n: float) -> Array:
-    """Return the friction of steady sliding, against the movement, with the viscous part.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    speed_m_s : (...)
-        Speeds of the tip, of either sign.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    (...)
-        Force in N, of the sign of the speed.
-    """
+    """Return the friction of steady sliding, against the movement, with the viscous part."""
     speed = np.asarray(speed_m_s)
     return force_n * (np.sign(speed) * coefficient(friction, speed) + friction.viscous_s_m * speed)
 
@@ -429,23 +331,7 @@ JUMP_M_S = 3.0  # what moves faster than this was put elsewhere, it did not slid
 
 
 class TipDrag:
-    """Follow the tip of a finger that is dragged along a path; what lies between the blocks is continuous.
-
-    Parameters
-    ----------
-    friction
-        Of the surface, and the skin.
-    rate_hz
-        Points of the path a second; several steps are taken between two points where `step_s` asks for it.
-    stretched : number or (...)
-        How far the skin is stretched at the first point, as a share of what makes it let go: a slide need not begin
-        with a touch.
-
-    Raises
-    ------
-    InvalidParameter
-        If the step is beyond the border of stability.
-    """
+    """Follow the tip of a finger that is dragged along a path; what lies between the blocks is continuous."""
 
     def __init__(self, friction: StickSlip, rate_hz: float, stretched: float | Array = 0.0) -> None:
         self.friction = friction
@@ -532,15 +418,7 @@ class SlidingFriction(Stribeck):
 
 
 class SlidingDrag:
-    """Follow a finger that slides along a path; what lies between the blocks is continuous.
-
-    Parameters
-    ----------
-    friction
-        Of the surface.
-    rate_hz
-        Points of the path a second.
-    """
+    """Follow a finger that slides along a path; what lies between the blocks is continuous."""
 
     def __init__(self, friction: SlidingFriction, rate_hz: float) -> None:
         self._friction = friction
@@ -571,24 +449,7 @@ FRICTIONS: Mapping[str, type] = {
 def make_drag(
     friction: Any, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
 ) -> TipDrag | SlidingDrag:
-    """Return what follows a finger over a surface.
-
-    Parameters
-    ----------
-    friction
-        One of `FRICTIONS`.
-    rate_hz
-        Points of the path a second.
-    rng
-        Decides how far the skin is stretched where a slide begins under load.
-    batch_shape
-        () for one slide, (count,) for many at once.
-
-    Returns
-    -------
-    TipDrag or SlidingDrag
-        Follows the path from its first point on.
-    """
+    """Return what follows a finger over a surface."""
     if isinstance(friction, SlidingFriction):
         return SlidingDrag(friction, rate_hz)
     # Slides that are cut out of longer ones begin with the skin at any point of its cycle, not all at the same.
@@ -596,23 +457,5 @@ def make_drag(
 
 
 def sliding_coefficient(friction: Stribeck, speed_m_s: Array) -> Array:
-    """Return tangential over normal force of a finger that slides steadily.
-
-    Parameters
-    ----------
-    friction
-        One of `FRICTIONS`.
-    speed_m_s : (...)
-        Speed along the surface.
-
-    Returns
-    -------
-    (...)
-        The Stribeck curve at the speed, without dimension.
-
-    Examples
-    --------
-    >>> sliding_coefficient(SlidingFriction(static=0.6, kinetic=0.5), np.array([10.0])).round(3).tolist()  # fast
-    [0.5]
-    """
+    """Return tangential over normal force of a finger that slides steadily."""
     return steady_force_n(friction, speed_m_s, 1.0)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Simulate slides without a clock: batches, bags, data sets."""
 
@@ -33,26 +34,6 @@ def simulate_slides(
 
     Each slide meets another place of the sample, with the scene's effects. The samples are in the unit the driver
     publishes. Speed, force and direction of `sliding` may be arrays (count,).
-
-    Parameters
-    ----------
-    scene
-        Scene: sensor, contact and effects.
-    surface
-        Name of the surface.
-    count
-        Number of slides.
-    sliding
-        Speed, force, direction and duration of the slides.
-    rng
-        All random numbers: positions on the sample, effects, noise.
-    finger
-        Which individual of the sensor.
-
-    Returns
-    -------
-    (count, n_samples, n_channels)
-        In the unit the driver publishes.
     """
     return simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=False)['signal']
 
@@ -67,28 +48,7 @@ def simulate_slide_streams(
     finger: int = 0,
     slow: bool = True,
 ) -> dict[str, Samples]:
-    """Return the same by topic, with the slow stream if the sensor has one.
-
-    Parameters
-    ----------
-    scene, surface
-        What is touched.
-    count
-        How many slides.
-    sliding
-        How each goes.
-    rng
-        Decides where the sample is touched, and all effects.
-    finger
-        Which individual of the sensor.
-    slow
-        Whether the slow stream is wanted.
-
-    Returns
-    -------
-    dict
-        Samples by topic, (count, n_samples, n_channels).
-    """
+    """Return the same by topic, with the slow stream if the sensor has one."""
     kind = find(SENSORS, scene.sensor, 'sensor model')
     touched = scene.surface(surface)
     lengths = {stream.topic: round(sliding.duration_s * stream.rate_hz) for stream in kind.streams}
@@ -296,24 +256,7 @@ def write_simulated(
     scene: str = 'twelve_textures',
     surfaces: Sequence[str] = (),
 ) -> list[Path]:
-    """Write one bag a surface, named after it, and return their paths.
-
-    Parameters
-    ----------
-    out
-        Folder for the bags; made if missing.
-    plan
-        How many slides, how fast, how hard and which way.
-    rng
-        Decides where the surfaces are touched, errors and noise.
-    scene, surfaces
-        Name or file of the scene, and which of its surfaces; all if none is named.
-
-    Returns
-    -------
-    list of Path
-        Of the bags.
-    """
+    """Write one bag a surface, named after it, and return their paths."""
     table = load_scene(scene)
     chosen = [table.surface(name).name for name in surfaces] or list(table.surfaces)
     start_ns = START_NS

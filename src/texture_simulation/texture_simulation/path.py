@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """How a finger moves in a simulation: trajectories, tracks, filters."""
 
@@ -24,15 +25,7 @@ def _steady(sections: bytes) -> Array:
 
 
 class Filter:
-    """Second-order sections along the last axis.
-
-    Parameters
-    ----------
-    sections : (n_sections, 6)
-        As scipy.signal designs them.
-    settled
-        Whether it has forgotten a beginning: it starts as if the first value had come for ever, else at rest.
-    """
+    """Second-order sections along the last axis."""
 
     def __init__(self, sections: Array, *, settled: bool = False) -> None:
         self._sections = sections
@@ -66,20 +59,6 @@ def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_
     """Return a field at places along ways, (..., n), straight between places that are `within_m` apart or nearer.
 
     Between places h apart, a wave of wave number k is wrong by at most (k·h)²/8 of its amplitude.
-
-    Parameters
-    ----------
-    field
-        Takes and returns arrays of equal shape.
-    x_m, y_m : (..., n)
-        n at least 1.
-    within_m
-        Largest distance of the places at which the field is computed.
-
-    Returns
-    -------
-    (..., n)
-        In the unit of the field.
     """
     n_points = x_m.shape[-1]
     longest_m = np.abs(np.diff(x_m)).max(initial=0.0) + np.abs(np.diff(y_m)).max(initial=0.0)
@@ -101,15 +80,7 @@ def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Places and forces at consecutive times of a constant rate; of one slide, or of many at once.
-
-    Parameters
-    ----------
-    x_m, y_m : (..., n)
-        In the frame of the surface.
-    force_n : (..., n)
-        Normal force, 0 in the air.
-    """
+    """Places and forces at consecutive times of a constant rate; of one slide, or of many at once."""
 
     x_m: Array
     y_m: Array
@@ -119,67 +90,22 @@ class Trajectory:
         return int(self.x_m.shape[-1])
 
     def moved(self, x_m: float | Array, y_m: float | Array) -> Trajectory:
-        """Return the same path starting elsewhere; (..., 1) for many.
-
-        Parameters
-        ----------
-        x_m, y_m : a number, or (..., 1)
-            Added to each place.
-        """
+        """Return the same path starting elsewhere; (..., 1) for many."""
         return Trajectory(self.x_m + x_m, self.y_m + y_m, self.force_n)
 
     def at(self, indices: NDArray[np.intp] | slice) -> Trajectory:
-        """Return some of its points.
-
-        Parameters
-        ----------
-        indices : (m,)
-            Numbers of the points, or a slice.
-
-        Returns
-        -------
-        Trajectory
-            Arrays (..., m) for m indices.
-        """
+        """Return some of its points."""
         return Trajectory(self.x_m[..., indices], self.y_m[..., indices], self.force_n[..., indices])
 
 
 def straight(start: tuple[float, float, float], end: tuple[float, float, float], n_points: int) -> Trajectory:
-    """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included.
-
-    Parameters
-    ----------
-    start
-        x, y and force before the first point; m and N.
-    end
-        x, y and force at the last point; m and N.
-    n_points
-        Number of points.
-
-    Returns
-    -------
-    Trajectory
-        (n_points,) each.
-    """
+    """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included."""
     shares = np.arange(1, n_points + 1) / n_points
     return Trajectory(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
 
 
 def before_first(path: Trajectory) -> tuple[Array, Array]:
-    """Return x and y before the first of at least one point, (..., 1) each: as far from it as the second is.
-
-    Parameters
-    ----------
-    path
-        At least one point.
-
-    Returns
-    -------
-    (..., 1)
-        x, m.
-    (..., 1)
-        y, m.
-    """
+    """Return x and y before the first of at least one point, (..., 1) each: as far from it as the second is."""
     x_m, y_m = (2 * place[..., :1] - place[..., :2][..., -1:] for place in (path.x_m, path.y_m))
     return x_m, y_m
 
@@ -213,20 +139,6 @@ class FingerTrack:
 
         Between two calls speed and change of force are constant; an arm that was put elsewhere leaves no trace of the
         way there.
-
-        Parameters
-        ----------
-        until_ns
-            Time of the last point.
-        n_points
-            Number of points.
-        rate_hz
-            Points a second.
-
-        Returns
-        -------
-        Trajectory
-            `n_points` points, m and N.
         """
         end = self._expected(until_ns)
         travelled_m = max(abs(end[0] - self._at[0]), abs(end[1] - self._at[1]))
@@ -256,20 +168,7 @@ Number = float | Array
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSlide:
-    """What is wanted of a slide, or of each of many slides.
-
-    Parameters
-    ----------
-    speed_m_s, force_n : number or (count,)
-    duration_s
-        Of the steady part.
-    direction_rad : number or (count,)
-        Direction of travel, from +x towards +y; at the start, for a circle.
-    radius_m
-        Of a circle, travelled anticlockwise; 0 for a straight line.
-    start_x_m, start_y_m : number or (count,)
-        Where it begins, on a sample that varies; of any other, each slide meets another place anyway.
-    """
+    """What is wanted of a slide, or of each of many slides."""
 
     speed_m_s: Number
     force_n: Number
@@ -280,24 +179,7 @@ class SimulatedSlide:
     start_y_m: Number = 0.0
 
     def steady_path(self, speed_m_s: Array, force_n: Array, n_points: int, rate_hz: float) -> Trajectory:
-        """Return the way at a constant speed, (..., n_points) points; speed and force are (..., 1).
-
-        Parameters
-        ----------
-        speed_m_s : (..., 1)
-            Constant speed.
-        force_n : (..., 1)
-            Constant normal force.
-        n_points
-            Number of points.
-        rate_hz
-            Points a second.
-
-        Returns
-        -------
-        Trajectory
-            Places in m, force in N.
-        """
+        """Return the way at a constant speed, (..., n_points) points; speed and force are (..., 1)."""
         time_s = np.arange(1, n_points + 1) / rate_hz
         path = trajectory_along(speed_m_s * time_s, np.broadcast_to(force_n, (*force_n.shape[:-1], n_points)), self)
         start_x_m, start_y_m = (np.asarray(at, dtype=np.float64)[..., None] for at in (self.start_x_m, self.start_y_m))
@@ -305,22 +187,7 @@ class SimulatedSlide:
 
 
 def trajectory_along(travelled_m: Array, force_n: Array, sliding: SimulatedSlide) -> Trajectory:
-    """Return the path with given ways along a line or a circle, (..., n).
-
-    Parameters
-    ----------
-    travelled_m : (..., n)
-        Distance travelled at each point.
-    force_n : (..., n)
-        Normal force at each point.
-    sliding
-        Direction, and the radius of a circle.
-
-    Returns
-    -------
-    Trajectory
-        Places in m, force in N.
-    """
+    """Return the path with given ways along a line or a circle, (..., n)."""
     direction = np.asarray(sliding.direction_rad, dtype=np.float64)[..., None]
     radius_m = sliding.radius_m
     if not radius_m:

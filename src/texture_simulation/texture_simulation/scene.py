@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A scene: surfaces, contact, friction and effects, from YAML."""
 
@@ -51,11 +52,6 @@ class Contact:
         Two spheres touch as one of radius 1 / (1 / r + 1 / R) touches a plane, and size and stiffness of the contact
         are as the cube root of that.
 
-        Parameters
-        ----------
-        radius_m
-            Radius of curvature of the object, R; infinite for a plane.
-
         Source: Hertz 1882.
         """
         return 1.0 if math.isinf(radius_m) else (radius_m / (radius_m + self.tip_radius_m)) ** (1 / 3)
@@ -72,21 +68,7 @@ SECTIONS = ('about', 'sensor', 'contact', 'effects', 'variation', 'surfaces')
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to touch, and how it is measured.
-
-    Parameters
-    ----------
-    name, about
-        Its file's name, and what it stands for.
-    sensor
-        Name of the sensor model (`sensor_models.py`).
-    surfaces
-        By name.
-    contact
-        Of the finger at 1 N.
-    effects
-        What is not ideal, by name (`effects.py`); what is not named is off.
-    """
+    """What there is to touch, and how it is measured."""
 
     name: str
     surfaces: Mapping[str, Surface]
@@ -138,13 +120,7 @@ def load_scene(name_or_path: str) -> Scene:
 
 
 def scene_from(name: str, content: Any) -> Scene:
-    """Return the scene that a mapping with `surfaces`, and if wanted the other `SECTIONS`, describes.
-
-    Raises
-    ------
-    InvalidParameter
-        If a section is missing, unknown or impossible.
-    """
+    """Return the scene that a mapping with `surfaces`, and if wanted the other `SECTIONS`, describes."""
     where = f"scene '{name}'"
     if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
         raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')

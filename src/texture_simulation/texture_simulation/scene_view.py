@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """One slide over a simulated surface, from the relief to the spectrum, as arrays to be drawn."""
 
@@ -52,27 +53,7 @@ class ViewPlan:
 
 @dataclass(frozen=True, eq=False)
 class SceneView:
-    """One slide.
-
-    Parameters
-    ----------
-    surface, sensor, channel
-        Names; of several channels the first is shown.
-    relief_m, extent_m : (n_y, n_x), (left, right, bottom, top)
-        Height of the surface around the way, as sharp as it is known.
-    way
-        Of the finger.
-    along_m, sharp_m, blurred_m : (n,)
-        Way from the start, and the height there: as it is, and as the contact averages it.
-    time_s, signal : (n_samples,)
-        What the sensor publishes.
-    frequency_hz, density : (n_frequencies,)
-        Its power.
-    lines_hz
-        Where the ridges must have their line: speed over pitch.
-    unit
-        Of the signal.
-    """
+    """One slide."""
 
     surface: str
     sensor: str
@@ -92,29 +73,7 @@ class SceneView:
 
 
 def view(scene: Scene, surface: str, plan: ViewPlan, rng: np.random.Generator) -> SceneView:
-    """Return one slide over a surface at exactly the speed and force of the plan, with the other effects of the scene.
-
-    Parameters
-    ----------
-    scene
-        Scene: sensor, contact and effects.
-    surface
-        Name of the surface.
-    plan
-        Speed, force, duration and direction.
-    rng
-        All random numbers: positions on the sample, effects, noise.
-
-    Returns
-    -------
-    SceneView
-        Relief, path, signal and spectrum.
-
-    Raises
-    ------
-    UnknownName
-        If the scene has no such surface.
-    """
+    """Return one slide over a surface at the exact speed and force of the plan, with the other effects of the scene."""
     touched = scene.surface(surface)
     kind = find(SENSORS, scene.sensor, 'sensor model')
     model = kind.make(scene, touched, rng, settled=True)
@@ -164,22 +123,7 @@ def _relief(surface: Surface, way: Trajectory) -> tuple[Array, tuple[float, floa
 
 
 def lines_hz(surface: Surface, speed_m_s: float, direction_rad: float) -> list[float]:
-    """Return where ridges have their first line on a straight slide: speed · |cos(angle to the ridges)| / pitch.
-
-    Parameters
-    ----------
-    surface
-        Surface that is touched.
-    speed_m_s
-        Speed along the surface.
-    direction_rad
-        Direction of travel, from +x towards +y.
-
-    Returns
-    -------
-    list of float
-        Hz, rising, each once.
-    """
+    """Return where ridges have their first line on a straight slide: speed · |cos(angle to the ridges)| / pitch."""
     waves = [wave for term in surface.terms for wave in WAVES.get(type(term), _no_waves)(term)]
     lines = [speed_m_s * abs(math.cos(angle - direction_rad)) / pitch for pitch, angle in waves]
     return sorted({round(line, 6) for line in lines if line > 1e-3})

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """How each finger turns contact into samples."""
 
@@ -31,25 +32,7 @@ Integer = TypeVar('Integer', bound=np.integer[Any])
 
 
 class Converter:
-    """Turn samples of one stream into whole counts within a range.
-
-    Parameters
-    ----------
-    scene
-        Whose effects on the signal are applied.
-    rng
-        Their randomness.
-    rate_hz, channels
-        Of the stream.
-    limits
-        Least and most count.
-    batch_shape
-        () for one slide, (count,) for many at once.
-    slow
-        Whether it is the slow stream beside the fast one.
-    scale
-        Counts of this converter for one count of the effects, which are those of a TSF-85.
-    """
+    """Turn samples of one stream into whole counts within a range."""
 
     def __init__(
         self,
@@ -71,18 +54,7 @@ class Converter:
         ]
 
     def exact(self, counts: Samples) -> Samples:
-        """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole.
-
-        Parameters
-        ----------
-        counts : (..., n_samples, n_channels)
-            What the sensor measures, in counts that need not be whole.
-
-        Returns
-        -------
-        (..., n_samples, n_channels)
-            Counts.
-        """
+        """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole."""
         if self._filters:
             counts = counts / self._scale
             for apply in self._filters:
@@ -92,20 +64,7 @@ class Converter:
         return np.clip(whole, *self._limits, out=whole)
 
     def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
-        """Return the same as whole numbers.
-
-        Parameters
-        ----------
-        counts : (..., n_samples, n_channels)
-            What the sensor measures, in counts that need not be whole.
-        kind
-            Integer type of numpy.
-
-        Returns
-        -------
-        (..., n_samples, n_channels)
-            Counts of the type `kind`.
-        """
+        """Return the same as whole numbers."""
         return self.exact(counts).astype(kind)
 
 
@@ -114,21 +73,7 @@ class Converter:
 
 
 class SensorModel:
-    """Turn a path, block by block, into what a sensor publishes; what lies between the blocks is continuous.
-
-    Parameters
-    ----------
-    scene, surface
-        How the finger senses, and what.
-    rng
-        All randomness: where a sample is touched, what the effects do.
-    finger
-        Which individual of the sensor: its traits are its own and stay the same.
-    batch_shape
-        () for one slide at a time, (count,) for many at once.
-    settled
-        Whether its filters have forgotten how the touch began.
-    """
+    """Turn a path, block by block, into what a sensor publishes; what lies between the blocks is continuous."""
 
     PATH_RATE_HZ: float  # points of the path a second
 
@@ -148,20 +93,7 @@ class SensorModel:
         self._filter = partial(Filter, settled=settled)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return samples by topic, (..., n_samples, n_channels) in the unit the driver publishes.
-
-        Parameters
-        ----------
-        path
-            The next points, whole steps of the sensor.
-        slow
-            Whether the slow stream is wanted, too.
-
-        Returns
-        -------
-        mapping
-            Topic → (..., n_samples, n_channels).
-        """
+        """Return samples by topic, (..., n_samples, n_channels) in the unit the driver publishes."""
         raise NotImplementedError
 
     def advance(self, path: Trajectory) -> Any:
@@ -186,19 +118,7 @@ class SimulatedStream(NamedTuple):
 
 
 class SensorKind(NamedTuple):
-    """A simulated sensor.
-
-    Parameters
-    ----------
-    make
-        The model, from the arguments of `SensorModel`.
-    path_rate_hz
-        Points of the path a second.
-    step_points
-        Points of a whole step: a path must consist of such.
-    streams
-        What it publishes; the fast one first.
-    """
+    """A simulated sensor."""
 
     make: Callable[..., SensorModel]
     path_rate_hz: float
@@ -250,13 +170,7 @@ BIOTAC_LIMITS = (0, FULL_SCALE)
 
 
 class BioTacModel(SensorModel):
-    """Turn a path, frame by frame, into the sensor's counts; see `SensorModel` for the arguments.
-
-    Parameters
-    ----------
-    layout
-        Kind of BioTac.
-    """
+    """Turn a path, frame by frame, into the sensor's counts; see `SensorModel` for the arguments."""
 
     PATH_RATE_HZ = BIOTAC_PATH_RATE_HZ
 
@@ -283,17 +197,7 @@ class BioTacModel(SensorModel):
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
 
     def advance(self, path: Trajectory) -> NDArray[np.uint16]:
-        """Return what is measured along the next piece of path.
-
-        Parameters
-        ----------
-        path
-            Points at 4.4 kHz, whole frames of them; slot i is sampled at point i.
-
-        Returns
-        -------
-        (n_frames, n_slots) counts
-        """
+        """Return what is measured along the next piece of path."""
         streams = self.streams(path)
         frames = streams['signal_static']
         counts = np.empty((*frames.shape[:-1], len(self._layout.slots)), dtype=np.uint16)
@@ -397,17 +301,7 @@ class DaqModel(SensorModel):
         return {daq.TOPIC: VOLT_PER_COUNT * self._counts.exact(self._exact(path))}
 
     def advance(self, path: Trajectory) -> NDArray[np.int16]:
-        """Return what is measured along the next piece of path.
-
-        Parameters
-        ----------
-        path
-            Points at `PATH_RATE_HZ`, one a sample.
-
-        Returns
-        -------
-        (n_points, 8) counts: films then gauges, of each the outer ones first
-        """
+        """Return what is measured along the next piece of path."""
         return self._counts.counts(self._exact(path), np.int16)
 
     def _exact(self, path: Trajectory) -> Samples:
@@ -448,17 +342,6 @@ class PressedElements:
 
     The force spreads over the elements like a bell; each senses its share, blurred as it lies, and its axes are not
     quite at right angles. All these numbers are ours.
-
-    Parameters
-    ----------
-    places_m
-        Where the elements lie, x and y of each.
-    blur_m
-        Length over which each averages.
-    rate_hz
-        Points of the path a second.
-    finger
-        Which individual of the sensor.
     """
 
     def __init__(self, places_m: Sequence[tuple[float, float]], blur_m: float, rate_hz: float, finger: int) -> None:
@@ -473,13 +356,7 @@ class PressedElements:
         self._before: tuple[Array, Array] | None = None
 
     def forces_n(self, touch: SkinContact, path: Trajectory) -> Array:
-        """Return the force that each element senses along the next points of a path.
-
-        Returns
-        -------
-        (..., n_elements, 3, n) N
-            Along x, y, and into the finger.
-        """
+        """Return the force that each element senses along the next points of a path."""
         placed = touch.placed(path)
         pressed_n = placed.force_n[..., None, :] + touch.variation_n(placed, self._blur_m, self._offset_m)
         normal_n = self._share * pressed_n
@@ -498,17 +375,7 @@ class PressedElements:
 
 
 def as_samples(forces_n: Array) -> Samples:
-    """Return the forces on elements, (..., n_elements, 3, n), as samples of all their axes, (..., n, 3 · n_elements).
-
-    Parameters
-    ----------
-    forces_n : (..., n_elements, 3, n)
-        As `PressedElements.forces_n` returns them.
-
-    Returns
-    -------
-    (..., n, 3 · n_elements)
-    """
+    """Return the forces on elements, (..., n_elements, 3, n), as samples of their axes, (..., n, 3 · n_elements)."""
     return np.swapaxes(forces_n.reshape(*forces_n.shape[:-3], -1, forces_n.shape[-1]), -1, -2)
 
 
@@ -552,17 +419,7 @@ class AnySkinModel(SensorModel):
         return {anyskin.SIGNAL: self.advance(path)}
 
     def advance(self, path: Trajectory) -> Array:
-        """Return what is measured along the next piece of path.
-
-        Parameters
-        ----------
-        path
-            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample; a sample is taken at the last of its points.
-
-        Returns
-        -------
-        (..., n_points / OVERSAMPLING, 15) µT
-        """
+        """Return what is measured along the next piece of path."""
         forces_n = self._band(self._elements.forces_n(self.touch, path))
         by_channel = as_samples(forces_n[..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING])
         return UT_PER_COUNT * self._counts.exact((self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT)
@@ -621,18 +478,7 @@ class PapillArrayModel(SensorModel):
         return {papillarray.SIGNAL: measured.reshape(*measured.shape[:-2], -1)}
 
     def advance(self, path: Trajectory) -> Array:
-        """Return what is measured along the next piece of path.
-
-        Parameters
-        ----------
-        path
-            Points at `PATH_RATE_HZ`.
-
-        Returns
-        -------
-        (..., n_points, 9, 6) N and mm
-            A step for each point, 1000 a second.
-        """
+        """Return what is measured along the next piece of path."""
         forces_n = self._band(self._elements.forces_n(self.touch, path))
         measured_n = N_PER_COUNT * self._counts.exact(as_samples(forces_n) / N_PER_COUNT)
         measured_n = measured_n.reshape(*measured_n.shape[:-1], len(PAPILLARRAY_PLACES_M), 3)
@@ -687,19 +533,7 @@ class PvdfModel(SensorModel):
         return {**fast, pvdf.FORCE_TOPIC: pvdf.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Return what is measured along the next piece of path.
-
-        Parameters
-        ----------
-        path
-            Points at `PATH_RATE_HZ`, one a sample of the film.
-
-        Returns
-        -------
-        film : (n_points,) counts
-        force : (n_force,) counts
-            Those whose time, at 64 Hz from the very first point on, lies in this piece.
-        """
+        """Return what is measured along the next piece of path."""
         _, force_n = self._pressed_n(path)
         film = self._fast.counts(self._charge(force_n), np.int16)
         return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
@@ -752,13 +586,7 @@ FAST_LIMITS, SLOW_LIMITS = (-(2**15), 2**15 - 1), (0, 2**16 - 1)
 
 
 class Tsf85Model(SensorModel):
-    """Turn a path, block by block, into the sensor's counts; see `SensorModel` for the arguments.
-
-    Parameters
-    ----------
-    layout
-        Kind of fingertip: how many taxels, and how often they are read.
-    """
+    """Turn a path, block by block, into the sensor's counts; see `SensorModel` for the arguments."""
 
     PATH_RATE_HZ = TSF85_PATH_RATE_HZ
 
@@ -782,19 +610,7 @@ class Tsf85Model(SensorModel):
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        """Return what is measured along the next piece of path.
-
-        Parameters
-        ----------
-        path
-            Points at `PATH_RATE_HZ`, `OVERSAMPLING` a sample; a sample is taken at the last of its points.
-
-        Returns
-        -------
-        dynamic : (n_points / OVERSAMPLING,) counts
-        images : (n_images, n_taxels) counts
-            Those whose time, from the very first point on, lies in this piece.
-        """
+        """Return what is measured along the next piece of path."""
         placed, force_n = self._pressed_n(path)
         dynamic = self._fast.counts(self._dynamic(force_n), np.int16)
         return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
@@ -888,15 +704,7 @@ class JoinedContacts:
 
 
 class JoinedFingers:
-    """The models of fingers that move as one.
-
-    Parameters
-    ----------
-    models
-        One a finger, in their order.
-    join
-        Joins what they measure along a piece of path.
-    """
+    """The models of fingers that move as one."""
 
     def __init__(self, models: Sequence[SensorModel], join: Callable[[Sequence[Any]], Any]) -> None:
         self._models = models

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Height profiles of simulated surfaces."""
 
@@ -50,15 +51,7 @@ LEVEL_SPREAD, BLUR_SPREAD, FRICTION_SPREAD, STRETCH_SPREAD = 0.28, 0.28, 0.14, 0
 
 @dataclass(frozen=True)
 class PlaceVariation:
-    """How the statistics of a sample vary from place to place; such a sample lies still under the surface frame.
-
-    Examples
-    --------
-    >>> places = np.linspace(0.0, 1.0, 2000)
-    >>> level, blur, friction, shift_x_m, shift_y_m = PlaceVariation(strength=0.5).at(places, np.zeros(2000))
-    >>> bool(abs(np.log(level).std() - 0.5 * LEVEL_SPREAD) < 0.03), bool(np.abs(np.diff(np.log(level))).max() < 0.02)
-    (True, True)
-    """
+    """How the statistics of a sample vary from place to place; such a sample lies still under the surface frame."""
 
     strength: float = param(
         1.0, 'Strength of the variation; 0 is a sample that is the same everywhere.', low=0.0, high=5.0
@@ -108,19 +101,6 @@ def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: fl
     """Return the height of ridges one unit high, less its mean, (..., n).
 
     Harmonic n is weakened by exp(−(2π·n·blur/pitch)²/2), the transfer function of the Gaussian.
-
-    Parameters
-    ----------
-    across_m : (..., n)
-        Place across the ridges; 0 is the middle of one.
-    blur_m : (..., n) or (..., 1)
-    pitch_m, shape, duty
-        Of the ridges; a square one takes the share `duty` of the pitch.
-
-    Returns
-    -------
-    (..., n)
-        From -1 to 1.
     """
     cosine = np.cos(2 * np.pi / pitch_m * across_m)
     first_share = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
@@ -156,22 +136,7 @@ class Relief:
     """A kind of relief."""
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same.
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-
-        Returns
-        -------
-        (..., n)
-            m, of zero mean.
-        """
+        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same."""
         raise NotImplementedError
 
 
@@ -363,14 +328,6 @@ def _bilinear(tiles: AnyArray, number: NDArray[np.intp], rows: Array, columns: A
     """Return tiles between their points; rows and columns go on periodically.
 
     Written in place, which takes two thirds of the time.
-
-    Parameters
-    ----------
-    tiles : (n_tiles * (SIDE + 1)**2,) in single precision, real or complex
-        Flat, one after the other, the first row and column of each again at its end.
-    number : (..., n) or (..., 1)
-        Which of the tiles.
-    rows, columns : (..., n)
     """
     row, column = np.floor(rows), np.floor(columns)
     down, right = (rows - row).astype(np.float32), (columns - column).astype(np.float32)
@@ -428,18 +385,7 @@ def _pairs(random: RandomRelief) -> AnyArray:
 
 
 def waves_1_m(spacing_m: float) -> Array:
-    """Return the wave number of each coefficient of a tile's spectrum, (SIDE, SIDE // 2 + 1) 1/m.
-
-    Parameters
-    ----------
-    spacing_m
-        Distance of two points of the tile.
-
-    Returns
-    -------
-    (SIDE, SIDE // 2 + 1)
-        1/m.
-    """
+    """Return the wave number of each coefficient of a tile's spectrum, (SIDE, SIDE // 2 + 1) 1/m."""
     return np.hypot(np.fft.fftfreq(SIDE, spacing_m)[:, None], np.fft.rfftfreq(SIDE, spacing_m)[None, :])
 
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """`texture scene`: draw a simulated surface, the path over it, the signal and its spectrum."""
 
@@ -27,22 +28,7 @@ RELIEF_COLOURS = 'cividis'
 
 
 def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
-    """Draw surfaces, one in each row: relief with the path of the finger, profile, signal and spectrum.
-
-    Parameters
-    ----------
-    views
-        What the finger meets and measures on each surface.
-    title
-        Above the panels.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
+    """Draw surfaces, one in each row: relief with the path of the finger, profile, signal and spectrum."""
     alone = len(views) == 1  # its panels are two by two, so that they can be read in a page
     with chart(path, (8.6, 5.6) if alone else (13.0, 0.8 + 1.75 * len(views)), title) as figure:
         if alone:
@@ -65,21 +51,7 @@ def picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
 
 
 def caption(name: str, sensor: str, plan: ViewPlan) -> str:
-    """Return what is shown, in one line.
-
-    Parameters
-    ----------
-    name
-        Name of the scene.
-    sensor
-        Name of the sensor.
-    plan
-        Speed, force and path of the finger.
-
-    Returns
-    -------
-    str
-    """
+    """Return what is shown, in one line."""
     way = f'a circle of {MM * plan.radius_m:g} mm' if plan.radius_m else 'a line'
     return f'{name}, simulated: along {way} at {plan.speed_m_s:g} m/s with {plan.force_n:g} N ({sensor})'
 

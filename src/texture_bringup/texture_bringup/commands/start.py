@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The sub-commands of `texture` that start nodes: those of a launch file, the dashboard, the demonstration."""
 

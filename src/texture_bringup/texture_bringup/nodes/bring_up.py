@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Bring the nodes of a robot up in order: wait for those that compute, then activate the one that moves."""
 
@@ -36,13 +37,7 @@ class BringUpParams:
 
 
 class BringUp(Node):
-    """Go through the nodes one after the other, in its constructor.
-
-    Raises
-    ------
-    DeviceError
-        If a node is not there or refuses a transition; those behind it are not activated.
-    """
+    """Go through the nodes one after the other, in its constructor."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('bring_up', **kwargs)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Collect labelled slides of a surface at many places of the taught patch into a bag, as a service or as an action."""
 
@@ -63,28 +64,6 @@ def collect_surface(
     """Collect a surface; return how it ended, and the bag, which is complete however that was, Ctrl-C included.
 
     A bag without any slide is removed; then None is returned instead.
-
-    Parameters
-    ----------
-    operator
-        Client of the explorer.
-    surface
-        Label of the slides.
-    folder
-        Folder of the bags of all surfaces; made if missing.
-    params
-        How many places, how fast and how hard.
-    tell
-        Called with a sentence and the number of slides.
-    namespace
-        Namespace of the finger.
-
-    Raises
-    ------
-    InvalidData
-        If no surface is taught, no slide lies on the patch, or the recorder does not begin.
-    InvalidParameter
-        If a force or a speed is asked for that the explorer does not allow.
     """
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Show what the nodes publish on a web page, and pass on what its buttons ask for."""
 
@@ -97,15 +98,7 @@ class DashboardNode(Node):
     # What the page asks for: coroutines of the web server's thread.
 
     async def explore(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Explore until it is over.
-
-        Raises
-        ------
-        InvalidParameter
-            If no motion is named, or a number is none.
-        MotionAborted
-            If the explorer ends during the exploration.
-        """
+        """Explore until it is over."""
         if 'motion' not in asked:
             raise InvalidParameter('no motion is asked for; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
@@ -138,13 +131,7 @@ class DashboardNode(Node):
         return await self._ask(self._recover, Trigger.Request(), 'explorer')
 
     async def check(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Slide over the reference plate, and compare it with that of the training of the classifier's model.
-
-        Raises
-        ------
-        InvalidParameter
-            If the classifier has no model.
-        """
+        """Slide over the reference plate, and compare it with that of the training of the classifier's model."""
         await ready(self._model.services_are_ready, 'classifier')
         answer = await answer_of(self._model.get_parameters(['model']), ANSWER_DEADLINE_S)
         path = answer.values[0].string_value
@@ -153,26 +140,14 @@ class DashboardNode(Node):
         return await self._run('check', path)
 
     async def collect(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Record labelled slides at many places of the taught patch, into the folder `surfaces` of the recordings.
-
-        Raises
-        ------
-        InvalidParameter
-            If the surface has no name.
-        """
+        """Record labelled slides at many places of the taught patch, into the folder `surfaces` of the recordings."""
         surface = checked_label(_short(str(asked.get('surface', ''))))
         if not surface or surface.startswith('-'):
             raise InvalidParameter('the surface to collect has no name; give one')
         return await self._run('collect', surface, str(self._recordings / 'surfaces'))
 
     async def add(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Add an exploration, the last one if it has no id, or remove the last added slide.
-
-        Raises
-        ------
-        InvalidParameter
-            If the texture has no name.
-        """
+        """Add an exploration, the last one if it has no id, or remove the last added slide."""
         if asked.get('undo'):
             return await self._ask(self._undo, Trigger.Request(), 'classifier')
         label, exploration = (_short(str(asked.get(name, ''))).strip() for name in ('label', 'id'))

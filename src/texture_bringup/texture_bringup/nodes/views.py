@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Show the finger in types that standard tools draw: samples as curves, taxels, the path of the slide, its wrench."""
 

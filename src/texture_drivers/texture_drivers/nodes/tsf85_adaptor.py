@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The node that turns the messages of the vendor's TSF-85 driver into the suite's signals."""
 
@@ -22,13 +23,7 @@ from texture_drivers.tsf85 import Tsf85MessageConverter, Tsf85Settings
 
 
 def import_message(message_type: str, parameter: str) -> Any:
-    """Return the class of 'package/msg/Type', as a parameter of that name asks for.
-
-    Raises
-    ------
-    InvalidParameter
-        If it is not installed.
-    """
+    """Return the class of 'package/msg/Type', as a parameter of that name asks for."""
     package, _, name = message_type.partition('/msg/')
     try:
         return getattr(importlib.import_module(f'{package}.msg'), name)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Linear discriminant analysis with a shrunk covariance, in plain arrays."""
 
@@ -40,41 +41,8 @@ def linear_discriminant(
 ) -> tuple[Array, Array]:
     """Return the layer that gives the log-probabilities of Gaussian classes with one covariance, up to a constant.
 
-    Parameters
-    ----------
-    X : (n, n_features)
-        Features.
-    y : (n,)
-        Number of the label of each.
-    n_labels
-        Number of labels, which are equally probable before.
-    shrinkage
-        0 for the covariance within classes as it is, 1 for its diagonal alone.
-    weights : (n,) or None
-        How much each example counts, above 0; all the same if None.
-    stretches : (n,) or None
-        Number of the stretch of the path, from 0, at which each example was made.
-    stretch_weight
-        How much more the differences between the stretches of one label count in the covariance than what varies
-        within a stretch: these are differences between places, which a slide elsewhere has in another way.
-
-    Returns
-    -------
-    (n_features, n_labels)
-        Weights; 0 for features that are constant, and all 0 where a label has fewer than two examples.
-    (n_labels,)
-        Offsets.
-
     Source: Fisher 1936; Friedman 1989, "Regularized discriminant analysis"; Hatch et al. 2006, "Within-class covariance
     normalization for SVM-based speaker recognition", for the differences between places.
-
-    Examples
-    --------
-    >>> X, y = np.array([[0.0], [2.0], [4.0], [6.0]]), np.array([0, 0, 1, 1])  # means 1 and 5, variance 1
-    >>> weights, offsets = linear_discriminant(X, y, 2, shrinkage=0.0)
-    >>> scores = 3.0 * weights[0] + offsets  # in the middle
-    >>> bool(np.isclose(scores[0], scores[1])), round(float(weights[0, 1] - weights[0, 0]), 6)  # (5 - 1) / 1
-    (True, 4.0)
     """
     nothing = np.zeros((X.shape[1], n_labels)), np.zeros(n_labels)
     if np.bincount(y, minlength=n_labels).min() < 2:
@@ -197,25 +165,7 @@ OUTERMOST = 0.05  # of the windows lie below the trained range, and as many abov
 
 
 class ForceDiscriminantPredictor:
-    """The layer of the nearest force; what lies outside the trained forces counts less.
-
-    Parameters
-    ----------
-    parameters
-        As `ForceDiscriminant` fits them: weights (n_ranges, n_features, n_labels) and offsets (n_ranges, n_labels);
-        log_forces (n_ranges,), the middle of each range, logarithm of N; trained (2,), the lowest and highest force;
-        reach, the difference of logarithms beyond these by which a window counts 1 / e; column, the number of the
-        feature that is the force, UNBOUND if none is.
-
-    Examples
-    --------
-    >>> layers = np.array([[[1.0, -1.0], [0.0, 0.0]], [[-1.0, 1.0], [0.0, 0.0]]])  # what 1 N and 10 N say
-    >>> forces = {'log_forces': np.log([1.0, 10.0]), 'trained': np.log([1.0, 10.0]), 'reach': 0.1, 'column': 1}
-    >>> predictor = ForceDiscriminantPredictor({'weights': layers, 'offsets': np.zeros((2, 2)), **forces})
-    >>> windows = np.array([[2.0, 1.0], [2.0, 9.0], [2.0, 20.0]])
-    >>> predictor(windows).tolist(), predictor.trust(windows).round(3).tolist()
-    ([[2.0, -2.0], [-2.0, 2.0], [-2.0, 2.0]], [1.0, 1.0, 0.001])
-    """
+    """The layer of the nearest force; what lies outside the trained forces counts less."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.weights, self.offsets, self.log_forces, self.trained = (
@@ -340,20 +290,7 @@ class ForceDiscriminant(Discriminant):
 
 
 def stretches_of(groups: Codes, count: int) -> Codes:
-    """Return the stretch of its slide in which each window lies, (n,), of `count` with as many windows each.
-
-    Parameters
-    ----------
-    groups : (n,)
-        Slide of each window; those of one slide in the order of time.
-    count
-        Number of stretches.
-
-    Examples
-    --------
-    >>> stretches_of(np.array([0, 0, 0, 0, 1, 1]), 2).tolist()
-    [0, 0, 1, 1, 0, 1]
-    """
+    """Return the stretch of its slide in which each window lies, (n,), of `count` with as many windows each."""
     found = np.zeros(len(groups), dtype=np.intp)
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What a learner is, and the folds, standardisation and log-probabilities that learners share."""
 
@@ -24,13 +25,7 @@ Predictor = Callable[[Array], Array]
 
 
 def hidden_layer(predictor: Predictor) -> Callable[[Array], Array] | None:
-    """Return what computes the outputs of the hidden layer of a predictor; None if it has none.
-
-    Returns
-    -------
-    callable or None
-        Takes (..., n_features), returns (..., n_hidden).
-    """
+    """Return what computes the outputs of the hidden layer of a predictor; None if it has none."""
     return getattr(predictor, 'activations', None)
 
 
@@ -84,22 +79,7 @@ class Learner(Protocol):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
-        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
-
-        Parameters
-        ----------
-        X : (n, n_features)
-            Features of windows; finite.
-        y : (n,)
-            Number of the label of each, from 0, without gaps.
-        groups : (n,)
-            Number of the slide of each; windows of one slide are held out together.
-
-        Returns
-        -------
-        Fitted
-            Parameters for `predictor`, log-probabilities when held out, and a note on the calibration.
-        """
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
@@ -110,20 +90,6 @@ def of_examples(learner: Learner, names: Sequence[str], labels: Sequence[str]) -
     """Return the learner as it is, or for examples with these features and textures if its parameters name them.
 
     A learner whose parameters do has a method of this name, as `TunedPairs` has.
-
-    Parameters
-    ----------
-    learner
-        Of a recipe.
-    names : (n_features,)
-        Of the features.
-    labels : (n_labels,)
-        Of the textures, in the order of their numbers.
-
-    Returns
-    -------
-    Learner
-        That `fit` may be called of.
     """
     bind: Callable[[Sequence[str], Sequence[str]], Learner] | None = getattr(learner, 'of_examples', None)
     return bind(names, labels) if bind else learner
@@ -133,15 +99,7 @@ UNBOUND = -1
 
 
 def column_of(names: Sequence[str], feature: str) -> int:
-    """Return the number of the first value of a feature in any input; UNBOUND if there is none.
-
-    Parameters
-    ----------
-    names : (n_features,)
-        Such as 'signal/force'.
-    feature
-        Name that ends it.
-    """
+    """Return the number of the first value of a feature in any input; UNBOUND if there is none."""
     return next((number for number, name in enumerate(names) if name.rsplit('/', 1)[-1] == feature), UNBOUND)
 
 
@@ -205,18 +163,7 @@ def _numbered(groups: Codes) -> Codes:
 
 
 def held_out_scores(fit: Callable[[NDArray[np.bool_]], Predictor], X: Array, folds_of: Codes, count: int) -> Array:
-    """Return what is said of each example by a predictor that has not seen its part, (n, count).
-
-    Parameters
-    ----------
-    fit
-        Returns the predictor fitted without the examples of a mask, (n,).
-    X : (n, n_features)
-    folds_of : (n,)
-        Part of each example.
-    count
-        Number of values that a predictor returns.
-    """
+    """Return what is said of each example by a predictor that has not seen its part, (n, count)."""
     found = np.empty((len(X), count))
     for part in np.unique(folds_of):
         held = folds_of == part
@@ -239,28 +186,7 @@ def fit_in_folds(
     tempered: Sequence[str],
     most: float = 4.0,
 ) -> Fitted:
-    """Fit to all examples and without each part of them, all with the temperature that suits what was held out.
-
-    Parameters
-    ----------
-    fit
-        Returns the parameters fitted without the examples of a mask, (n,).
-    predictor
-        Makes a predictor of them.
-    X, y, groups
-        As `Learner.fit` takes them.
-    folds, parts
-        How to divide them, see `assign_folds`.
-    tempered
-        Parameters of which the scores are linear functions.
-    most
-        Largest logarithm of the temperature.
-
-    Returns
-    -------
-    Fitted
-        With the log-probabilities of each example when it was held out, if a label has more than a single window.
-    """
+    """Fit to all examples and without each part of them, all with the temperature that suits what was held out."""
     split, nothing = assign_folds(y, groups, folds, parts), np.zeros(len(y), dtype=bool)
     if split is None:
         return Fitted(fit(nothing), None, UNCALIBRATED)
@@ -297,17 +223,6 @@ def standardisation(values: Array) -> tuple[Array, Array]:
     """Return mean and scale of each feature, (n_features,), of examples (n, n_features).
 
     The scale is the standard deviation; 1 for a constant feature, which then is 0 for every example.
-
-    Parameters
-    ----------
-    values : (n, n_features)
-
-    Returns
-    -------
-    (n_features,)
-        Mean of each feature.
-    (n_features,)
-        Scale of each feature, above 0.
     """
     mean = values.mean(axis=0)
     deviation = values.std(axis=0)
@@ -320,25 +235,7 @@ def standardisation(values: Array) -> tuple[Array, Array]:
 
 
 def group_means(values: Array, groups: NDArray[np.intp]) -> Array:
-    """Return the mean of the rows of each group, (n_groups, n_features).
-
-    Parameters
-    ----------
-    values : (n, n_features)
-        Such as the features of windows.
-    groups : (n,)
-        Number of the group of each row, from 0, without gaps.
-
-    Returns
-    -------
-    (n_groups, n_features)
-        In the units of the values.
-
-    Examples
-    --------
-    >>> group_means(np.array([[1.0], [3.0], [5.0]]), np.array([0, 0, 1])).tolist()
-    [[2.0], [5.0]]
-    """
+    """Return the mean of the rows of each group, (n_groups, n_features)."""
     counts = np.bincount(groups)
     means = np.zeros((len(counts), values.shape[1]))
     np.add.at(means, groups, values)
@@ -348,12 +245,6 @@ def group_means(values: Array, groups: NDArray[np.intp]) -> Array:
 
 def shrunk_covariance(covariance: Array, shrinkage: float) -> Array:
     """Return a covariance drawn to its diagonal, (n_features, n_features).
-
-    Parameters
-    ----------
-    covariance : (n_features, n_features)
-    shrinkage
-        0 for the covariance as it is, 1 for its diagonal alone: few examples hardly tell what is correlated.
 
     Source: Friedman 1989, "Regularized discriminant analysis".
     """
@@ -369,80 +260,31 @@ CHUNK = 1 << 21  # numbers, 16 MiB
 
 
 def chunks(n_rows: int, n_columns: int) -> Iterator[slice]:
-    """Yield slices of rows that hold at most CHUNK numbers together, so that intermediate results stay small.
-
-    Parameters
-    ----------
-    n_rows, n_columns
-        Shape of an array.
-
-    Examples
-    --------
-    >>> list(chunks(5, CHUNK // 2))
-    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
-    """
+    """Yield slices of rows that hold at most CHUNK numbers together, so that intermediate results stay small."""
     size = max(1, CHUNK // max(1, n_columns))
     for start in range(0, n_rows, size):
         yield slice(start, min(start + size, n_rows))
 
 
 def log_softmax(scores: Array) -> Array:
-    """Return scores less the logarithm of the sum of their exponentials, (..., n_labels).
-
-    Parameters
-    ----------
-    scores : (..., n_labels)
-
-    Returns
-    -------
-    (..., n_labels)
-        Logarithms of probabilities that add up to 1.
-    """
+    """Return scores less the logarithm of the sum of their exponentials, (..., n_labels)."""
     shifted = scores - np.maximum.reduce(scores, axis=-1, keepdims=True)
     return shifted - np.log(np.add.reduce(np.exp(shifted), axis=-1, keepdims=True))
 
 
 def is_tied(log_probabilities: Array) -> NDArray[np.bool_]:
-    """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided.
-
-    Parameters
-    ----------
-    log_probabilities : (..., n_labels)
-
-    Returns
-    -------
-    (...) bool
-        True where nothing is decided.
-    """
+    """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided."""
     best = np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
     return np.count_nonzero(log_probabilities == best, axis=-1) > 1
 
 
 def log_loss(log_probabilities: Array, codes: NDArray[np.intp]) -> float:
-    """Return the mean negative log-probability of the true textures; (n, n_labels) and (n,) of their numbers.
-
-    Parameters
-    ----------
-    log_probabilities : (n, n_labels)
-    codes : (n,)
-        Numbers of the true labels.
-    """
+    """Return the mean negative log-probability of the true textures; (n, n_labels) and (n,) of their numbers."""
     return float(-np.take_along_axis(log_probabilities, codes[:, None], axis=-1).mean())
 
 
 def fit_temperature(scores: Array, codes: NDArray[np.intp], trusted: Array | None = None, most: float = 4.0) -> float:
     """Return the temperature that makes the true textures most probable by log_softmax(scores / temperature).
-
-    Parameters
-    ----------
-    scores : (n, n_labels)
-        Of examples that were held out.
-    codes : (n,)
-        Numbers of the true labels.
-    trusted : (n,) or None
-        How much each example counts; all the same if None.
-    most
-        Its logarithm is sought from -2 to this.
 
     Source: Guo et al. 2017, "On calibration of modern neural networks".
     """

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The networks of our recipes: training with augmented copies, plain-array predictors, onset network."""
 
@@ -28,34 +29,7 @@ BLOCK = 16  # batches that are drawn at once
 
 @dataclass(frozen=True, eq=False)
 class AugmentedExamples:
-    """What a learner draws besides the examples of the undisturbed slides.
-
-    Parameters
-    ----------
-    values : (n, n_features) float32
-        Windows of changed copies of the slides.
-    codes, groups : (n,)
-        Number of the label and of the slide of each.
-    rows : (n_rows,)
-        Windows to draw from, those that count more often several times.
-    gain_response : (n_features,)
-        Change of each feature per natural logarithm of the gain.
-    slide_deviations : (n_slides, n_features)
-        Mean of each undisturbed slide less that of its class.
-    slides : (n_slides,)
-        Number of each of these.
-    augmentation
-        Ranges and shares.
-
-    Examples
-    --------
-    >>> nothing = np.zeros((0, 2), dtype=np.float32)
-    >>> none = np.zeros(0, dtype=np.intp)
-    >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
-    >>> augmented = AugmentedExamples(nothing, none, none, none, zeros[0], zeros, slides, Augmentation())
-    >>> augmented.without(np.array([1])).slides.tolist()
-    [0]
-    """
+    """What a learner draws besides the examples of the undisturbed slides."""
 
     values: Inputs
     codes: Codes
@@ -78,32 +52,7 @@ class AugmentedExamples:
 
 
 class AugmentedBatches:
-    """Draw batches of standardised inputs: undisturbed examples and copies, with random gains and slide jitter.
-
-    Parameters
-    ----------
-    inputs : (n, n_features) float32
-        Undisturbed examples, standardised.
-    y : (n,)
-        Their labels.
-    augmented
-        What is drawn besides.
-    mean, scale : (n_features,)
-        Of the standardisation.
-
-    Examples
-    --------
-    >>> inputs = np.ones((4, 2), dtype=np.float32)
-    >>> none = np.zeros(0, dtype=np.intp)
-    >>> changes = Augmentation(gain_probability=0.0, slide_jitter=0.0, clean_fraction=1.0)
-    >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
-    >>> augmented = AugmentedExamples(inputs[:0], none, none, none, zeros[0], zeros, slides, changes)
-    >>> rng = np.random.default_rng(0)
-    >>> batches = AugmentedBatches(inputs, np.arange(4) // 2, augmented, rng, mean=zeros[0], scale=np.ones(2))
-    >>> drawn, codes = batches.draw(3)
-    >>> drawn.shape, codes.shape
-    ((3, 2), (3,))
-    """
+    """Draw batches of standardised inputs: undisturbed examples and copies, with random gains and slide jitter."""
 
     def __init__(
         self,
@@ -172,20 +121,7 @@ class _Rows:
 
 
 class MlpPredictor:
-    """The two layers, made for features as they come.
-
-    Parameters
-    ----------
-    parameters
-        `hidden` (n_features, n_hidden), `hidden_offset` (n_hidden,), `output` (n_hidden, n_labels) and `output_offset`
-        (n_labels,), as `Mlp` fits them.
-
-    Examples
-    --------
-    >>> layer = {'hidden': np.eye(2), 'hidden_offset': np.zeros(2), 'output': np.eye(2), 'output_offset': np.zeros(2)}
-    >>> MlpPredictor(layer)(np.array([3.0, -1.0])).tolist()
-    [3.0, 0.0]
-    """
+    """The two layers, made for features as they come."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         # Column by column a product with one window is a quarter faster.
@@ -206,16 +142,7 @@ class MlpPredictor:
         return self.scores(self.activations(X))
 
     def scores(self, activations: Array) -> Array:
-        """Return the same, (..., n_labels), from the outputs of the hidden layer, (..., n_hidden).
-
-        Parameters
-        ----------
-        activations : (..., n_hidden)
-
-        Returns
-        -------
-        (..., n_labels)
-        """
+        """Return the same, (..., n_labels), from the outputs of the hidden layer, (..., n_hidden)."""
         scores: Array = activations @ self._output
         scores += self._output_offset
         return scores
@@ -407,28 +334,7 @@ class _Batches:
 class MlpTraining:
     """A network in training: weights, slopes and Adam's means as one vector each, so that a step is a few passes.
 
-    Parameters
-    ----------
-    n_features, hidden, n_labels
-        Its size.
-    rng
-        Source of the first weights.
-    dtype
-        Of all numbers.
-
-    Attributes
-    ----------
-    weights, slopes
-        Hidden layer (n_features, hidden), its offsets (hidden,), output (hidden, n_labels) and its offsets (n_labels,).
-
     Source: Adam of Kingma & Ba 2015.
-
-    Examples
-    --------
-    >>> network = MlpTraining(2, 4, 3, np.random.default_rng(0))
-    >>> network.find_slopes(np.ones((5, 2), np.float32), np.zeros(5, np.intp))
-    >>> [part.shape for part in network.slopes]
-    [(2, 4), (4,), (4, 3), (3,)]
     """
 
     def __init__(
@@ -491,21 +397,7 @@ class MlpTraining:
 
 
 class OnsetMlpPredictor(MlpPredictor):
-    """The layers of the network, and one that is added to its scores for first windows.
-
-    Parameters
-    ----------
-    parameters
-        Those of the network; `onset` (n_features, n_labels) and `onset_offset` (n_labels,); and `onset_column`, the
-        number of the feature that is 1 for first windows.
-
-    Examples
-    --------
-    >>> layer = {'hidden': np.eye(2), 'hidden_offset': np.zeros(2), 'output': np.eye(2), 'output_offset': np.zeros(2)}
-    >>> predictor = OnsetMlpPredictor({**layer, 'onset': np.eye(2), 'onset_offset': np.ones(2), 'onset_column': 1})
-    >>> predictor(np.array([[3.0, 0.0], [3.0, 1.0]])).tolist()
-    [[3.0, 0.0], [7.0, 3.0]]
-    """
+    """The layers of the network, and one that is added to its scores for first windows."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         super().__init__(parameters)

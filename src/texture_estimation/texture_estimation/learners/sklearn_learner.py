@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Any classifier of scikit-learn as a learner."""
 
@@ -48,13 +49,7 @@ ESTIMATOR_PARTS = (
 
 
 def packed(estimator: Any, name: str) -> NDArray[np.uint8]:
-    """Return an estimator as bytes, (n,), for a model file.
-
-    Raises
-    ------
-    InvalidParameter
-        If a model file could not hold it, or it could not be read again.
-    """
+    """Return an estimator as bytes, (n,), for a model file."""
     content = library(*SKOPS).dumps(estimator)
     try:
         _check_parts(content)
@@ -67,13 +62,7 @@ def packed(estimator: Any, name: str) -> NDArray[np.uint8]:
 
 
 def unpacked(content: NDArray[np.uint8]) -> Any:
-    """Return what `packed` was given; nothing is built of types that no estimator holds, and no code is run.
-
-    Raises
-    ------
-    ModelMismatch
-        If it holds something else.
-    """
+    """Return what `packed` was given; nothing is built of types that no estimator holds, and no code is run."""
     skops = library(*SKOPS)  # takes seconds, and few models need it
     trusted = _check_parts(content.tobytes())
     unexpected = sorted(set(skops.get_untrusted_types(data=content.tobytes())) - set(trusted))
@@ -135,31 +124,7 @@ FLOOR = 1e-3  # trees give a probability of 0 to what none of their leaves holds
 
 @dataclass(frozen=True, eq=False)
 class SklearnPredictor:
-    """A fitted classifier behind the interface of all predictors.
-
-    Parameters
-    ----------
-    estimator
-        Fitted with label numbers.
-    mean, scale : (n_features,)
-        Mean and scale of the features in the training.
-    n_labels
-        Number of labels, of which the estimator may lack some.
-    temperature
-        Divisor of the logarithms.
-    floor
-        Probability that all labels share at least; 0 takes the estimator's own log-probabilities.
-
-    Examples
-    --------
-    >>> from texture_estimation.learners.sklearn_learner import SklearnLearner
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> learner = SklearnLearner('sklearn.linear_model:LogisticRegression')
-    >>> predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
-    >>> isinstance(predictor, SklearnPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
-    (True, True)
-    """
+    """A fitted classifier behind the interface of all predictors."""
 
     estimator: Any
     mean: Array

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Support vector machines with coupled pairs: trained by scikit-learn, stored and evaluated as plain arrays."""
 
@@ -43,19 +44,6 @@ class PairCoupling:
     (1 / (Σ_j 1/r_ij - (n - 2)))^(1/temperature) = (1 / (1 + Σ_j exp(-(slope_ij f_ij + offset_ij))))^(1/temperature).
 
     Source: Platt 1999 for the sigmoids; Price, Knerr, Personnaz & Dreyfus 1995, eq. 5, for the coupling.
-
-    Parameters
-    ----------
-    slopes, offsets : (n_pairs,)
-        Pairs in the order (0, 1), (0, 2), …, (1, 2), …; a positive decision value speaks for the first.
-    temperature
-        Above 1: the probabilities are drawn together.
-
-    Examples
-    --------
-    >>> coupling = PairCoupling(2, slopes=np.array([2.0]), offsets=np.array([0.0]), temperature=1.0)
-    >>> np.exp(coupling(np.array([0.5]))).round(3).tolist()  # 1 / (1 + exp(-2 · 0.5))
-    [0.731, 0.269]
     """
 
     n_labels: int
@@ -75,18 +63,7 @@ class PairCoupling:
         return log_softmax(self.scores(decisions) / self.temperature)
 
     def scores(self, decisions: Array) -> Array:
-        """Return -log(1 + Σ_j exp(-margin)), (..., n_labels).
-
-        Parameters
-        ----------
-        decisions : (..., n_pairs)
-            Positive for the first label of a pair.
-
-        Returns
-        -------
-        (..., n_labels)
-            At most 0.
-        """
+        """Return -log(1 + Σ_j exp(-margin)), (..., n_labels)."""
         margins = decisions * self.slopes + self.offsets
         n_pairs = margins.shape[-1]
         against = np.empty((*margins.shape[:-1], 2 * n_pairs))
@@ -98,22 +75,7 @@ class PairCoupling:
 
 
 def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
-    """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,).
-
-    Parameters
-    ----------
-    decisions : (n, n_pairs)
-        Decision values of held-out examples.
-    y : (n,)
-        Numbers of their labels.
-    n_labels
-        At least 2.
-
-    Returns
-    -------
-    PairCoupling
-        With a temperature that makes the labels most probable.
-    """
+    """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,)."""
     pairs = combinations(range(n_labels), 2)
     sigmoids = np.array([_fit_sigmoid(decisions[:, number], y, *pair) for number, pair in enumerate(pairs)])
     coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)
@@ -164,31 +126,6 @@ class RbfMachines:
 
     The support vectors of each label are padded to the same number, so that every sum of all pairs is one product of
     arrays: in pair (i, j), label i's vectors carry coefficient row j - 1 and label j's carry row i.
-
-    Parameters
-    ----------
-    mean, scale : (n_features,)
-        Of the standardisation.
-    vectors : (n_labels · width, n_features)
-        Standardised support vectors, label by label, times 2 gamma.
-    squares : (n_labels · width,)
-        Square of the length of each support vector, times gamma.
-    coefficients : (n_labels, n_labels - 1, width)
-        0 for padding.
-    intercepts : (n_pairs,)
-    gamma
-        Of the kernel exp(-gamma |x - s|²).
-    projection : (n_features, n_features) or None
-        What features are multiplied with before the standardisation.
-
-    Examples
-    --------
-    >>> from sklearn.svm import SVC
-    >>> values, codes = np.random.default_rng(0).standard_normal((30, 2)), np.arange(30) % 3
-    >>> machines = RbfMachines.fit(values, codes, np.zeros(2), np.ones(2), c=1.0, gamma=0.5)
-    >>> svc = SVC(gamma=0.5, decision_function_shape='ovo').fit(values, codes)
-    >>> np.allclose(machines(values), svc.decision_function(values))
-    True
     """
 
     mean: Array
@@ -210,23 +147,7 @@ class RbfMachines:
     def fit(
         cls, X: Array, y: Codes, mean: Array, scale: Array, *, c: float, gamma: float, projection: Array | None = None
     ) -> RbfMachines:
-        """Return the machines of all pairs of labels, trained by scikit-learn.
-
-        Parameters
-        ----------
-        X : (n, n_features)
-            Features of windows, as they come.
-        y : (n,)
-            Number of the label of each, from 0, without gaps.
-        mean, scale : (n_features,)
-            Of the standardisation.
-        c
-            Box constraint.
-        gamma
-            Of the kernel.
-        projection : (n_features, n_features) or None
-            What features are multiplied with before the standardisation.
-        """
+        """Return the machines of all pairs of labels, trained by scikit-learn."""
         # Imported here: scikit-learn takes a second, and who only recognises does without it.
         from sklearn.svm import SVC  # noqa: PLC0415
 
@@ -289,32 +210,7 @@ def within_class_whitening(X: Array, y: Codes, groups: Codes, ridge: float, diff
     nothing, such as how the load moves when friction begins to shear a finger that was at rest: a slide in the other
     direction shears it the other way.
 
-    Parameters
-    ----------
-    X : (n, n_features)
-        Features of windows.
-    y : (n,)
-        Number of the label of each.
-    groups : (n,)
-        Number of the slide of each.
-    ridge
-        Added to the eigenvalues of the covariance, whose mean is 1; a large one leaves the features as they are.
-    differences : (n_groups, n_features) or None
-        For the number of each slide a difference that is no difference of textures; NaN where it is not known.
-
-    Returns
-    -------
-    (n_features, n_features)
-        Symmetric; the identity if slides of one texture do not differ.
-
     Source: within-class covariance normalisation, Hatch, Kajarekar & Stolcke 2006.
-
-    Examples
-    --------
-    >>> X = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 1.0], [9.0, 1.0]])  # the first feature varies within both textures
-    >>> whitening = within_class_whitening(X, np.array([0, 0, 1, 1]), np.arange(4), ridge=0.01)
-    >>> whitening.round(2).tolist()
-    [[0.71, 0.0], [0.0, 10.0]]
     """
     slides, first, rows = np.unique(groups, return_index=True, return_inverse=True)
     means = group_means(X, rows)

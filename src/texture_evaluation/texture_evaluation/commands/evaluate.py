@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The sub-commands of `texture` that measure: `evaluate` a model on labelled bags, `cross-validate` recipes."""
 
@@ -106,13 +107,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
 
 
 def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the recipes and the bags among arguments: the first is a recipe, and others before the first bag are.
-
-    Raises
-    ------
-    InvalidParameter
-        If no bag is left.
-    """
+    """Return the recipes and the bags among arguments: the first is a recipe, and others before the first bag are."""
     known = set(shipped('texture_estimation', 'config/recipes'))
     count = 1
     while count < len(given) and not _is_bags(given[count], known):

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What an arm is to the explorer: commands, states, limits of commands, the surface's frame, zeroing of forces."""
 
@@ -91,15 +92,6 @@ class Arm:
     A command holds until the next one, but at most for a fraction of a second: an arm without commands stops by itself.
     Any method but `close` raises DeviceError if the arm cannot be reached. What an arm can do beyond moving, it
     overrides.
-
-    Attributes
-    ----------
-    Params : type
-        Its dataclass of parameters.
-    force_reading : ForceReading
-        What its measured force does by itself; this one asks least.
-    reboots : bool
-        Whether it has motors that latch an error until they are rebooted.
     """
 
     Params: type[Any]
@@ -224,14 +216,7 @@ class SurfacePoseParams:
 
 
 class SurfaceFrame:
-    """Turn places and directions from the base frame of an arm to the frame of the surface and back.
-
-    Parameters
-    ----------
-    pose : (6,)
-        Of the surface in the base frame: x, y, z in m of a point in it, then a rotation vector in rad. The z axis
-        points away from the surface.
-    """
+    """Turn places and directions from the base frame of an arm to the frame of the surface and back."""
 
     def __init__(self, pose: Sequence[float]) -> None:
         self._origin = np.array(pose[:3])
@@ -286,28 +271,7 @@ SLIDING_M_S = 1e-3  # a slower finger has no direction of travel that its noise 
 
 
 def tangential_force_n(force_n: Vector, velocity_m_s: Vector) -> float:
-    """Return the force of the surface against the direction of travel, N; NaN for a finger that does not slide.
-
-    Parameters
-    ----------
-    force_n : (3,)
-        Force of the surface on the finger, N, in the frame of the surface: z is the normal.
-    velocity_m_s : (3,)
-        Velocity of the finger, m/s, in the same frame.
-
-    Returns
-    -------
-    float
-        −F·v / |v| of the components along the surface: positive where the surface drags the finger, μ N under Coulomb
-        friction.
-
-    Examples
-    --------
-    >>> tangential_force_n((-0.6, 0.0, 2.0), (0.05, 0.0, 0.001))  # a coefficient of 0.3 under 2 N
-    0.6
-    >>> tangential_force_n((-0.6, 0.0, 2.0), (0.0, 0.0, 0.0))
-    nan
-    """
+    """Return the force of the surface against the direction of travel, N; NaN for a finger that does not slide."""
     speed_m_s = math.hypot(*velocity_m_s[:2])
     if not speed_m_s >= SLIDING_M_S:
         return math.nan
@@ -322,13 +286,6 @@ class CommandedVelocity:
     """Choose the velocity that carries out a command: a wanted force by the force loop, a velocity as it is.
 
     Towards the surface a commanded velocity is limited to what the force loop can still stop in time.
-
-    Parameters
-    ----------
-    params
-        The force loop.
-    period_s
-        How often `choose` is called.
     """
 
     def __init__(self, params: ForceLoopParams, period_s: float) -> None:
@@ -349,22 +306,7 @@ class CommandedVelocity:
         self._travelled_m += distance_m
 
     def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
-        """Return the velocity to ask for, m/s.
-
-        Parameters
-        ----------
-        command
-            What the arm shall do.
-        state
-            The newest state of the arm.
-        held_s
-            For how long the velocity of the last call was asked for.
-
-        Returns
-        -------
-        (3,)
-            Along the surface and its normal, m/s.
-        """
+        """Return the velocity to ask for, m/s."""
         normal_m_s = self._normal_m_s(command, state, held_s)
         self._loop.asked(state.position[2], normal_m_s, held_s)
         return (*command.tangential_m_s, normal_m_s)
@@ -397,13 +339,6 @@ class GuardProcess:
     """A process at a pipe whose other end only the commanding process holds.
 
     The kernel closes that end however the process ends, also by SIGKILL; whoever ends in order says so first.
-
-    Parameters
-    ----------
-    module, arguments
-        What it runs.
-    start
-        What starts it, such as in a control group of its own.
     """
 
     def __init__(self, module: str, *arguments: str, start: Sequence[str] = ()) -> None:
@@ -469,13 +404,6 @@ class FreeAir:
     In contact the force changes while the finger rises: a stiffness k times the rise. Free air is proven by a rise
     through which the force stays the same, and until the force changes again. So a contact of at least
     `steady_n / rise_m` is noticed. A force sensor that was never zeroed does not matter, as only changes count.
-
-    Parameters
-    ----------
-    rise_m
-        The rise that proves it, m.
-    steady_n
-        A change of the force by more than this is contact, N.
     """
 
     def __init__(self, rise_m: float, steady_n: float) -> None:
@@ -495,22 +423,7 @@ class FreeAir:
         self.proven = False
 
     def update(self, time_ns: int, position: Vector, force_n: float) -> bool:
-        """Take note of a state of the arm in the frame of the surface, and return whether free air is proven.
-
-        Parameters
-        ----------
-        time_ns
-            When it was measured.
-        position : (3,)
-            m, z away from the surface.
-        force_n
-            Along the normal, N.
-
-        Returns
-        -------
-        bool
-            Whether free air is proven.
-        """
+        """Take note of a state of the arm in the frame of the surface, and return whether free air is proven."""
         self._smooth(time_ns, force_n)
         start = self._start
         # Written so that NaN is a change too.
@@ -561,22 +474,6 @@ class ForceZero:
     Free air is proven by a rise through which the force stays the same (`texture_exploration.arms.arm`). At rest after
     such a rise the mean of the readings becomes the new zero; any contact, and any command to press, asks for a new
     rise first.
-
-    Parameters
-    ----------
-    rise_m, steady_n
-        See `FreeAir`.
-
-    Attributes
-    ----------
-    air : FreeAir
-        Whether nothing touches the finger.
-    zeroed : bool
-        Whether there is a zero.
-    offset_n : (3,)
-        What the sensor shows in free air, in its own frame; zeros before.
-    zeroings : int
-        How often the sensor was zeroed.
     """
 
     def __init__(self, rise_m: float, steady_n: float) -> None:
@@ -599,21 +496,7 @@ class ForceZero:
         self._readings.clear()
 
     def update(self, time_ns: int, position: Vector, normal_n: float, reading_n: Array, *, moving: bool) -> None:
-        """Take a reading.
-
-        Parameters
-        ----------
-        time_ns
-            When it came.
-        position : (3,)
-            Of the finger in the surface frame, m.
-        normal_n
-            Its component along the normal, zeroed or not: only changes count.
-        reading_n : (3,)
-            Without the weight of the tool, in the frame of the sensor, not zeroed.
-        moving
-            Whether the arm is commanded to move.
-        """
+        """Take a reading."""
         if not self.air.update(time_ns, position, normal_n) or moving:
             self._rest_ns = None
             self._readings.clear()

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Hands with Dynamixel motors: the bus, the hand, and the process that takes torque off when its parent dies."""
 
@@ -89,15 +90,7 @@ def _locked(device: str) -> int:
 
 
 class DynamixelBus:
-    """All motors of a profile.
-
-    Attributes
-    ----------
-    missing : set of int
-        Motors that do not answer, or not as they should; they are left out until `look_for` finds them.
-    limits_a : dict of int to float
-        Highest current that each motor takes.
-    """
+    """All motors of a profile."""
 
     def __init__(self, device: str, profile: Profile) -> None:
         try:
@@ -143,13 +136,7 @@ class DynamixelBus:
             self._lock = None
 
     def start(self) -> None:
-        """Find and check the motors, set mode and gains; only when all is well, let them hold where they are.
-
-        Raises
-        ------
-        DeviceError
-            If none answers, one is of another model, reports a hardware error, or does not take what it is told.
-        """
+        """Find and check the motors, set mode and gains; only when all is well, let them hold where they are."""
         self.torque_off(self._profile.ids)  # a program before may have left it on
         self.missing = set(self._profile.ids)
         found = [motor for motor in self._profile.ids if any(self._prepare(motor) for _ in range(TRIES))]
@@ -246,13 +233,7 @@ class DynamixelBus:
             )
 
     def reboot(self) -> list[int]:
-        """Reboot the motors that report a hardware error, all without torque; return which.
-
-        Raises
-        ------
-        DeviceError
-            If one does not come back, or still reports an error.
-        """
+        """Reboot the motors that report a hardware error, all without torque; return which."""
         self.torque_off(self._profile.ids)
         latched = [motor for motor in self._profile.ids if self.read_register(motor, 'hardware_error')]
         for motor in latched:
@@ -326,13 +307,7 @@ class DynamixelBus:
                     return
 
     def check_next(self) -> str:
-        """Look after one motor, another one with each call; return in words what it reports, '' if nothing.
-
-        Raises
-        ------
-        DeviceError
-            If its watchdog has stopped it, or it refuses what it is told.
-        """
+        """Look after one motor, another one with each call; return in words what it reports, '' if nothing."""
         present = [motor for motor in self._profile.ids if motor not in self.missing]
         if not present:
             return ''
@@ -377,24 +352,7 @@ class DynamixelBus:
         return round(min(limit_a, max(-limit_a, current_a)) / self._profile.current_a)
 
     def write(self, motor: int, register: str, value: int) -> None:
-        """Write one register, and see that it was taken.
-
-        Parameters
-        ----------
-        motor
-            Id of the motor on the bus.
-        register
-            Name of the register in the table of the profile.
-        value
-            Signed number in the unit of the register.
-
-        Raises
-        ------
-        NoAnswer
-            If the motor does not answer after some tries.
-        DeviceError
-            If the motor refuses the value.
-        """
+        """Write one register, and see that it was taken."""
         address, size = self._profile.table[register]
         send = {1: 'write1ByteTxRx', 2: 'write2ByteTxRx', 4: 'write4ByteTxRx'}[size]
         for _ in range(TRIES):
@@ -507,15 +465,7 @@ PAUSE_S = 0.02
 
 
 class TorqueGuard(GuardProcess):
-    """The guard of one hand; start it before the torque is switched on.
-
-    Parameters
-    ----------
-    device, baud
-        Line of the motors.
-    packet
-        What to write to it, see `DynamixelBus.torque_off_packet`.
-    """
+    """The guard of one hand; start it before the torque is switched on."""
 
     def __init__(self, device: str, baud: int, packet: bytes) -> None:
         super().__init__(__name__, device, str(baud), packet.hex())
@@ -562,17 +512,6 @@ class DynamixelHand:
     A motor that is missing or reports an error is named in the fault of the state; the others go on. However the thread
     or the process ends, the torque is switched off: by the thread itself, by a `TorqueGuard` when the process is gone;
     and if nobody speaks to the motors for the time in the profile, their Bus Watchdog stops them.
-
-    Parameters
-    ----------
-    profile
-        Name or path of a profile.
-    device
-        Serial device.
-    torque_off_on_fault
-        Let go when a motor reports an error or is missing.
-    limits
-        Of every single command.
     """
 
     def __init__(
@@ -595,13 +534,7 @@ class DynamixelHand:
         self._thread: threading.Thread | None = None
 
     def connect(self) -> None:
-        """Open the bus and find the motors; the pose now is where the fingers begin.
-
-        Raises
-        ------
-        DeviceError
-            If the bus cannot be opened, or motors are missing, of another model or silent.
-        """
+        """Open the bus and find the motors; the pose now is where the fingers begin."""
         self.close()
         self._closing.clear()
         self._fresh.clear()
@@ -623,13 +556,7 @@ class DynamixelHand:
         self._failure = self._failure or NOT_CONNECTED
 
     def state(self) -> HandState:
-        """Return the newest state.
-
-        Raises
-        ------
-        DeviceError
-            If the hand is not connected, or the bus has failed.
-        """
+        """Return the newest state."""
         if self._failure or self._state is None:
             raise DeviceError(self._failure)
         return self._state
@@ -645,15 +572,7 @@ class DynamixelHand:
         self._grip = dict(forces_n)
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Follow from the next cycle on; what is refused makes these fingers stand still.
-
-        Raises
-        ------
-        DeviceError
-            If the bus has failed.
-        CommandRefused
-            If the command is out of the limits of a finger.
-        """
+        """Follow from the next cycle on; what is refused makes these fingers stand still."""
         if self._failure:
             raise DeviceError(self._failure)
         for name in fingers:
@@ -661,13 +580,7 @@ class DynamixelHand:
         self._order(fingers, command)
 
     def reboot(self) -> str:
-        """Let go, reboot the motors that report a hardware error, and stay unconnected; return in words what was done.
-
-        Raises
-        ------
-        DeviceError
-            If the bus cannot be reached, or a motor still reports an error.
-        """
+        """Let go, reboot the motors that report a hardware error, and stay unconnected; return what was done."""
         self.close()
         bus = DynamixelBus(self._device, self.profile)
         try:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """What a hand is to the explorer: profiles, models of force, finger sets, and a simulated hand."""
 
@@ -69,22 +70,7 @@ def describe(model: int) -> str:
 
 
 def differs(model: int, current_a: float, torque_nm_a: float) -> str:
-    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown.
-
-    Parameters
-    ----------
-    model
-        Model number that the motor reports.
-    current_a
-        Current per count in the profile, A.
-    torque_nm_a
-        Torque per current in the profile, N·m/A.
-
-    Returns
-    -------
-    str
-        A sentence without a full stop, or ''.
-    """
+    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown."""
     if model not in MODELS:
         return ''
     own = MODELS[model]
@@ -234,13 +220,7 @@ class Profile:
 
 
 def load_profile(name_or_path: str) -> Profile:
-    """Return a profile that the package ships, or of a file.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        With the nearest name, or what is missing in the file.
-    """
+    """Return a profile that the package ships, or of a file."""
     path = find_file(name_or_path, 'texture_exploration', 'config/hands', 'hand profile')
     try:
         return read_profile(load_yaml(path, 'hand profile'), path.stem)
@@ -254,20 +234,7 @@ def load_profile(name_or_path: str) -> Profile:
 
 
 def read_profile(content: Mapping[str, Any], name: str) -> Profile:
-    """Return the profile in what a file holds; raises as `load_profile`.
-
-    Parameters
-    ----------
-    content
-        Content of the file.
-    name
-        Name of the profile, for the sentences of errors.
-
-    Raises
-    ------
-    InvalidParameter
-        If a register is missing, or a finger, role or number does not fit.
-    """
+    """Return the profile in what a file holds; raises as `load_profile`."""
     where = f"hand profile '{name}'"
     missing = [register for register in X_SERIES if register not in content['table']]
     if missing:
@@ -355,17 +322,7 @@ LIMITS = CommandLimits()
 
 
 class SimulatedHand:
-    """Each finger is a simulated arm of its own; see `texture_exploration.arms.hand.Hand`.
-
-    Parameters
-    ----------
-    clock
-        CLOCK_MONOTONIC in ns.
-    own_thread
-        Move by itself once connected. If False, whoever owns the hand calls `step`.
-    limits
-        Of every single command.
-    """
+    """Each finger is a simulated arm of its own; see `texture_exploration.arms.hand.Hand`."""
 
     finger_sets: Mapping[str, FingerSet] = FINGER_SETS
 
@@ -429,13 +386,7 @@ class SimulatedHand:
         return ''
 
     def reboot(self) -> str:
-        """Refuse.
-
-        Raises
-        ------
-        DeviceError
-            Always.
-        """
+        """Refuse."""
         raise DeviceError('a simulated hand has no motors that could be rebooted')
 
     def _send(self, fingers: Sequence[str], command: ArmCommand) -> None:

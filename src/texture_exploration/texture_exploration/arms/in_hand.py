@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The sliding fingers of a hand as an arm: they move as one, while the other fingers hold."""
 

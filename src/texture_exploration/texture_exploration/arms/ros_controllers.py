@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """An arm that ROS drives: a twist controller, poses and wrenches on topics."""
 
@@ -245,11 +246,6 @@ class FollowWatch:
 
     The comparison begins again when the commanded velocity turns back: a late arm still goes the old way for its lag,
     which is no sign of a lost controller.
-
-    Attributes
-    ----------
-    stood : bool
-        Whether an arm that did not follow stood still, and did not go another way.
     """
 
     def __init__(self) -> None:
@@ -262,24 +258,7 @@ class FollowWatch:
         self._begin = None
 
     def update(self, now_ns: int, position: Vector, velocity_m_s: Vector, held_s: float) -> str:
-        """Return in a sentence that the arm does not follow, '' if it does.
-
-        Parameters
-        ----------
-        now_ns
-            The time.
-        position : (3,)
-            Of the finger, m.
-        velocity_m_s : (3,)
-            That was commanded until now.
-        held_s
-            For how long, s.
-
-        Returns
-        -------
-        str
-            A sentence without a full stop, or ''.
-        """
+        """Return in a sentence that the arm does not follow, '' if it does."""
         place, velocity = np.array(position), np.array(velocity_m_s)
         if self._begin is None or velocity @ self._asked_m < 0.0:
             self._begin, self._asked_m = (now_ns, place), np.zeros(3)
@@ -310,25 +289,7 @@ REST: Vector = (0.0, 0.0, 0.0)
 
 
 class ToolState:
-    """Turn what the controllers report into the state of an arm.
-
-    Parameters
-    ----------
-    params
-        Frames, tool and surface.
-
-    Attributes
-    ----------
-    zero : ForceZero
-        Of the force sensor.
-    pose_ns, force_ns : int
-        When the newest pose and force were measured that differ from the ones before by their stamps: by the stamp
-        where the clocks agree, else when they came; 0 before the first.
-    misplaced : str
-        In a sentence, that a pose or a force came in an unknown frame; '' if none did.
-    listening : Listening
-        When this process stood still itself; what waited for it meanwhile is not late.
-    """
+    """Turn what the controllers report into the state of an arm."""
 
     def __init__(self, params: RosControllersParams) -> None:
         self._params = params
@@ -365,17 +326,7 @@ class ToolState:
         self._update_velocity(sample.stamp_ns or now_ns)
 
     def take_force(self, now_ns: int, sample: ForceSample, *, moving: bool) -> None:
-        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is told to move.
-
-        Parameters
-        ----------
-        now_ns
-            The time, ns.
-        sample
-            Force and its place.
-        moving
-            Whether the arm is commanded to move.
-        """
+        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is told to move."""
         params = self._params
         if sample.frame_id not in (params.base_frame_id, params.tool_frame_id):
             self.misplaced = (
@@ -494,13 +445,7 @@ NOT_CONNECTED = 'the arm is not connected; connect it first'
 
 
 def open_topics(params: RosControllersParams) -> ControllerTopics:
-    """Return the topics over ROS.
-
-    Raises
-    ------
-    DeviceError
-        If ROS is not installed.
-    """
+    """Return the topics over ROS."""
     try:
         module = importlib.import_module('texture_exploration.ros.controllers')
     except ImportError as error:

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """An arm without a robot: a kinematic finger over an elastic surface; with a force mode of its own, or without."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """An arm of Universal Robots, reached through ur-rtde in a process of its own."""
 
@@ -73,13 +74,7 @@ class TcpConnection:
             raise self._silent() from error
 
     def read(self, size: int) -> bytes:
-        """Return exactly so many bytes.
-
-        Raises
-        ------
-        DeviceError
-            If the other side is silent for too long or ends the connection.
-        """
+        """Return exactly so many bytes."""
         data = b''
         while len(data) < size:
             try:
@@ -276,13 +271,7 @@ class WorkerLink:
         return self._process.pid
 
     def wait_for_report(self) -> None:
-        """Return when the first report has come.
-
-        Raises
-        ------
-        DeviceError
-            If the worker ends before, or none comes in time.
-        """
+        """Return when the first report has come."""
         end_s = time.monotonic() + self._timeout_s
         while not self._state_received.wait(POLL_S):
             give_up_when_ending()
@@ -294,24 +283,12 @@ class WorkerLink:
         self.check()
 
     def check(self) -> None:
-        """Return if the worker is there.
-
-        Raises
-        ------
-        DeviceError
-            With the reason why it is not.
-        """
+        """Return if the worker is there."""
         if not self._reader.is_alive() or self.report is None:
             raise DeviceError(self._why_ended())
 
     def send(self, data: bytes) -> None:
-        """Send a message to the worker, without waiting.
-
-        Raises
-        ------
-        DeviceError
-            If it is gone or does not read.
-        """
+        """Send a message to the worker, without waiting."""
         try:
             self._channel.send(data, socket.MSG_DONTWAIT)
         except BlockingIOError as error:
@@ -416,13 +393,7 @@ UNLOCK_RETRY_S = 0.25
 
 
 def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
-    """Return the major and minor version of the controller.
-
-    Raises
-    ------
-    DeviceError
-        If there is none, or it does not answer in time.
-    """
+    """Return the major and minor version of the controller."""
     with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         answer = _ask(line, CONTROLLER_VERSION, b'')
@@ -433,13 +404,7 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
 
 
 def runtime_state(ip: str, timeout_s: float) -> int:
-    """Return the runtime state of the controller: 1 if no program runs or pauses.
-
-    Raises
-    ------
-    DeviceError
-        If it does not answer in time.
-    """
+    """Return the runtime state of the controller: 1 if no program runs or pauses."""
     with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         _ask(line, SETUP_OUTPUTS, struct.pack('>d', RUNTIME_HZ) + b'runtime_state')
@@ -453,27 +418,7 @@ def runtime_state(ip: str, timeout_s: float) -> int:
 
 
 def claims_register(ip: str, name: str, timeout_s: float) -> bool:
-    """Return whether an input register is free, by claiming it for a moment.
-
-    Parameters
-    ----------
-    ip
-        Address of the controller.
-    name
-        Name of the input register, such as 'input_double_register_24'.
-    timeout_s
-        Longest time to wait for the answers.
-
-    Returns
-    -------
-    bool
-        False if another program writes the register.
-
-    Raises
-    ------
-    DeviceError
-        If the controller does not answer in time.
-    """
+    """Return whether an input register is free, by claiming it for a moment."""
     with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         return b'IN_USE' not in _ask(line, SETUP_INPUTS, name.encode())
@@ -514,27 +459,7 @@ class DashboardClient(TcpConnection):
 
 
 def check_ready(ip: str, timeout_s: float, unlock: bool) -> tuple[int, int]:
-    """Return the version of a controller whose arm can move; release a protective stop if `unlock` says so.
-
-    Parameters
-    ----------
-    ip
-        Address of the controller.
-    timeout_s
-        Longest time for all questions and answers.
-    unlock
-        Whether a protective stop is released.
-
-    Returns
-    -------
-    (int, int)
-        Version of the controller, such as (5, 12).
-
-    Raises
-    ------
-    DeviceError
-        With what stands in the way, and what to do.
-    """
+    """Return the version of a controller whose arm can move; release a protective stop if `unlock` says so."""
     end_s = time.monotonic() + timeout_s
     version = rtde_version(ip, timeout_s)
     _check_version(ip, version)
@@ -568,13 +493,7 @@ def _check_version(ip: str, version: tuple[int, int]) -> None:
 
 
 def unlock_protective_stop(ip: str, timeout_s: float) -> None:
-    """Release a protective stop, as soon as the controller allows it.
-
-    Raises
-    ------
-    DeviceError
-        If it does not.
-    """
+    """Release a protective stop, as soon as the controller allows it."""
     end_s = time.monotonic() + UNLOCK_WAIT_S
     while True:
         with closing(DashboardClient(ip, timeout_s)) as dashboard:
@@ -605,11 +524,6 @@ def check_program(params: UrArmParams, version: tuple[int, int], *, pause_is_our
     A stop by the safety system may pause the program of the connection before: `pause_is_ours`. A control script of
     ours whose process was killed is ended by its watchdog; one that has none yet is known by its name and by nobody
     writing the register that it obeys.
-
-    Raises
-    ------
-    DeviceError
-        If there is one and `take_over` does not allow to stop it.
     """
     ip, timeout_s = params.ip, params.probe_timeout_s
     end_s = time.monotonic() + max(params.acknowledge_s, 1.0 / params.watchdog_hz) + WATCHDOG_S

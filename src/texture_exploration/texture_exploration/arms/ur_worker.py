@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The process that talks to a UR controller at `rate_hz`, its stream of commands and its watchdog."""
 
@@ -50,28 +51,7 @@ MARGIN = 3.0  # of the period, over the time that the controller took to acknowl
 
 
 class Watchdog:
-    """Set the watchdog of the controller, and time the commands for which it has to wait.
-
-    Parameters
-    ----------
-    control
-        The RTDEControlInterface of ur-rtde.
-    params
-        The arm.
-    guard
-        Is told before each command how long it may take, s; whoever hangs longer is ended.
-    clock
-        In s.
-
-    Attributes
-    ----------
-    armed
-        The controller waits no longer than `moving_s`; no arm moves without.
-    moving_s
-        How long it waits while the arm moves: 1 / `watchdog_hz`, or longer if it acknowledged the watchdog itself late.
-    slow, slowest_s
-        How many commands took longer than that, and the longest time that one took.
-    """
+    """Set the watchdog of the controller, and time the commands for which it has to wait."""
 
     def __init__(
         self,
@@ -150,26 +130,7 @@ class Mode(enum.Enum):
 
 
 class UrCommandStream:
-    """Turn the newest command of the arm into calls of ur-rtde.
-
-    Parameters
-    ----------
-    control
-        The RTDEControlInterface of ur-rtde. Only one thread may use it.
-    params
-        The arm.
-    watchdog
-        The same controller's.
-
-    Attributes
-    ----------
-    refused, zeroings
-        How many commands the controller did not take, and how often the force sensor was zeroed.
-    trusted
-        The force sensor was zeroed since the arm was connected or recovered.
-    unsteady
-        It could not be zeroed: the force changed all the while the finger rose.
-    """
+    """Turn the newest command of the arm into calls of ur-rtde."""
 
     def __init__(self, control: Any, params: UrArmParams, watchdog: Watchdog) -> None:
         self.refused = 0
@@ -190,17 +151,7 @@ class UrCommandStream:
         self._turned_ns = -TURN_NS
 
     def observe(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
-        """Take over what the controller measured last, in the base frame.
-
-        Parameters
-        ----------
-        time_ns
-            When it was measured, ns.
-        position_m : (3,)
-            Place of the tool, m, in the base frame.
-        force_n : (3,)
-            Force on the tool, N, in the base frame.
-        """
+        """Take over what the controller measured last, in the base frame."""
         place = self._frame.place(position_m)
         self._height_m, self._measured_ns = place[2], time_ns
         self._air.update(time_ns, place, self._frame.direction(force_n)[2])

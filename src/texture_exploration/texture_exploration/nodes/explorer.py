@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Move the finger over the surface on request, and return the estimates."""
 
@@ -87,25 +88,7 @@ class FrameParams:
 
 
 class FrameBroadcaster:
-    """Publish transforms of one arm.
-
-    Parameters
-    ----------
-    node
-        Owner of the publishers.
-    params
-        Names of the frames, and which are broadcast.
-
-    Attributes
-    ----------
-    surface_frame_id : str
-        Full name of the frame of the surface.
-
-    Raises
-    ------
-    InvalidParameter
-        If the fingertip is to be broadcast and tf2_msgs is not installed.
-    """
+    """Publish transforms of one arm."""
 
     def __init__(self, node: Any, params: FrameParams) -> None:
         self._node = node

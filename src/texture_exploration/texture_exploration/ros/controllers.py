@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Topics of an arm that ROS drives, and the guard that stops it when the explorer has died."""
 
@@ -115,17 +116,7 @@ def scope() -> tuple[str, ...]:
 
 
 class TwistGuard(GuardProcess):
-    """The guard of one topic; nothing may be commanded to those whom it does not reach, or once it has ended.
-
-    Parameters
-    ----------
-    heartbeat_s
-        Longest silence while the arm moves.
-    topic, frame_id
-        Full name of the topic of the velocities, and what their header carries.
-    wrench_topic, wrench_frame_id
-        The same of the force that a compliance controller is commanded; '' if there is none.
-    """
+    """The guard of one topic; nothing may be commanded to those whom it does not reach, or once it has ended."""
 
     def __init__(
         self, heartbeat_s: float, topic: str, frame_id: str, wrench_topic: str = '', wrench_frame_id: str = ''
@@ -241,18 +232,7 @@ UNNAMED_S = 1.0
 
 
 class RosTopics:
-    """See `texture_exploration.arms.ros_controllers.ControllerTopics`.
-
-    Parameters
-    ----------
-    params
-        Names of topics and frames.
-
-    Raises
-    ------
-    DeviceError
-        If the controller would hold the last velocity for ever, or somebody else commands it.
-    """
+    """See `texture_exploration.arms.ros_controllers.ControllerTopics`."""
 
     def __init__(self, params: RosControllersParams) -> None:
         if not (params.controller_timeout_s or params.accept_no_timeout):
@@ -345,18 +325,7 @@ class RosTopics:
         self._wrenches.publish(message)
 
     def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """Let the controller manager switch both sets or nothing.
-
-        Parameters
-        ----------
-        activate, deactivate
-            Names of controllers.
-
-        Raises
-        ------
-        DeviceError
-            If controller_manager_msgs is not installed, or the manager does not answer, or refuses.
-        """
+        """Let the controller manager switch both sets or nothing."""
         manager = self._params.controller_manager
         try:
             kind = importlib.import_module('controller_manager_msgs.srv').SwitchController

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Spectra of windows, in time and along a surface, and their features: band powers, peaks, spectral exponent."""
 
@@ -26,21 +27,6 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins
     transform is a product with a matrix: for the few bins of a short window it takes half the time of a fast Fourier
     transform and the steps around it, and its rounding is the same for one window as for many.
 
-    Parameters
-    ----------
-    rows : (..., n_samples)
-    rate_hz
-        Sampling rate.
-    segment, step
-        Length of a segment, even, and distance between two of them, in samples.
-    bins
-        Number of bins, at most segment / 2.
-
-    Returns
-    -------
-    (..., n_segments, bins)
-        At the frequencies k · rate_hz / segment, k = 1 to `bins`, unit²/Hz.
-
     Source: Welch 1967; the mean over the segments is scipy.signal.welch(detrend='constant').
     """
     squares = _squares(rows, rate_hz, segment, step, bins)
@@ -49,23 +35,7 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins
 
 
 def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
-    """Return the mean of `segment_densities` over the segments, (..., bins); it costs less than all of them.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-    rate_hz
-        Sampling rate.
-    segment, step
-        Length of a segment, even, and distance between two of them, in samples.
-    bins
-        Number of bins, at most segment / 2.
-
-    Returns
-    -------
-    (..., bins)
-        At the frequencies k · rate_hz / segment, k = 1 to `bins`, unit²/Hz.
-    """
+    """Return the mean of `segment_densities` over the segments, (..., bins); it costs less than all of them."""
     squares = _squares(rows, rate_hz, segment, step, bins)
     means = squares @ mean_weights(squares.shape[-1])
     return means[..., :bins] + means[..., bins:]
@@ -83,38 +53,14 @@ def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) ->
 
 
 def segments(rows: Array, length: int, step: int) -> Array:
-    """Return the segments of rows; a row shorter than a segment is its only segment.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-    length, step
-        Length of a segment and distance between two of them, in samples.
-
-    Returns
-    -------
-    (..., n_segments, min(length, n_samples))
-        A copy.
-    """
+    """Return the segments of rows; a row shorter than a segment is its only segment."""
     if rows.shape[-1] <= length:
         return rows[..., None, :]
     return overlapping(rows, length, step).copy()  # a product of the view itself would crawl
 
 
 def overlapping(rows: Array, length: int, step: int) -> Array:
-    """Return the segments of rows as a view that must not be changed.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-        At least `length` samples long.
-    length, step
-        Length of a segment and distance between two of them, in samples.
-
-    Returns
-    -------
-    (..., n_segments, length)
-    """
+    """Return the segments of rows as a view that must not be changed."""
     rows = np.ascontiguousarray(rows)
     count = (rows.shape[-1] - length) // step + 1
     # The bare constructor: numpy's as_strided takes longer than a copy of all segments.
@@ -128,22 +74,7 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
 
 
 def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
-    """Return the densities of the segments of windows; features that ask for the same share them.
-
-    Parameters
-    ----------
-    windows
-        What is described.
-    segment, step
-        Length of a segment, even, and distance between two of them, in samples.
-    bins
-        Number of bins, at most segment / 2.
-
-    Returns
-    -------
-    (..., n_channels, n_segments, bins)
-        As `segment_densities` gives them, unit²/Hz.
-    """
+    """Return the densities of the segments of windows; features that ask for the same share them."""
     return windows.shared(
         ('densities', segment, step, bins),
         lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
@@ -151,17 +82,7 @@ def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Ar
 
 
 def mean_over_segments(densities: Array) -> Array:
-    """Return the mean over the segments, (..., n_bins).
-
-    Parameters
-    ----------
-    densities : (..., n_segments, n_bins)
-
-    Returns
-    -------
-    (..., n_bins)
-        In the unit of the densities.
-    """
+    """Return the mean over the segments, (..., n_bins)."""
     return mean_weights(densities.shape[-2]) @ densities
 
 
@@ -169,18 +90,6 @@ def long_densities(rows: Array, rate_hz: float, bins: int) -> Array:
     """Return the mean one-sided power spectral density at `bins` frequencies above 0 Hz, by fast Fourier transform.
 
     What `segment_densities` and the mean over half-overlapping segments give, for long segments and all their bins.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-    rate_hz
-        Sampling rate.
-    bins
-        Half the length of a segment.
-
-    Returns
-    -------
-    (..., bins)
     """
     segment = 2 * bins
     cut = segments(rows, segment, bins)
@@ -194,20 +103,7 @@ def long_densities(rows: Array, rate_hz: float, bins: int) -> Array:
 
 
 def amplitudes_of(windows: WindowBatch, points: int) -> tuple[Array, float]:
-    """Return the amplitudes of the Fourier transform of the zero-mean windows, and the step between its bins.
-
-    Parameters
-    ----------
-    points
-        Samples of the transform: a shorter window is padded with zeros, for a longer one there are as many as it has.
-
-    Returns
-    -------
-    (..., n_channels, n_bins)
-        From 0 Hz on, in the unit of the signal: a tone of amplitude 1 in the middle of a bin has 1.
-    float
-        Distance of the bins, Hz.
-    """
+    """Return the amplitudes of the Fourier transform of the zero-mean windows, and the step between its bins."""
     n_samples = windows.samples.shape[-2]
     points = max(points, n_samples)
     amplitudes = windows.shared(
@@ -218,13 +114,7 @@ def amplitudes_of(windows: WindowBatch, points: int) -> tuple[Array, float]:
 
 @lru_cache(maxsize=64)
 def hann(length: int) -> Array:
-    """Return a Hann window that is nowhere 0: taken in the middle of each sample.
-
-    Returns
-    -------
-    (length,)
-        Read-only, because it is shared.
-    """
+    """Return a Hann window that is nowhere 0: taken in the middle of each sample."""
     window: Array = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
     window.flags.writeable = False
     return window
@@ -260,19 +150,6 @@ def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) ->
 
     The whole window is tapered and transformed at once: for its few waves there is nothing to average. A band beyond
     half the sampling rate holds the density there.
-
-    Parameters
-    ----------
-    windows
-        What is described. NaN comes back where the speed is unknown or not above 0: what stands still has no waves.
-    edges_per_m : (n_bands + 1,)
-        Waves per metre, rising.
-    floor
-        unit² m.
-
-    Returns
-    -------
-    (..., n_channels, n_bands)
     """
     rows = windows.centred_rows
     n_samples = rows.shape[-1]
@@ -290,17 +167,7 @@ def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) ->
 
 
 def mean_subtracted(log_bands: Array) -> Array:
-    """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level.
-
-    Parameters
-    ----------
-    log_bands : (..., n_bands)
-
-    Returns
-    -------
-    (..., n_bands)
-        Of zero mean.
-    """
+    """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level."""
     return log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
 
 
@@ -344,25 +211,7 @@ class WelchPower(Feature):
 
 
 def welch_spectrum(windows: WindowBatch, points: int, rate_of_change: bool) -> tuple[Array, Array]:
-    """Return the mean density of each line above 0 Hz, (..., n_channels, n_lines), and its frequency, (n_lines,) Hz.
-
-    Parameters
-    ----------
-    windows
-        What is described.
-    points
-        Samples of a segment; segments overlap by a half, lines are rate / points apart.
-    rate_of_change
-        The signal is the rate of change of what touches, as a dynamic capacitive channel gives it: the density of the
-        integral is returned, by split by (2πf)².
-
-    Returns
-    -------
-    (..., n_channels, n_lines)
-        Density, unit²/Hz; for a rate of change that of its integral.
-    (n_lines,)
-        Frequencies, Hz.
-    """
+    """Return the mean density of each line above 0 Hz, (..., n_channels, n_lines), and its frequency, (n_lines,) Hz."""
     segment = 2 * (points // 2)
     hertz, integration = _lines(segment, windows.rate_hz)
     densities = windows.shared(
@@ -379,20 +228,6 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
     """Return at which frequencies the lines would stand at another speed, (..., 1, n_lines); 0 m/s: where they stand.
 
     A wave of the surface met at f is met at f · speed_m_s / v at that speed; NaN if that is unknown or not above 0.
-
-    Parameters
-    ----------
-    hertz : (n_lines,)
-        Frequencies at the speed of each window, Hz.
-    windows
-        What is described; their speeds are used.
-    speed_m_s
-        The other speed; 0 returns the frequencies unchanged.
-
-    Returns
-    -------
-    (..., 1, n_lines), or (n_lines,) for 0 m/s
-        Hz.
     """
     if not speed_m_s:
         return hertz
@@ -406,19 +241,6 @@ def force_normalised(log_power: Array, windows: WindowBatch, exponent: float) ->
     """Return a log power, (..., n_channels, n_values), less what it owes to the force, exponent · log(force).
 
     On a soft round finger (Hertz) the stiffness grows with the cube root of the force, so the power with force^(2/3).
-
-    Parameters
-    ----------
-    log_power : (..., n_channels, n_values)
-    windows
-        What is described; their forces are used.
-    exponent
-        Power of the force with which the power of the vibration grows; 0 returns `log_power` unchanged.
-
-    Returns
-    -------
-    (..., n_channels, n_values)
-        NaN where the force is unknown.
     """
     if not exponent:
         return log_power

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Features of the signal over time: moments, Hjorth parameters, differences; speed, force, friction; time stretch."""
 
@@ -18,13 +19,7 @@ from texture_features.windows import Feature, WindowBatch, centred, first_differ
 
 
 def signal_differences(windows: WindowBatch) -> Array:
-    """Return the zero-mean signal, its steps from sample to sample and their steps, ended by zeros, in one array.
-
-    Returns
-    -------
-    (..., n_channels, 3, 3, n_samples)
-        These three as they are, their squares, and their absolute values, per sample step.
-    """
+    """Return the zero-mean signal, its steps from sample to sample and their steps, ended by zeros, in one array."""
     return windows.shared('differences', lambda: _differences(windows.centred_rows))
 
 
@@ -126,15 +121,6 @@ class Hjorth(Feature):
 
 def hjorth(rows: Array) -> Array:
     """Return activity, mobility per sample step, and complexity; the latter two are 0 for a constant row.
-
-    Parameters
-    ----------
-    rows : (..., n_samples)
-        Zero mean.
-
-    Returns
-    -------
-    (..., 3)
 
     Source: Hjorth 1970; Kaboli et al. 2015, eq. 1 to 3.
     """
@@ -381,13 +367,6 @@ class Stretched(Feature):
     ten times as long or as short.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.D.4.
-
-    Examples
-    --------
-    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(2048) / 1000.0)[:, None]  # at 0.1 m/s
-    >>> window = WindowBatch(tone, 1000.0, np.array(0.1))
-    >>> Stretched(Speed(), to_m_s=0.05)(window).item()  # after stretching
-    0.05
     """
 
     feature: Feature
@@ -441,22 +420,7 @@ class Stretched(Feature):
 
 
 def stretched_lengths(speed_m_s: Array, n_samples: int, to_m_s: float) -> AnyArray:
-    """Return how many samples windows have after stretching, (...).
-
-    Parameters
-    ----------
-    speed_m_s : (...)
-        Speed of each window; NaN if unknown.
-    n_samples
-        Samples of a window before stretching.
-    to_m_s
-        Speed to which windows are brought.
-
-    Returns
-    -------
-    (...)
-        Whole numbers, at least 1.
-    """
+    """Return how many samples windows have after stretching, (...)."""
     speed = np.asarray(speed_m_s, dtype=np.float64)
     moving = speed > 0  # False for NaN
     factor = np.clip(np.where(moving, speed, to_m_s) / to_m_s, 1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
@@ -469,14 +433,6 @@ def resample(samples: Samples, length: int) -> Samples:
 
     The line from the first to the last sample is taken out before the Fourier transform, which sees the signal as
     periodic, and put back after it.
-
-    Parameters
-    ----------
-    samples : (..., n_samples, n_channels)
-
-    Returns
-    -------
-    (..., length, n_channels)
     """
     n_samples = samples.shape[-2]
     if length == n_samples:

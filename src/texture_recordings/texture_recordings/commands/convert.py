@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """The sub-commands of `texture` that turn recordings into others: `import`, `segment` and `export`."""
 

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Publish a bag into the graph, at any rate, and exit when it is through."""
 
@@ -30,21 +31,7 @@ from texture_recordings.ros import TOPICS
 
 
 class Schedule:
-    """Turn log times, given in their order, into seconds since the replay began.
-
-    Parameters
-    ----------
-    rate
-        How many times faster than recorded.
-    longest_pause_s
-        Longer pauses between messages, such as those between two slides, are cut to this; s of the recording.
-
-    Examples
-    --------
-    >>> schedule = Schedule(rate=2.0, longest_pause_s=1.0)
-    >>> [schedule.due_s(second * NANOSECONDS) for second in (0, 1, 60)]  # the pause of 59 s is cut to one
-    [0.0, 0.5, 1.0]
-    """
+    """Turn log times, given in their order, into seconds since the replay began."""
 
     def __init__(self, rate: float, longest_pause_s: float) -> None:
         self._rate = rate

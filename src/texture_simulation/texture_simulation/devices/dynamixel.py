@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Dynamixel motors and a hand emulated at the wire."""
 
@@ -74,22 +75,7 @@ LEAP_PRESSING = {finger.press: PressingMotor(0.09, 0.01) for finger in LEAP_FING
 
 
 class DynamixelMotors:
-    """Control tables and mechanics of all motors.
-
-    Parameters
-    ----------
-    ids
-        Of the motors.
-    pressing
-        Those that press, and how.
-    stiffness_n_m
-        Of fingertip and object; 0: there is no object.
-    model
-        Number of the model.
-    watchdog_stops
-        Whether a motor stops when its Bus Watchdog trips. False: as with firmware 51 of the motors of size 330 in
-        current control, which report the trip and go on (forum.robotis.com, topic 4814).
-    """
+    """Control tables and mechanics of all motors."""
 
     def __init__(
         self,
@@ -191,22 +177,7 @@ class DynamixelMotors:
         self._angle = self._angle + self._speed * PHYSICS_S
 
     def write(self, motor: int, address: int, data: bytes) -> int:
-        """Write into a control table unless the motor refuses it; return the error of the status packet.
-
-        Parameters
-        ----------
-        motor
-            Id of the motor.
-        address
-            First address of the control table.
-        data
-            Bytes to write.
-
-        Returns
-        -------
-        int
-            Error number of Protocol 2.0; 0 if the motor took it.
-        """
+        """Write into a control table unless the motor refuses it; return the error of the status packet."""
         table = self.tables[motor]
         error = self._refusal(table, address, data)
         if not error:
@@ -303,19 +274,7 @@ def crc16(data: bytes) -> int:
 
 
 class EmulatedDynamixelBus(EmulatedSerialRobot):
-    """The motors on their bus.
-
-    Parameters
-    ----------
-    link, finger_pipe
-        See `EmulatedSerialRobot`.
-    motors
-        On the bus.
-    finger
-        Which one is reported to the emulator.
-    latency_s
-        What comes from the motors is kept back for so long, as by a USB adapter: 16 ms are the default of FTDI.
-    """
+    """The motors on their bus."""
 
     def __init__(
         self,

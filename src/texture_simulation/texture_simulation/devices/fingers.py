@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Fingers emulated at the wire: encoders of their protocols and the devices that send them."""
 
@@ -48,18 +49,7 @@ def commands(electrodes: int) -> Bytes:
 
 
 def encode_replies(values: Values, absent: Sequence[int] = ()) -> Bytes:
-    """Return the replies to whole frames.
-
-    Parameters
-    ----------
-    values : (n_frames, n_slots, n_fingers) counts, 0 to 4095
-    absent
-        Places without a BioTac: their line stays low.
-
-    Returns
-    -------
-    (n_frames, n_slots * (2 + 2 * n_fingers))
-    """
+    """Return the replies to whole frames."""
     n_frames, n_slots, n_fingers = values.shape
     replies = np.zeros((n_frames, n_slots, 2 + 2 * n_fingers), dtype=np.uint8)
     replies[:, :, 0] = commands(n_slots // 2 - 3)
@@ -71,46 +61,12 @@ def encode_replies(values: Values, absent: Sequence[int] = ()) -> Bytes:
 
 
 def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, version: int = VERSION) -> bytes:
-    """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds.
-
-    Parameters
-    ----------
-    sequence
-        Running number of the frame; wraps at 16 bits.
-    time_us
-        Device's time of its first row; wraps at 32 bits.
-    values : (n_slots, n_fingers)
-        Counts, 0 to 4095.
-    reply
-        Bytes of the reply.
-    version
-        Version of the protocol.
-
-    Returns
-    -------
-    bytes
-        The whole frame.
-    """
+    """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds."""
     return framed(ord('B'), version, sequence, time_us, shape=values.shape, body=reply)
 
 
 def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
-    """Return the serial numbers on the wire.
-
-    Parameters
-    ----------
-    sequence
-        Running number of the frame; wraps at 16 bits.
-    time_us
-        Device's time of its first row; wraps at 32 bits.
-    serials
-        Serial number of each place; '' for an empty one.
-
-    Returns
-    -------
-    bytes
-        The whole frame.
-    """
+    """Return the serial numbers on the wire."""
     return framed(ord('S'), VERSION, sequence, time_us, shape=(1, len(serials)), body=','.join(serials).encode('ascii'))
 
 
@@ -182,15 +138,7 @@ HUB, EACH_PILLAR, WHOLE = 1, 3, 4
 
 
 class PapillArrayEncoder:
-    """Make the packets of a hub.
-
-    Parameters
-    ----------
-    arrays
-        How many arrays it carries.
-    hub_type
-        Type of the block with counter and clock.
-    """
+    """Make the packets of a hub."""
 
     def __init__(self, arrays: int, hub_type: int = HUB) -> None:
         self._arrays = arrays
@@ -208,22 +156,7 @@ class PapillArrayEncoder:
         self._whole_columns = self._columns(starts[WHOLE] + 2 + arrays * OFFSET_BYTES, 0)
 
     def packets(self, counter: int, times_us: Array, pillars: Array) -> Iterator[bytes]:
-        """Yield the packets of consecutive measurements.
-
-        Parameters
-        ----------
-        counter
-            Number of the first packet; wraps at 32 bits.
-        times_us : (n,)
-            The hub's clock.
-        pillars : (n, n_arrays, 9, 6)
-            Forces (N) and displacements (mm) along x, y, z of each pillar.
-
-        Returns
-        -------
-        iterator of bytes
-            A packet for each measurement.
-        """
+        """Yield the packets of consecutive measurements."""
         count = len(pillars)
         rows = np.tile(self._template, (count, 1))
         numbers = (counter + np.arange(count)).astype('<u4')
@@ -280,13 +213,7 @@ class PtyPort:
         return self._ends is not None
 
     def plug(self) -> None:
-        """Make the device appear under a new name, and lead the link there.
-
-        Raises
-        ------
-        DeviceError
-            If the link cannot be made.
-        """
+        """Make the device appear under a new name, and lead the link there."""
         if self._ends is not None:
             return
         device_end, host_end = os.openpty()
@@ -353,13 +280,6 @@ class EmulatedDevice:
 
     It has no clock of its own: each kind is given the samples, and a caller of another pace than nominal makes it a
     device whose clock drifts.
-
-    Parameters
-    ----------
-    link
-        Symbolic link that leads to the device; this is the path for the driver.
-    rng
-        Randomness of the faults.
     """
 
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
@@ -428,13 +348,7 @@ class EmulatedAnySkin(EmulatedDevice):
     """An emulated board: `sample` it at its pace; it sends from the moment it is plugged in. See `EmulatedDevice`."""
 
     def sample(self, field_ut: Array) -> None:
-        """Measure and send.
-
-        Parameters
-        ----------
-        field_ut : (n_frames, 15)
-            Field along x, y, z of each magnetometer.
-        """
+        """Measure and send."""
         # With the wrong firmware it is a board with fewer magnetometers.
         self._send(self._disturbed(encode(field_ut[:, 3:] if self.wrong_firmware else field_ut)))
 
@@ -443,15 +357,7 @@ class EmulatedAnySkin(EmulatedDevice):
 
 
 def encode(field_ut: Array, temperature_c: float = TEMPERATURE_C) -> Iterator[bytes]:
-    """Yield the frames of consecutive measurements.
-
-    Parameters
-    ----------
-    field_ut : (n_frames, 3 · n_magnetometers)
-        Field along x, y, z of each magnetometer.
-    temperature_c
-        Temperature that all magnetometers report.
-    """
+    """Yield the frames of consecutive measurements."""
     values = np.full((len(field_ut), field_ut.shape[1] // 3, 4), temperature_c, dtype='<f4')
     values[..., 1:] = field_ut.reshape(*values.shape[:2], 3)
     for row in values:
@@ -467,15 +373,7 @@ WRONG_VERSION = 99
 
 
 class EmulatedBioTac(EmulatedDevice):
-    """An emulated bridge: `advance` it by the frames that have been sampled.
-
-    Parameters
-    ----------
-    link, rng
-        See `EmulatedDevice`.
-    serials
-        Serial number of the BioTac at each place, '' where there is none.
-    """
+    """An emulated bridge: `advance` it by the frames that have been sampled."""
 
     def __init__(
         self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
@@ -496,12 +394,7 @@ class EmulatedBioTac(EmulatedDevice):
         self._frames += frames
 
     def advance(self, values: Values) -> None:
-        """Sample some frames and send them.
-
-        Parameters
-        ----------
-        values : (n_frames, n_slots, n_fingers) counts, 0 to 4095
-        """
+        """Sample some frames and send them."""
         replies = self._disturb(encode_replies(values, self._absent))
         self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True)))
 
@@ -532,15 +425,7 @@ UNKNOWN_TYPE = 8  # of a block that no driver knows
 
 
 class EmulatedPapillArray(EmulatedDevice):
-    """An emulated hub: `sample` it 1000 times a second.
-
-    Parameters
-    ----------
-    link, rng
-        See `EmulatedDevice`.
-    arrays
-        How many it carries.
-    """
+    """An emulated hub: `sample` it 1000 times a second."""
 
     def __init__(self, link: Path, rng: np.random.Generator, arrays: int = 1) -> None:
         super().__init__(link, rng)
@@ -561,13 +446,7 @@ class EmulatedPapillArray(EmulatedDevice):
         self._clock_ms = self._sent = 0
 
     def sample(self, pillars: Array) -> None:
-        """Let as many milliseconds pass as there are samples, and send those that the rate asks for.
-
-        Parameters
-        ----------
-        pillars : (n, n_arrays, 9, 6)
-            Forces (N) and displacements (mm) of each pillar.
-        """
+        """Let as many milliseconds pass as there are samples, and send those that the rate asks for."""
         self._execute(self._port.read())
         self._newest = pillars[-1]
         times_ms = self._clock_ms + np.arange(len(pillars))
@@ -619,17 +498,7 @@ class SampledStream(NamedTuple):
 
 
 class EmulatedSampler(EmulatedDevice):
-    """An emulated device: `advance` it by what has been sampled.
-
-    Parameters
-    ----------
-    link, rng
-        See `EmulatedDevice`.
-    streams
-        What it samples, by a name of our own.
-    start_us
-        Its clock when plugged in.
-    """
+    """An emulated device: `advance` it by what has been sampled."""
 
     def __init__(
         self, link: Path, rng: np.random.Generator, streams: Mapping[str, SampledStream], start_us: int = 0
@@ -653,13 +522,7 @@ class EmulatedSampler(EmulatedDevice):
             self._frames[name] += round(duration_s * stream.rate_hz / stream.rows)
 
     def advance(self, samples: Mapping[str, Counts]) -> None:
-        """Sample, and send what fills a frame.
-
-        Parameters
-        ----------
-        samples
-            Counts of each stream, (n_samples, n_columns).
-        """
+        """Sample, and send what fills a frame."""
         data = b''
         for name, counts in samples.items():
             self._waiting[name] = np.concatenate([self._waiting[name], counts])
@@ -679,26 +542,7 @@ class EmulatedSampler(EmulatedDevice):
 
 
 def encode_samples(stream: SampledStream, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
-    """Return a frame on the wire; number and time wrap.
-
-    Parameters
-    ----------
-    stream
-        Kind of the frame.
-    number
-        Running number of the frame; wraps at 16 bits.
-    time_us
-        Device's time of its first row; wraps at 32 bits.
-    counts : (n_rows, n_columns)
-        Samples of the frame.
-    version
-        Version of the protocol.
-
-    Returns
-    -------
-    bytes
-        The whole frame.
-    """
+    """Return a frame on the wire; number and time wrap."""
     return framed(stream.kind, version, number, time_us, shape=counts.shape, body=counts.astype('<i2').tobytes())
 
 
@@ -755,15 +599,7 @@ RESTING_ROTATION = bytes(6)
 
 
 class Tsf85Encoder:
-    """Make the packets of consecutive milliseconds; a finger that does not sense and the inertial sensors rest.
-
-    Parameters
-    ----------
-    finger
-        The finger that senses, 0 or 1.
-    long_stamps
-        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
-    """
+    """Make the packets of consecutive milliseconds; a finger that does not sense and the inertial sensors rest."""
 
     def __init__(self, finger: int = 0, long_stamps: bool = True) -> None:
         self._finger = finger
@@ -787,24 +623,7 @@ class Tsf85Encoder:
         return bytes([0x9A, 0x00, 0x58, len(items)]) + items
 
     def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:
-        """Yield the packets of some milliseconds.
-
-        Parameters
-        ----------
-        first_ms
-            The device's clock at the first of them.
-        dynamic : (n,) or (n, 2)
-            Of the finger that senses, or of both.
-        image : (n_taxels,) or (2, n_taxels)
-            The same.
-        image_is_new
-            Whether it has changed since the last call.
-
-        Yields
-        ------
-        bytes
-            One packet each.
-        """
+        """Yield the packets of some milliseconds."""
         rows = np.tile(self._template, (len(dynamic), 1))
         stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
         rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
@@ -840,13 +659,7 @@ UNKNOWN_ITEM = b'\x80'  # no type that any firmware known sends
 
 
 class EmulatedTsf85(EmulatedDevice):
-    """An emulated sensor: `advance` it by the milliseconds that have passed.
-
-    Parameters
-    ----------
-    link, rng
-        See `EmulatedDevice`.
-    """
+    """An emulated sensor: `advance` it by the milliseconds that have passed."""
 
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
@@ -874,14 +687,7 @@ class EmulatedTsf85(EmulatedDevice):
         self._encoder.plug(plugged)
 
     def advance(self, dynamic: Counts, images: Image) -> None:
-        """Let as many milliseconds pass as there are dynamic values, and send them if started.
-
-        Parameters
-        ----------
-        dynamic : (n,) or (n, 2)
-        images : (n_images, n_taxels) or (n_images, 2, n_taxels)
-            New ones; the last is in force from the first of these milliseconds on.
-        """
+        """Let as many milliseconds pass as there are dynamic values, and send them if started."""
         self._execute(self._port.read())
         if len(images):
             self._image, self._image_is_new = images[-1], True

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """Two rails and a pressing motor emulated at the wire."""
 
@@ -198,15 +199,7 @@ LineT = TypeVar('LineT', bound='EmulatedSerialRobot')
 
 
 class EmulatedSerialRobot:
-    """A robot in real time behind a device path, in a thread of its own; usable as a context.
-
-    Parameters
-    ----------
-    link
-        Symbolic link that leads to the device; this is the path for the arm.
-    finger_pipe
-        Path of the named pipe on which the emulator is told where the finger is; '': nobody.
-    """
+    """A robot in real time behind a device path, in a thread of its own; usable as a context."""
 
     def __init__(self, link: Path, finger_pipe: str) -> None:
         self.port = PtyPort(link)
@@ -216,13 +209,7 @@ class EmulatedSerialRobot:
         self._thread = threading.Thread(target=self.run, name=type(self).__name__, daemon=True)
 
     def run(self) -> None:
-        """Let time go by until `closing`.
-
-        Raises
-        ------
-        NotImplementedError
-            Always: each robot has its own.
-        """
+        """Let time go by until `closing`."""
         raise NotImplementedError
 
     def __enter__(self: LineT) -> LineT:
@@ -261,17 +248,7 @@ MAX_STEPS = 40  # in one go, after the machine was busy
 
 
 class EmulatedRails(EmulatedSerialRobot):
-    """The rails on their line.
-
-    Parameters
-    ----------
-    link, finger_pipe
-        See `EmulatedSerialRobot`.
-    machine
-        The mechanics.
-    rng
-        Randomness of the faults.
-    """
+    """The rails on their line."""
 
     def __init__(
         self,

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A twist controller with poses and wrenches, as a ROS arm offers them."""
 
@@ -40,21 +41,7 @@ STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no 
 
 
 def coulomb_n(friction: float, pressing_n: float, normal: Array, velocity_m_s: Array) -> Array:
-    """Return the Coulomb friction on a finger that is pressed on a surface with this normal.
-
-    Parameters
-    ----------
-    friction
-        Coefficient.
-    pressing_n
-        Normal force.
-    normal, velocity_m_s : (3,)
-
-    Returns
-    -------
-    (3,)
-        N, along the surface and against the movement.
-    """
+    """Return the Coulomb friction on a finger that is pressed on a surface with this normal."""
     along = velocity_m_s - (velocity_m_s @ normal) * normal
     speed = math.sqrt(float(along @ along))
     return -friction * pressing_n * along / max(speed, STICTION_M_S)
@@ -156,21 +143,7 @@ TOOL_AXES = np.diag([1.0, -1.0, -1.0])
 
 
 class EmulatedTwistArm:
-    """The arm: commands in, pose and force out; time goes by `advance`.
-
-    Parameters
-    ----------
-    params
-        See `TwistControllerParams`; may be replaced while it runs.
-    now_ns
-        The time.
-
-    Attributes
-    ----------
-    params : TwistControllerParams
-    position, velocity : (3,)
-        Of the fingertip in the base frame, m and m/s.
-    """
+    """The arm: commands in, pose and force out; time goes by `advance`."""
 
     def __init__(self, params: TwistControllerParams, now_ns: int) -> None:
         self.params = params
@@ -185,28 +158,14 @@ class EmulatedTwistArm:
         self._since_ns = self._now_ns = now_ns
 
     def command(self, now_ns: int, velocity_m_s: Array) -> None:
-        """Take a velocity in the base frame, (3,), m/s; it comes into effect later.
-
-        Parameters
-        ----------
-        now_ns
-            The time, ns.
-        velocity_m_s : (3,)
-            In the base frame.
-        """
+        """Take a velocity in the base frame, (3,), m/s; it comes into effect later."""
         if self.params.active:
             delay_s = self.params.lag_s + self.jitter_s()
             sign = -1.0 if self.params.invert_twist else 1.0
             self._coming.append((now_ns + round(delay_s * 1e9), sign * velocity_m_s))
 
     def press(self, force_n: Array) -> None:
-        """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none.
-
-        Parameters
-        ----------
-        force_n : (3,)
-            Force of the tool on its surroundings; 0 for none.
-        """
+        """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none."""
         self._pressing = force_n
 
     def jitter_s(self) -> float:
@@ -234,13 +193,7 @@ class EmulatedTwistArm:
         return force - params.wall_stiffness_n_m * behind_m * self._axes[:, 0]
 
     def reading_n(self) -> Array:
-        """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise.
-
-        Returns
-        -------
-        (3,)
-            N, in the frame of the tool.
-        """
+        """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise."""
         weight = np.array([0.0, 0.0, -self.params.tool_mass_kg * GRAVITY_M_S2])
         noise = self.params.force_noise_n * self._rng.standard_normal(3)
         turned = rotation_matrix((0.0, self.params.turn_force_rad, 0.0))

@@ -1,3 +1,4 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 """A UR controller emulated at the wire: RTDE, dashboard, program, and a robot in contact."""
 
@@ -44,22 +45,7 @@ class RobotMove:
     done: bool
 
     def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Return the velocity of the next step, (6,).
-
-        Parameters
-        ----------
-        pose : (6,)
-            Place of the tool in m and rotation vector in rad.
-        velocity : (6,)
-            m/s and rad/s.
-        step_s
-            Length of the step.
-
-        Returns
-        -------
-        (6,)
-            m/s and rad/s.
-        """
+        """Return the velocity of the next step, (6,)."""
         raise NotImplementedError
 
 
@@ -91,19 +77,7 @@ class SpeedMove(RobotMove):
 
 
 def approach(now: Array, wanted: Array, step: float) -> Array:
-    """Return `now` led towards `wanted` by at most `step`.
-
-    Parameters
-    ----------
-    now, wanted : (n,)
-        In one unit.
-    step
-        Largest change of their distance, in that unit.
-
-    Returns
-    -------
-    (n,)
-    """
+    """Return `now` led towards `wanted` by at most `step`."""
     offset = wanted - now
     distance = math.sqrt(offset @ offset)
     return wanted if distance <= step else now + step / distance * offset
@@ -272,15 +246,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class ContactPlane:
-    """Contact force on a finger at a position and velocity, in the base frame of the robot.
-
-    Attributes
-    ----------
-    drop_m
-        The whole surface lies lower by this: set while the finger slides, the surface is lost as behind an edge.
-    friction
-        Coefficient of Coulomb friction: another sample has another one.
-    """
+    """Contact force on a finger at a position and velocity, in the base frame of the robot."""
 
     def __init__(self, params: UrControllerParams) -> None:
         self._params = params
@@ -289,17 +255,7 @@ class ContactPlane:
         self.origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
 
     def force_n(self, position_m: Array, velocity_m_s: Array) -> Array:
-        """Return the force of the surface on the finger.
-
-        Parameters
-        ----------
-        position_m, velocity_m_s : (3,)
-
-        Returns
-        -------
-        (3,)
-            Stiffness × depth upwards, Coulomb friction against the movement, and the push of the wall.
-        """
+        """Return the force of the surface on the finger."""
         behind_m = max(0.0, float(position_m[0] - self.origin[0]) - self._params.wall_m)
         wall: Array = np.array([-self._params.wall_stiffness_n_m * behind_m, 0.0, 0.0])
         depth_m = float(self.origin[2] - self.drop_m - position_m[2])
@@ -334,13 +290,7 @@ class ControllerProcess:
         self.stop()
 
     def start(self) -> None:
-        """Return when its ports are open.
-
-        Raises
-        ------
-        DeviceError
-            If they cannot be opened.
-        """
+        """Return when its ports are open."""
         command = [sys.executable, '-m', 'texture_simulation.devices.ur', json.dumps(dataclasses.asdict(self.params))]
         self._process = subprocess.Popen(
             command,
@@ -1032,15 +982,7 @@ OUTPUT_RECIPE = 1
 
 
 class RtdeSession(Session):
-    """The conversation with one client; `package` is what it gets each cycle once it has asked for it.
-
-    Parameters
-    ----------
-    controller
-        Whose variables are read and written.
-    claims
-        Who writes which input, over all sessions: each may belong to one only.
-    """
+    """The conversation with one client; `package` is what it gets each cycle once it has asked for it."""
 
     def __init__(self, controller: EmulatedController, claims: dict[str, RtdeSession]) -> None:
         self._controller = controller
@@ -1193,13 +1135,7 @@ CHUNK = 65536
 
 
 class Server:
-    """Serve a controller on its ports.
-
-    Raises
-    ------
-    DeviceError
-        If a port cannot be opened.
-    """
+    """Serve a controller on its ports."""
 
     def __init__(self, controller: EmulatedController, ip: str, finger_pipe: str) -> None:
         self._controller = controller
