@@ -45,6 +45,39 @@ class Listening:
 WITHOUT_GAPS = Listening()
 
 
+# --------------------
+# What no arm and no sensor can mean: a number that is none, or beyond every robot.
+
+MOST_FORCE_N = 1e4
+MOST_M = 100.0  # of a place, and of a speed in m/s
+
+
+def impossible(what: str, numbers: Iterable[float], most: float, unit: str) -> str:
+    """Return in a short sentence which number nobody can have measured, '' if all may be."""
+    for number in numbers:
+        if not math.isfinite(number):
+            return f'the arm reports a {what} that is no number ({number:g})'
+        if abs(number) > most:
+            return f'the arm reports a {what} of {number:.3g} {unit}, which no {"sensor" if unit == "N" else "arm"} has'
+    return ''
+
+
+def sound(arm: ArmState, before: ArmState) -> ArmState:
+    """Return the state; what nobody can have measured is replaced by what was `before` and makes it unsafe.
+
+    A place that stays unknown grows old, so that the arm counts as silent; a force that stays unknown does not keep a
+    finger from being lifted.
+    """
+    place = impossible('place', arm.position, MOST_M, 'm') or impossible('velocity', arm.velocity, MOST_M, 'm/s')
+    if place:
+        return replace(before, unsafe=arm.unsafe or place, fault=arm.fault)
+    along_n = () if all(map(math.isnan, arm.along_n)) else arm.along_n
+    force = impossible('force', (arm.force_n, *along_n), MOST_FORCE_N, 'N')
+    if force:
+        return replace(arm, force_n=before.force_n, along_n=before.along_n, unsafe=arm.unsafe or force)
+    return arm
+
+
 MAX_DISTANCE_M = 1.0
 # What can be asked for: lowest, highest and unit. A number is the same for every robot; a name is a limit to be chosen.
 RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
@@ -57,6 +90,11 @@ RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
 }
 # Several turns are a direction, too; an angle beyond this one is a mistake, and loses its meaning by rounding.
 MAX_DIRECTION_RAD = 100.0
+
+
+def shown(force_n: float) -> str:
+    """Return a force in few characters, whatever it is."""
+    return f'{force_n:.2f}' if abs(force_n) <= MOST_FORCE_N else f'{force_n:.3g}'
 
 
 def stated(given: float, value: float) -> str:
@@ -281,20 +319,18 @@ class SafetyLimits:
         """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
         # Written so that NaN is too much too.
         if not arm.force_n <= self.force_limit_n:
-            return f'the force of {arm.force_n:.2f} N is above the limit of {self.force_limit_n:g} N'
+            return f'the force of {shown(arm.force_n)} N is above the limit of {self.force_limit_n:g} N'
         if arm.force_n < -self.force_limit_n:
             return (
-                f'the force of {arm.force_n:.2f} N pulls by more than the limit of {self.force_limit_n:g} N; if the '
+                f'the force of {shown(arm.force_n)} N pulls by more than the limit of {self.force_limit_n:g} N; if the '
                 'finger was pressing, its sign is wrong'
             )
         if not arm.force_size_n <= self.force_limit_n:
-            x, y, z = arm.force_vector_n
+            x, y, z = map(shown, arm.force_vector_n)
             return (
-                f'the force of {arm.force_size_n:.2f} N ({x:.2f} and {y:.2f} N along the surface, {z:.2f} N normal to '
-                f'it) is above the limit of {self.force_limit_n:g} N'
+                f'the force of {shown(arm.force_size_n)} N ({x} and {y} N along the surface, {z} N normal to it) is '
+                f'above the limit of {self.force_limit_n:g} N'
             )
-        if not all(map(math.isfinite, arm.position)):
-            return f'the place of the finger is unknown: the arm tells {arm.position}'
         return ''
 
     def friction_violation(self, arm: ArmState) -> str:

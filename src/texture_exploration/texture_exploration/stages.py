@@ -1237,6 +1237,11 @@ class Motion:
             self._finish_reason = reason
             self._slide.finish()
 
+    def lift_from(self, place: Vector) -> LiftStage:
+        """Return another lift from a place, for whoever cannot trust this motion any more."""
+        along, (x, y, z) = self._slide.along, place
+        return LiftStage((x, y, z + along.touch.clearance_m), along.force_n, along.touch, along.limits)
+
     @property
     def force_n(self) -> float:
         """The wanted force of the slide."""

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import math
 import threading
 import time
@@ -36,7 +37,15 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
-from texture_exploration.safety import GAP_NS, WITHOUT_GAPS, CommandLimits, Listening
+from texture_exploration.safety import (
+    GAP_NS,
+    MOST_FORCE_N,
+    MOST_M,
+    WITHOUT_GAPS,
+    CommandLimits,
+    Listening,
+    impossible,
+)
 
 # --------------------
 # What can be chosen about an arm that is driven by ROS controllers.
@@ -286,6 +295,7 @@ VELOCITY_OVER_NS = 30_000_000
 STILL_M_S = 1e-4  # a slower finger is at rest: what remains is the noise of its place
 AGREE_NS = 1_000_000_000  # clocks by which a sample is older than this, or comes from the future, do not agree
 REST: Vector = (0.0, 0.0, 0.0)
+LEAST_ROTATION = 0.5  # of the length of a quaternion, which is 1
 
 
 class ToolState:
@@ -299,6 +309,7 @@ class ToolState:
         self._force_came_ns = 0
         self._late = {'pose': '', 'force': ''}
         self.misplaced = ''
+        self.impossible = ''  # what no sensor can have measured came; it was not taken
         self.listening = WITHOUT_GAPS
         self.rotation: Array = np.eye(3)  # of the tool in the base frame
         self._position: Vector = (math.nan, math.nan, math.nan)
@@ -320,6 +331,12 @@ class ToolState:
             return
         if not self._is_new('pose', sample.stamp_ns):
             return
+        bad = impossible('place', sample.position_m, MOST_M, 'm') or impossible('rotation', sample.rotation, 2.0, '')
+        if not bad and math.hypot(*sample.rotation) < LEAST_ROTATION:
+            bad = 'the arm reports a quaternion of zeros, which is no rotation'
+        if bad:  # it grows old if it stays so
+            self.impossible = f"{bad}, on '{params.pose_topic}'"
+            return
         self.pose_ns = now_ns - self._age_ns('pose', now_ns, sample.age_ns)
         self.rotation = quaternion_matrix(sample.rotation)
         self._position = self._frame.place(sample.position_m)
@@ -335,6 +352,10 @@ class ToolState:
             )
             return
         if not self._is_new('force', sample.stamp_ns):
+            return
+        if bad := impossible('force', sample.force_n, MOST_FORCE_N, 'N'):
+            self.impossible = f"{bad}, on '{params.wrench_topic}'"
+            self.force_ns = now_ns  # the finger can be lifted without a force
             return
         passed_s = (now_ns - self._force_came_ns) * 1e-9 if self._force_came_ns else math.inf
         self._force_came_ns = now_ns
@@ -402,6 +423,8 @@ class ToolState:
         for what, topic, time_ns in measured:
             age_s = self.listening.silence_s(time_ns, now_ns)
             if age_s > params.deadman_s:
+                if what == 'pose' and self.impossible:
+                    return f'{self.impossible}, and no other has come for {1e3 * age_s:.0f} ms'
                 return (
                     f"no {what} has come on '{topic}' for {1e3 * age_s:.0f} ms, so zero velocity was commanded; check "
                     'that its broadcaster is active'
@@ -441,6 +464,7 @@ class ToolState:
 HALTING_NS = 500_000_000  # so long zero velocity is repeated; afterwards others may command the controller
 GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
 POLL_S = 0.005
+LOGGER = logging.getLogger(__name__)
 NOT_CONNECTED = 'the arm is not connected; connect it first'
 
 
@@ -502,6 +526,8 @@ class RosControllersArm(SurfaceArm):
         self._switched = False  # controllers were switched for this connection
         self._hand_over_fault = ''
         self._unsafe = ''  # why it may only be lifted, likewise
+        self._state: ArmState
+        self._failed = ''  # with an internal error
         self._lost = ''  # a fault that stays until the arm is recovered or connected again
         self._restart()
 
@@ -600,7 +626,7 @@ class RosControllersArm(SurfaceArm):
         """
         self._connected()
         self.stop()
-        self._lost = self._unsafe = self._tool.misplaced = ''
+        self._lost = self._unsafe = self._failed = self._tool.misplaced = self._tool.impossible = ''
         self._tool.zero.forget()
         self._zeroed = False
         self._follow.restart()
@@ -629,8 +655,26 @@ class RosControllersArm(SurfaceArm):
         }
 
     def step(self) -> None:
-        """Take what was measured, and send what the newest command needs now."""
+        """Take what was measured, and send what the newest command needs now; zero velocity if that fails.
+
+        After a first error the arm may only be lifted; one that comes again leaves it at rest for good.
+        """
         topics = self._connected()
+        try:
+            self._step(topics)
+        except Exception as error:
+            LOGGER.exception('a step of the arm failed')
+            reason = f'internal error, {type(error).__name__}: {error}'[:200]
+            self._lost = self._lost or (self._failed and reason)
+            self._failed = self._unsafe = reason
+            self._command = None
+            self._commanded = REST
+            self._stop_pressing(topics)
+            topics.send_velocity(REST)
+            self._state = replace(self._state, unsafe=reason, fault=self._lost)
+
+    def _step(self, topics: ControllerTopics) -> None:
+        """Take what was measured, and send what the newest command needs now."""
         now_ns = self._clock()
         held_s = (now_ns - self._sent_ns) * 1e-9 if self._sent_ns else 0.0
         if self._sent_ns and now_ns - self._sent_ns > GAP_NS:
@@ -639,7 +683,7 @@ class RosControllersArm(SurfaceArm):
         self._take(topics, now_ns)
         if not self._lost:
             self._lost = self._lost_controller(topics, now_ns, held_s)
-        self._unsafe = self._unsafe or topics.unsafe()
+        self._unsafe = self._unsafe or topics.unsafe() or self._tool.impossible
         fault = self._fault(now_ns)
         if fault:
             self._command = None
@@ -669,7 +713,7 @@ class RosControllersArm(SurfaceArm):
         self._commanded = REST
         self._moved_ns = self._sent_ns = self._gone_ns = 0
         self._pressing = self._zeroed = False
-        self._lost = self._unsafe = ''
+        self._lost = self._unsafe = self._failed = ''
 
     def _take_over(self, topics: ControllerTopics) -> None:
         if self._params.controller_manager:
