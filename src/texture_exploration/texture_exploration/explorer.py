@@ -263,7 +263,7 @@ class Exploration:
         while not arm_fault(arm, self._clock(), self._limits):
             command = lift.timed_step(self._clock(), arm)
             if command is None:
-                return lift.free
+                return bool(lift.free)
             self._arm.command(command)
             pace()
             arm = self._sound_state()
@@ -295,7 +295,7 @@ class Exploration:
         if fault:
             self._give_up(ExplorationError.ARM_FAULT, f'{fault}; the finger was not lifted')
             return True
-        relative = self._guard.relative(arm, self._arm.zeroed, self._commanded)
+        relative = self._guard.relative(arm, self._arm.zeroed)
         trouble = self._stop or self._trouble(now_ns, arm, relative)
         if trouble:
             self._abort = self._abort or trouble
@@ -579,6 +579,7 @@ class Explorer:
         self._lock = threading.Lock()
         self._home: Vector | None = None
         self._lift_first = True  # nobody knows whether the finger presses
+        self._zero_n: Vector | None = None  # what the sensor showed before the first lift, until it is zeroed
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = self._released = False
@@ -595,7 +596,7 @@ class Explorer:
         DeviceError
             If it cannot be reached.
         """
-        self._lift_first = True
+        self._lift_first, self._zero_n = True, None
         self.arm.close()
         self.arm.connect()
         self._released = False
@@ -873,7 +874,9 @@ class Explorer:
             except MotionRefused as error:
                 raise MotionRefused(f'{error}; the workspace of a request with a start is the surface patch') from error
         if self._lift_first:
-            motion.lift_first(lambda: self.arm.zeroed)
+            if self._zero_n is None or self.arm.zeroed:
+                self._zero_n = self.arm.state().force_vector_n
+            motion.lift_first(lambda: self.arm.zeroed, self._zero_n)
         return Exploration(
             exploration_id,
             request,

@@ -38,8 +38,11 @@ class Listening:
     def silence_s(self, heard_ns: int, now_ns: int) -> float:
         """Return for how long nothing was heard, s, without the part of it that lies in the newest gap."""
         start_ns = max(heard_ns, self.since_ns)
-        slept_ns = max(0, self.gap_end_ns - max(self.gap_start_ns, start_ns))
-        return (now_ns - start_ns - slept_ns) * 1e-9
+        silent_ns = now_ns - start_ns
+        # Only the part of the gap after the last sign of life counts.
+        if self.gap_end_ns > start_ns:
+            silent_ns -= self.gap_end_ns - max(self.gap_start_ns, start_ns)
+        return silent_ns * 1e-9
 
 
 WITHOUT_GAPS = Listening()
@@ -227,7 +230,7 @@ class SafetyLimits:
         10.0, 'How long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
     )
     contact_timeout_s: float = param(
-        3.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
+        10.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
     )
     slide_overtime_s: float = param(
         2.0, 'How much longer than planned a slide may take before the exploration is aborted.', unit='s', low=0.1
@@ -498,7 +501,6 @@ WAY_S = 0.15  # of commands that count as the way into an obstacle: no arm is la
 BACK_S = 0.3  # no way back takes longer
 HELPS_S = 0.09  # after which the force has begun to fall, if it ever will
 BACK_SPEEDS_M_S = (0.02, 0.1)  # the way back was free a moment ago: it may be gone as fast as it was come
-REST_NS = 50_000_000  # an arm that was told to stand still does so after this
 
 
 class ForceWatch:
@@ -606,30 +608,26 @@ class ForceWatch:
 class ForceGuard:
     """Limit the whole force, and find the way back out of what the finger has met.
 
-    As long as the arm has not zeroed its force sensor, only the change counts: since the start, or since the arm last
-    stood still. The way back is that of the last commands: it needs neither the frame nor the sign of the force, nor
-    those of the pose.
+    As long as the arm has not zeroed its force sensor, only the change since the start counts. The way back
+    is that of the last commands: it needs neither the frame nor the sign of the force, nor those of the pose.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
         self.blocked = ''
         self._limits = limits
         self._zero: Vector | None = None  # what the sensor shows at the start, while it is not zeroed
-        self._moved_ns = 0
         self._way: deque[tuple[int, ArmCommand, float]] = deque()  # with the size of the force
         self._back: ArmCommand | None = None
         self._back_ns = 0
         self._came_back = False  # there is one way back
         self._largest_n = 0.0
 
-    def relative(self, arm: ArmState, zeroed: bool, command: ArmCommand) -> ArmState:
-        """Return the state with the force that counts; `command` is what the arm was doing."""
+    def relative(self, arm: ArmState, zeroed: bool) -> ArmState:
+        """Return the state with the force that counts."""
         if zeroed:
             self._zero = None
             return arm
-        if command != ArmCommand():
-            self._moved_ns = arm.time_ns
-        if self._zero is None or arm.time_ns - self._moved_ns > REST_NS:
+        if self._zero is None:
             self._zero = arm.force_vector_n
         x, y, z = (now_n - zero_n for now_n, zero_n in zip(arm.force_vector_n, self._zero, strict=True))
         return replace(arm, force_n=z, along_n=(x, y))

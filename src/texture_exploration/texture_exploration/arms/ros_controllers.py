@@ -518,7 +518,6 @@ class RosControllersArm(SurfaceArm):
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._late = 0
-        self._place: Vector | None = None  # along the surface, at the last step
         self._command: tuple[ArmCommand, int] | None = None  # and when it came
         self._commanded: Vector = REST
         self._moved_ns = self._sent_ns = 0
@@ -645,13 +644,11 @@ class RosControllersArm(SurfaceArm):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of this connection, and the measured lag of the controller in ms, 0 until it is measured."""
+        """Totals of this connection."""
         self._connected()
-        lag_s = self._velocity.lag_s
         return {
             'zeroed': self._tool.zero.zeroings,
             'late_periods': self._late,
-            'lag_ms': 0 if math.isnan(lag_s) else round(1e3 * lag_s),
         }
 
     def step(self) -> None:
@@ -709,7 +706,7 @@ class RosControllersArm(SurfaceArm):
         self._velocity = CommandedVelocity(loop, 1.0 / params.rate_hz)
         self._follow = FollowWatch()
         self._state = self._tool.state('')
-        self._place = self._command = None
+        self._command = None
         self._commanded = REST
         self._moved_ns = self._sent_ns = self._gone_ns = 0
         self._pressing = self._zeroed = False
@@ -830,7 +827,6 @@ class RosControllersArm(SurfaceArm):
 
     def _carry_out(self, topics: ControllerTopics, command: ArmCommand | None, now_ns: int, held_s: float) -> None:
         state = self._state
-        self._note_way(state)
         if command is not None and command.force_n is not None:
             self._tool.zero.presume_contact()
             self._press(topics, command)
@@ -856,11 +852,6 @@ class RosControllersArm(SurfaceArm):
         if command.force_n is not None and self._params.target_wrench_topic:
             command = replace(command, force_n=None, normal_m_s=0.0)
         return self._velocity.choose(command, state, held_s)
-
-    def _note_way(self, state: ArmState) -> None:
-        if self._place is not None:
-            self._velocity.travelled(math.dist(state.position[:2], self._place[:2]))
-        self._place = state.position
 
     def _send(self, topics: ControllerTopics, velocity: Vector, now_ns: int) -> None:
         self._commanded, self._moved_ns = velocity, now_ns
