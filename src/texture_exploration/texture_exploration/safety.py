@@ -147,28 +147,9 @@ class SafetyLimits:
         low=0.05,
         high=20.0,
     )
-    frozen_force_s: float = param(
-        0.06,
-        'How long a measured force may stay exactly the same, where it should change, before the '
-        'exploration is aborted.',
-        unit='s',
-        low=0.02,
-        high=5.0,
-    )
-    force_drift_fraction: float = param(
-        0.3,
-        'Largest change of the force in free air over an exploration, as a fraction of the wanted '
-        'force; more aborts it.',
-        low=0.01,
-        high=10.0,
-    )
-    max_turning_m_s2: float = param(
-        5.0,
-        'Highest centripetal acceleration on a circle; larger values allow faster and smaller circles.',
-        unit='m/s²',
-        low=0.05,
-        high=20.0,
-    )
+    frozen_force_s = 0.06  # of a reading that stays the same where it should change: six states at 100 Hz
+    force_drift_fraction = 0.3  # of the wanted force, that the force in free air may change over an exploration
+    max_turning_m_s2 = 5.0  # centripetal acceleration on a circle: half of what an arm of 1 kg turns by with 10 N
     x_low_m: float = param(
         -0.2,
         'Lowest x coordinate of the workspace in the surface frame; leaving it aborts.',
@@ -232,9 +213,7 @@ class SafetyLimits:
     contact_timeout_s: float = param(
         10.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
     )
-    slide_overtime_s: float = param(
-        2.0, 'How much longer than planned a slide may take before the exploration is aborted.', unit='s', low=0.1
-    )
+    slide_overtime_s = 2.0  # longer than planned, that a slide may take
     lift_timeout_s: float = param(
         5.0, 'How long braking and lifting may take before the exploration is aborted.', unit='s', low=0.1
     )
@@ -374,20 +353,8 @@ class CommandLimits:
     without the explorer, and for a motion with an error in its arithmetic.
     """
 
-    command_speed_m_s: float = param(
-        1.0,
-        'Highest tangential speed that one command may ask for; faster commands are refused.',
-        unit='m/s',
-        low=0.001,
-        high=2.0,
-    )
-    command_normal_m_s: float = param(
-        0.5,
-        'Highest normal speed that one command may ask for; faster commands are refused.',
-        unit='m/s',
-        low=0.001,
-        high=1.0,
-    )
+    command_speed_m_s = 1.0  # along the surface, of a single command; four times what an exploration may ask for
+    command_normal_m_s = 0.5  # along the normal, of a single command
     command_force_n: float = param(
         50.0,
         'Highest normal force that one command may ask for; larger forces are refused.',

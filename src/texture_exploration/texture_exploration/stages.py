@@ -194,13 +194,7 @@ class TouchParams:
         low=0.001,
         high=0.5,
     )
-    unheard_force_fraction: float = param(
-        1.5,
-        'Highest force of the approach, as a fraction of the wanted one, on an arm that only its watchdog stops; '
-        'a smaller fraction lowers the approach speed.',
-        low=0.2,
-        high=10.0,
-    )
+    unheard_force_fraction = 1.5  # of the wanted force, that an arm may reach which only its watchdog stops
     contact_force_n: float = param(
         0.2,
         'Force above which the finger counts as in contact; a larger force needs a harder touch.',
@@ -234,26 +228,9 @@ class TouchParams:
         low=0.05,
         high=10.0,
     )
-    jerk_m_s3: float = param(
-        50.0,
-        'Highest tangential jerk; larger values shorten the ramps before and after a slide.',
-        unit='m/s³',
-        low=1.0,
-        high=1000.0,
-    )
-    arm_lag_s: float = param(
-        0.005,
-        'Time after which the arm follows a command; the direction on a curved path is led by it.',
-        unit='s',
-        low=0.0,
-        high=0.1,
-    )
-    lost_force_fraction: float = param(
-        0.25,
-        'Fraction of the wanted force below which contact counts as lost during a slide; a larger one aborts sooner.',
-        low=0.05,
-        high=0.9,
-    )
+    jerk_m_s3 = 50.0  # along the surface: ramps of 0.1 s up to 0.05 m/s
+    arm_lag_s = 0.005  # after which an arm follows a command: the direction on a curved path is led by it
+    lost_force_fraction = 0.25  # of the wanted force, below which contact counts as lost
     lost_contact_s: float = param(
         0.1,
         'How long contact may be lost before the slide ends; shorter gaps are bounces on a rough surface.',
@@ -261,13 +238,7 @@ class TouchParams:
         low=0.02,
         high=5.0,
     )
-    stall_speed_fraction: float = param(
-        0.25,
-        'Fraction of the commanded way below which a sliding finger counts as stalled; a larger fraction aborts '
-        'sooner.',
-        low=0.05,
-        high=0.9,
-    )
+    stall_speed_fraction = 0.25  # of the commanded way, below which a sliding finger counts as stalled
     stall_s: float = param(
         0.25,
         'Time over which the commanded way and that of the finger are compared during a slide; a longer time '
@@ -276,12 +247,7 @@ class TouchParams:
         low=0.05,
         high=5.0,
     )
-    mean_force_fraction: float = param(
-        0.3,
-        'Largest relative error of the mean measured force with which a slide succeeds.',
-        low=0.05,
-        high=1.0,
-    )
+    mean_force_fraction = 0.3  # error of the mean force with which a slide succeeds
     peak_force_fraction: float = param(
         0.5,
         'By which fraction of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
@@ -302,20 +268,8 @@ class TouchParams:
         low=0.05,
         high=20.0,
     )
-    mean_friction: float = param(
-        2.0,
-        'Largest mean force along the surface, as a multiple of the wanted force, with which a slide '
-        'succeeds; it counts where the arm measures that force.',
-        low=0.1,
-        high=50.0,
-    )
-    peak_friction: float = param(
-        3.0,
-        'Largest force along the surface for 50 ms, as a multiple of the wanted force, with which a slide '
-        'succeeds; states beyond it are not steady.',
-        low=0.1,
-        high=50.0,
-    )
+    mean_friction = 2.0  # mean force along the surface by wanted force, of a slide that succeeds
+    peak_friction = 3.0  # the same for 50 ms; states beyond it are not steady
     lift_speed_m_s: float = param(
         0.05,
         'Speed away from the surface; a higher speed leaves the surface sooner.',
@@ -323,9 +277,7 @@ class TouchParams:
         low=0.005,
         high=0.5,
     )
-    clearance_m: float = param(
-        0.005, 'Least height by which the finger is lifted after a contact.', unit='m', low=0.001, high=0.1
-    )
+    clearance_m = 0.005  # least rise after a contact
 
     def approach_m_s(self, force_n: float, watchdog_s: float = 0.0) -> float:
         """Return how fast the finger may come down to press with a force.
@@ -542,7 +494,7 @@ class SlideWatch:
         if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
             yield (
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
-                f"{asked_n:g} N that were asked for ('mean_force_fraction'); slide more slowly, or check the force "
+                f'{asked_n:g} N that were asked for; slide more slowly, or check the force '
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
@@ -556,18 +508,18 @@ class SlideWatch:
         if mean_n > touch.mean_friction * asked_n:
             yield (
                 f'the mean force along the surface was {mean_n:.2f} N, and {touch.mean_friction * asked_n:.2f} N are '
-                f"allowed with {asked_n:g} N asked for ('mean_friction'); see whether the finger catches on something"
+                f'allowed with {asked_n:g} N asked for; see whether the finger catches on something'
             )
         measured = (
             ('force', 'N', f'{asked_n:g} N', 'peak_force_fraction'),
             ('speed', 'm/s', f'{asked_m_s:g} m/s', 'peak_speed_fraction'),
-            ('force along the surface', 'N', f'a force of {asked_n:g} N', 'peak_friction'),
+            ('force along the surface', 'N', f'a force of {asked_n:g} N', ''),
         )
         for (what, unit, asked, parameter), peak, most in zip(measured, self._peaks, self._most, strict=True):
             if not peak <= most:
                 yield (
                     f'the {what} of the slide reached {peak:.3g} {unit}, and {most:.3g} {unit} are allowed with '
-                    f"{asked} asked for ('{parameter}')"
+                    f'{asked} asked for' + (f" ('{parameter}')" if parameter else '')
                 )
 
     def _add_way(self, arm: ArmState) -> None:
@@ -609,6 +561,10 @@ class Stage:
 
     ahead = False
     free: bool | None = None
+    # One row of the state machine (docs/motion.md): kinds of what it commands, what ends it, where an error leads.
+    commands: tuple[str, ...] = ()
+    ends = ''
+    on_error = 'Lift'
 
     def __init__(self, phase: Phase, timeout_s: float, goal: str) -> None:
         self.phase = phase
@@ -647,6 +603,9 @@ class Stage:
 class GoHomeStage(Stage):
     """Rise to the height of the start, then go above the surface to where the motion begins."""
 
+    commands = ('rest', 'up', 'along')
+    ends = 'above the start of the motion'
+
     def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
         self._home = home
@@ -682,6 +641,9 @@ class GoHomeStage(Stage):
 
 class ApproachStage(Stage):
     """Come down until the force shows contact."""
+
+    commands = ('down',)
+    ends = 'the force shows contact that pushes the finger up'
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
@@ -756,6 +718,9 @@ class OvershootWatch:
 class SettleForceStage(Stage):
     """Press gently harder, until the force has stayed within its tolerance for a while."""
 
+    commands = ('press',)
+    ends = 'the force stayed within its tolerance'
+
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.CONTACT, limits.contact_timeout_s, f'the force to settle at {force_n:g} N')
         self._force_n = force_n
@@ -800,6 +765,9 @@ class Along(NamedTuple):
 class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
 
+    commands = ('press',)
+    ends = 'speed and force are reached'
+
     def __init__(self, along: Along) -> None:
         goal = f'the finger to slide at {along.speed_m_s:g} m/s with {along.force_n:g} N'
         super().__init__(Phase.CONTACT, along.ramp_s + along.limits.contact_timeout_s, goal)
@@ -829,6 +797,9 @@ class AccelerateStage(Stage):
 
 class SlideStage(Stage):
     """Keep speed and force for the length of the path."""
+
+    commands = ('press',)
+    ends = 'the end of the path, or an early end'
 
     def __init__(self, along: Along) -> None:
         planned_s = along.follower.length_m / along.speed_m_s
@@ -892,6 +863,9 @@ class BrakeStage(Stage):
     that was lost in the slide and does not come back aborts.
     """
 
+    commands = ('press', 'along', 'rest')
+    ends = 'at rest along the surface'
+
     def __init__(self, along: Along) -> None:
         super().__init__(Phase.LIFT, along.limits.lift_timeout_s, 'the finger to come to rest')
         self._along = along
@@ -931,6 +905,10 @@ class LiftStage(Stage):
     fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`. It goes no faster than it
     came down until the force has fallen: only that proves that up is up.
     """
+
+    commands = ('up',)
+    ends = 'at the height of the start and clear of the surface'
+    on_error = 'end, at rest'
 
     def __init__(self, home: Vector, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to be lifted')
@@ -1024,6 +1002,9 @@ class Rise(Stage):
     rise. Then it rises no faster than the finger comes down, and slower where the force shows a stiffer contact.
     """
 
+    commands = ('rest', 'up')
+    ends = 'the force stayed the same over the clearance'
+    on_error = 'GoBack, Rise again, or end at rest'
     ahead = True
 
     def __init__(
@@ -1161,6 +1142,9 @@ class Rise(Stage):
 class GoBack(Stage):
     """Go back down, until the force is again what it was before the rise."""
 
+    commands = ('down',)
+    ends = 'the force is as before the rise'
+    on_error = 'end, at rest'
     ahead = True
 
     def __init__(self, before_n: Vector, touch: TouchParams) -> None:
@@ -1188,6 +1172,9 @@ class CalmDown(Stage):
     as the force stays what it was when it first stood.
     """
 
+    commands = ('rest', 'up')
+    ends = 'the force sensor is zeroed'
+    on_error = 'GoBack, Rise again, or Lift'
     ahead = True
 
     def __init__(self, zeroed: Callable[[], bool], force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
@@ -1392,3 +1379,70 @@ class Motion:
 # height it lifts, m, in the frame of the surface; how the finger touches; and what is allowed. MotionRefused if a
 # number is out of its range or does not belong to this motion, or the path leaves the workspace.
 Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
+
+
+# --------------------
+# The state machine and the limits, each once: docs/motion.md shows both tables.
+
+STATES: tuple[type[Stage], ...] = (
+    Rise,
+    CalmDown,
+    GoBack,
+    GoHomeStage,
+    ApproachStage,
+    SettleForceStage,
+    AccelerateStage,
+    SlideStage,
+    BrakeStage,
+    LiftStage,
+)
+
+
+class Limit(NamedTuple):
+    """What is limited, by which value, who checks it, how fast, and what follows."""
+
+    name: str
+    quantity: str
+    value: str
+    checks: str
+    soon: str
+    follows: str
+
+
+EVERY_STEP = 'each step, 10 ms'
+LIMITS: tuple[Limit, ...] = (
+    Limit(
+        'MOST_FORCE_N, MOST_M', 'number of a sample', 'finite, 10 kN, 100 m', 'arm and Exploration', 'at once', 'lift'
+    ),
+    Limit('force_limit_n', 'force in any direction', '10 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit('friction_limit', 'force along the surface', '2 × normal + 1 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit('x_low_m to z_high_m', 'place', '±0.2 m; −0.02 to 0.2 m', 'Exploration', EVERY_STEP, 'lift'),
+    Limit('surface_tolerance_m', 'height of the contact', '20 mm', 'Exploration', EVERY_STEP, 'lift'),
+    Limit('state_timeout_s', 'age of the state', '0.13 s', 'Exploration', EVERY_STEP, 'stop'),
+    Limit('signal_timeout_s', 'silence of the sensor', '0.5 s', 'SignalWatch', EVERY_STEP, 'lift'),
+    Limit('frozen_force_s', 'force that repeats', '0.06 s', 'ForceWatch', EVERY_STEP, 'lift'),
+    Limit('force_drift_fraction', 'drift in free air', '30 %', 'ForceWatch', 'after the lift', 'no success'),
+    Limit('OVERSHOOT', 'force before the slide', '20 % above the wanted', 'OvershootWatch', '3 steps', 'lift'),
+    Limit('HARD, LATE_S', 'force after the first touch', '2 impacts; 30 ms', 'ForceLoop', 'delay + 0.13 s', 'lift'),
+    Limit('peak_force_fraction', 'force in the slide', '50 % above the wanted', 'SlideWatch', '3 steps', 'no window'),
+    Limit('peak_speed_fraction', 'speed in the slide', '50 % above the wanted', 'SlideWatch', '50 ms', 'no window'),
+    Limit('lost_contact_s', 'time without contact', '0.1 s', 'ContactWatch', EVERY_STEP, 'lift'),
+    Limit('stall_s', 'way by commanded way', '25 % in 0.25 s', 'StallWatch', '0.25 s', 'lift'),
+    Limit('MOST_FORCE_SHARE', 'change of the force in a rise', '65 % of force_limit_n', 'Rise', EVERY_STEP, 'go back'),
+    Limit('approach_travel_m', 'way down in search', '50 mm', 'ApproachStage', EVERY_STEP, 'lift'),
+    Limit('approach_timeout_s, …', 'time of a stage', '10, 10, 2, 5 s', 'Stage', EVERY_STEP, 'lift'),
+    Limit('command_speed_m_s, …', 'a single command', '1 m/s, 0.5 m/s, 50 N', 'arm', 'at once', 'refused, stop'),
+)
+
+
+def state_table() -> str:
+    """Return the state machine as rows of a table."""
+    rows = (
+        f'| `{state.__name__}` | {", ".join(state.commands)} | {state.ends} | {state.on_error} |' for state in STATES
+    )
+    return '\n'.join(rows)
+
+
+def limit_table() -> str:
+    """Return the limits as rows of a table."""
+    return '\n'.join(f'| `{row.name}` | {" | ".join(row[1:])} |' for row in LIMITS)
