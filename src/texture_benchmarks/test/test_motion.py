@@ -13,7 +13,7 @@ from texture_benchmarks.study import BenchmarkOptions
 MOST_N = {
     'stiffness as declared': 6.0,
     '20 kN/m declared': 6.0,
-    'wall of 20 kN/m in the slide': 45.0,
+    'wall of 20 kN/m in the slide': 70.0,  # of an arm 50 ms late; 45 N up to 20 ms
     'wrong signs and axes': 10.0,
     'surface upside down': 10.0,
 }
@@ -47,4 +47,4 @@ def test_the_sweep_keeps_its_goals(tmp_path: Path) -> None:
     for name, figures in result.numbers['rows'].items():
         assert figures['internal'] == 0, name
         assert figures['overshoot_of_success'] <= 0.2, name
-        assert max(figures['normal_n'], figures['sideways_n']) <= MOST_N.get(name, 45.0), name
+        assert max(figures['normal_n'], figures['sideways_n']) <= MOST_N.get(name, 10.0), name

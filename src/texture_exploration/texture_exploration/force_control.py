@@ -215,6 +215,7 @@ class ForceLoop:
             )
         self._controller = ForceController(params.gain_m_s_n(period_s), params.integral_s(period_s), FORCE_SPEED_M_S)
         self._touched_ns: int | None = None  # when the finger began to stand; None while it does not touch
+        self._touched_n = 0.0  # the force then
         self._stood: list[ContactState] = []  # what was measured since it must stand
         self._heard = False
         self.doubt = ''  # in a sentence, why nobody should press by this force
@@ -231,7 +232,7 @@ class ForceLoop:
             self.restart()
             return -self.approach_m_s
         if self._touched_ns is None:
-            self._touched_ns = contact.time_ns
+            self._touched_ns, self._touched_n = contact
         sliding = speed_m_s > SLOWEST_M_S
         if not sliding and not self._heard:
             self._listen(self._touched_ns, contact)
@@ -252,12 +253,12 @@ class ForceLoop:
         last = [state.force_n for state in self._stood if state.time_ns > middle_ns]
         if contact.time_ns <= middle_ns + round(HALF_S * 1e9) or len(last) < FEWEST:
             return
-        self._heard, rose_n = True, fmean(last) - fmean(first or last)
+        self._heard, rose_n, met_n = True, fmean(last) - fmean(first or last), fmean(last) - self._touched_n
         most_n = params.touching_n + HARD * params.max_impact_n
         if rose_n > params.touching_n:
             what = f'the force went on to rise by {rose_n:.2f} N while the finger stood on the surface'
-        elif fmean(last) > most_n:
-            what = f'the finger met the surface with {fmean(last):.2f} N, and {most_n:.2f} N are the most to expect'
+        elif met_n > most_n:
+            what = f'the force rose by {met_n:.2f} N after the first touch, and {most_n:.2f} N are the most to expect'
         else:
             return
         self.doubt = (
