@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from texture_core.config import from_mapping
-from texture_exploration.arms.arm import CALM_NS, RISE_M_S, FreeAir, SurfaceFrame, Vector
+from texture_exploration.arms.arm import CALM_NS, RISE_M_S, ZERO_RISE_M, FreeAir, SurfaceFrame, Vector
 from texture_exploration.arms.ur import (
     COMMAND,
     FAILURE,
@@ -141,7 +141,7 @@ class UrCommandStream:
         self._watchdog = watchdog
         self._frame = SurfaceFrame(params.surface_pose)
         self._up = self._frame.to_base((0.0, 0.0, RISE_M_S))
-        self._air = FreeAir(params.zero_rise_m, params.zero_steady_n)
+        self._air = FreeAir(ZERO_RISE_M, params.zero_steady_n)
         self._measured_ns = self._rest_ns = 0
         self._height_m = 0.0
         self._mode = Mode.STANDSTILL
