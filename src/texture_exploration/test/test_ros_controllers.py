@@ -373,6 +373,19 @@ def test_an_arm_that_somebody_else_moves_is_a_fault_and_zero_velocity_is_all_it_
     assert not any(any(velocity) for _, velocity in robot.sent)
 
 
+def test_a_controller_that_gets_no_computing_time_is_not_one_that_does_not_follow():
+    """It neither moves the arm nor shows a pose meanwhile."""
+    robot = Robot(deadman_s=1.0)
+    robot.connect()
+    robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    robot.pose_comes, robot.arm.advance = False, lambda _now_ns: None
+    robot.pass_time(0.6, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    robot.pose_comes = True
+    del robot.arm.advance
+    robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    assert (robot.driven.state().unsafe, robot.driven.state().fault) == ('', '')
+
+
 BROKEN = {
     'a force of NaN': ('newest_force', {'force_n': (0.0, math.nan, 0.0)}, 'a force on'),
     'a force of infinity': ('newest_force', {'force_n': (0.0, 0.0, math.inf)}, 'a force on'),

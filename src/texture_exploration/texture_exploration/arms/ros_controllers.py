@@ -76,6 +76,7 @@ class ControllerTopics(Protocol):
 COMMAND_HOLDS_S = 0.1  # without a new one, after which the arm stands: ten periods of the explorer
 RESTS_WITHIN_NS = 2_000_000_000  # that zero velocity is commanded; then somebody else moves the arm
 GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
+UNSEEN_NS = 100_000_000  # without a pose, after which it is not known whether the arm follows
 POLL_S = 0.005
 NOT_CONNECTED = 'the arm is not connected; connect it first'
 DEFAULTS = RosControllersParams()
@@ -386,7 +387,9 @@ class RosControllersArm(SurfaceArm):
             self._let_rest()
             return ''
         self._gone_ns = 0
-        if self._commanded == REST or held_s > HEARTBEAT_S:  # the guard has commanded zero meanwhile
+        # The guard has commanded zero meanwhile; or nobody has seen the arm, as when its controller got no time.
+        unseen = now_ns - self._tool.came_ns['pose'] > UNSEEN_NS
+        if self._commanded == REST or held_s > HEARTBEAT_S or unseen:
             self._follow.restart()
             return ''
         late = self._follow.update(now_ns, self._tool.state('').position, self._commanded, held_s)
