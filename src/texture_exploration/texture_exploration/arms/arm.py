@@ -187,28 +187,18 @@ PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
 class SurfacePoseParams:
     """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
 
-    surface_x_m: float = param(
-        0.4, 'X coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_y_m: float = param(
-        0.0, 'Y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_z_m: float = param(
-        0.1, 'Z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
+    surface_x_m: float = param(0.4, 'X of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
+    surface_y_m: float = param(0.0, 'Y of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
+    surface_z_m: float = param(0.1, 'Z of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
     surface_rx_rad: float = param(
         0.0,
-        'X component of the rotation vector of the surface frame; its z axis points away from the surface.',
+        'X of the rotation vector of the surface frame; its z axis points away from the surface.',
         unit='rad',
         low=-7.0,
         high=7.0,
     )
-    surface_ry_rad: float = param(
-        0.0, 'Y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
-    )
-    surface_rz_rad: float = param(
-        0.0, 'Z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
-    )
+    surface_ry_rad: float = param(0.0, 'Y of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
+    surface_rz_rad: float = param(0.0, 'Z of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
 
     def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
         """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""

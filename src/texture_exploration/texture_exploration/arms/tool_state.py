@@ -76,12 +76,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         high=0.1,
     )
     controller_timeout_s: float = param(
-        0.0,
-        'Declares after which time without a command the controller itself stops the arm; 0 declares that it never '
-        "does, which is refused unless 'accept_no_timeout' is set.",
-        unit='s',
-        low=0.0,
-        high=0.5,
+        0.0, 'Time without a command after which the controller stops the arm; 0: never.', unit='s', low=0.0, high=0.5
     )
     accept_no_timeout: bool = param(
         False,
@@ -94,12 +89,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         'the whole group leaves the arm moving.',
     )
     deadman_s: float = param(
-        0.08,
-        'Age of the newest pose or force above which zero velocity is commanded and a fault is reported; a '
-        'larger value bears more jitter.',
-        unit='s',
-        low=0.01,
-        high=2.0,
+        0.08, 'Age of pose or force above which zero velocity is commanded.', unit='s', low=0.01, high=2.0
     )
     tool_mass_kg: float = param(
         0.0, 'Mass of a tool whose weight the sensor shows; 0 if it shows none.', unit='kg', low=0.0, high=20.0
@@ -108,24 +98,13 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         False, 'Inverts the measured force, for a sensor that reports what the tool does to its surroundings.'
     )
     force_is_quantised: bool = param(
-        False,
-        'Lets a measured force repeat itself, as of a sensor that rounds; false takes a force that repeats itself for '
-        'a frozen sensor.',
+        False, 'Lets a measured force repeat itself, as of a sensor that rounds, without being taken for frozen.'
     )
     force_smoothing_s: float = param(
-        0.0,
-        'Time constant of the low-pass filter of the measured force; a longer one removes more noise and is '
-        'added to the delay of the loop.',
-        unit='s',
-        low=0.0,
-        high=0.1,
+        0.0, 'Time constant of the low-pass filter of the force; it delays the loop.', unit='s', low=0.0, high=0.1
     )
     connect_timeout_s: float = param(
-        5.0,
-        'How long the first pose, the first force and the controller may take before connecting fails.',
-        unit='s',
-        low=0.1,
-        high=60.0,
+        5.0, 'How long the first pose, the first force and the controller may take.', unit='s', low=0.1, high=60.0
     )
 
     def __post_init__(self) -> None:
