@@ -19,7 +19,8 @@ from texture_core.errors import ExplorationError, InvalidParameter
 from texture_core.types import Array, ExplorationRequest, ExplorationState, Phase
 from texture_evaluation.charts import COLOURS, chart
 from texture_exploration.arms.arm import Vector
-from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_exploration.explorer import Exploration, ExplorationOutcome
 from texture_exploration.force_control import (
     ForceController,
@@ -214,6 +215,7 @@ def explored(trial: Trial) -> TrialEnd:
         max_impact_n=0.5,
         touching_n=max(0.03, 6.0 * trial.noise_n),
         accept_no_timeout=True,
+        accept_shared_group=True,
     )
     try:
         arm = RosControllersArm(params, lambda: machine.now_ns, lambda _params: machine, own_thread=False)
@@ -241,6 +243,8 @@ def explored(trial: Trial) -> TrialEnd:
     machine.advance()
     machine.measure()
     arm.connect()
+    for _ in range(30):  # a connection begins at rest
+        pass_time()
     home = arm.state().position
     request = ExplorationRequest('linear_slide', speed_m_s=trial.speed_m_s, force_n=trial.wanted_n, distance_m=0.03)
     motion = MOTIONS[request.motion](request, home, touch, LIMITS).lift_first(lambda: arm.zeroed)

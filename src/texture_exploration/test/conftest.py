@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from texture_core.types import ExplorationRequest
-from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.simulated import PLANE, SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_exploration.explorer import Exploration, Explorer, no_signal_watch
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
@@ -104,6 +105,8 @@ class LateRobot:
         params = RosControllersParams(**given)
         self.arm = RosControllersArm(params, lambda: self.now_ns, lambda _params: self, own_thread=False)
         self.arm.connect()
+        for _ in range(30):  # a connection begins at rest
+            self.pace()
 
     def newest_pose(self):
         return PoseSample(self.now_ns, 'base', tuple(self.machine.position.tolist()), TOOL_DOWN)

@@ -15,13 +15,13 @@ from texture_exploration.safety import SafetyLimits
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.03)
 LONGEST = 400  # characters of a message
 BAD = {
-    'force nan': ('force', {'force_n': (0.0, 0.0, math.nan)}, 'is no number'),
-    'force infinite': ('force', {'force_n': (math.inf, 0.0, 0.0)}, 'is no number'),
-    'force 1e308': ('force', {'force_n': (0.0, 0.0, 1e308)}, 'no sensor'),
-    'place nan': ('pose', {'position_m': (0.4, math.nan, 0.1)}, 'is no number'),
-    'place 1e308': ('pose', {'position_m': (1e308, 0.0, 0.1)}, 'no arm'),
-    'rotation nan': ('pose', {'rotation': (math.nan, 0.0, 0.0, 1.0)}, 'is no number'),
-    'rotation zero': ('pose', {'rotation': (0.0, 0.0, 0.0, 0.0)}, 'no rotation'),
+    'force nan': ('force', {'force_n': (0.0, 0.0, math.nan)}, 'a force on'),
+    'force infinite': ('force', {'force_n': (math.inf, 0.0, 0.0)}, 'a force on'),
+    'force 1e308': ('force', {'force_n': (0.0, 0.0, 1e308)}, 'a force on'),
+    'place nan': ('pose', {'position_m': (0.4, math.nan, 0.1)}, 'a pose on'),
+    'place 1e308': ('pose', {'position_m': (1e308, 0.0, 0.1)}, 'a pose on'),
+    'rotation nan': ('pose', {'rotation': (math.nan, 0.0, 0.0, 1.0)}, 'a pose on'),
+    'rotation zero': ('pose', {'rotation': (0.0, 0.0, 0.0, 0.0)}, 'a pose on'),
 }
 PHASES = ('approach', 'contact', 'slide', 'lift')
 

@@ -18,9 +18,9 @@ def test_a_finger_that_rises_into_the_surface_stops_at_a_small_force(make_robot,
     robot = make_robot(
         {'stiffness_n_m': stiffness_n_m, 'start_height_m': gap_m},
         surface_rx_rad=math.pi,
-        zero_rise_m=zero_rise_m,
         max_stiffness_n_m=20000.0,
     )
+    robot.arm._tool.zero.air._rise_m = zero_rise_m
     outcome = robot.explore(SLIDE)
     assert not outcome.success
     assert max(robot.pressed_n) < 2.0

@@ -190,6 +190,7 @@ LEFT_SHARE = 0.5  # of the force that counts as touching, below which the finger
 LATE_S = 0.03  # beyond 'loop_delay_s', by which arm or force may be late
 HALF_S = 0.05  # of the time in which the force must stand, once the finger does
 FEWEST = 5  # samples in each half
+ROSE_SHARE = 0.5  # of the force that counts as touching, by which the mean of a half may exceed that of the other
 HARD = 2.0  # impacts as declared, beyond which the finger met the surface harder than it can have
 
 
@@ -248,14 +249,15 @@ class ForceLoop:
         if contact.time_ns <= must_stand_ns or (self._stood and contact.time_ns <= self._stood[-1].time_ns):
             return
         self._stood.append(contact)
-        middle_ns = must_stand_ns + round(HALF_S * 1e9)
+        stood_ns = contact.time_ns - self._stood[0].time_ns
+        middle_ns = contact.time_ns - stood_ns // 2
         first = [state.force_n for state in self._stood if state.time_ns <= middle_ns]
         last = [state.force_n for state in self._stood if state.time_ns > middle_ns]
-        if contact.time_ns <= middle_ns + round(HALF_S * 1e9) or len(last) < FEWEST:
+        if stood_ns < 2e9 * HALF_S or min(len(first), len(last)) < FEWEST:
             return
-        self._heard, rose_n, met_n = True, fmean(last) - fmean(first or last), fmean(last) - self._touched_n
+        self._heard, rose_n, met_n = True, fmean(last) - fmean(first), fmean(last) - self._touched_n
         most_n = params.touching_n + HARD * params.max_impact_n
-        if rose_n > params.touching_n:
+        if rose_n > ROSE_SHARE * params.touching_n:
             what = f'the force went on to rise by {rose_n:.2f} N while the finger stood on the surface'
         elif met_n > most_n:
             what = f'the force rose by {met_n:.2f} N after the first touch, and {most_n:.2f} N are the most to expect'
