@@ -33,6 +33,6 @@ SENSORS: Mapping[str, MakeSensor] = {
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
     'pvdf': pvdf,  # PVDF film and force sensor, Hu et al. 2014
     'anyskin': anyskin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
-    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card, through PortAudio
+    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card
     'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

@@ -204,3 +204,21 @@ def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, hos
     for _ in range(200):
         device.advance(TEN_MS, NO_IMAGE)
     assert device.dropped_bytes > 50_000
+
+
+def test_the_public_client_of_the_vendor_reads_each_packet_of_the_tsf85(tmp_path: Path) -> None:
+    client_of = pytest.importorskip('pyrobotiqtactile').RobotiqTactileSensor
+    link = tmp_path / 'tsf85'
+    dynamic: list[int] = []
+    with Rig('tsf85', link), client_of(port=str(link)) as client:
+        client.configure(update_period_ms=1)
+        while len(dynamic) < 1000:
+            for packet in client.parser.feed(client.serial_port.read(200)):
+                client.parser.parse_sensor_packet(packet)
+                dynamic.append(client.parser.fingers[0].dynamic_tactile)
+        pressure = client.read_frame().pressure
+    # A packet of an image alone repeats the value; no other is skipped, repeated or misread.
+    assert set(np.diff(dynamic) % 1000) == {0, 1}
+    assert np.mean(np.diff(dynamic) == 0) < 0.5
+    assert pressure.shape == (2, 7, 4)
+    assert pressure[0].any()
