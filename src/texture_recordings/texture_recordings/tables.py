@@ -1231,7 +1231,8 @@ def _places(times: Array, samples: AnyArray, rate_hz: float) -> tuple[AnyArray, 
     if uneven or (large.any() and steps[large].min() - steps[~large].max(initial=1.0) < CLEAR + coarse):
         raise ClockFault(
             0, f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: losses cannot be told from '
-            'jitter; give `rate_hz` in place of the column of time',
+            f'jitter, and by rows and duration it is '
+            f'{len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; give `rate_hz` in place of the column of time',
         )  # fmt: skip
     return index, dropped
 
