@@ -7,7 +7,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +18,7 @@ from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+from threadpoolctl import threadpool_limits
 
 from texture_core.config import library, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
@@ -25,7 +26,6 @@ from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
-from texture_estimation.search import single_blas_thread
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
@@ -45,6 +45,11 @@ CLUSTER_ADVICE = (
     'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
     'suite'
 )
+
+
+def single_blas_thread() -> AbstractContextManager[Any]:
+    """Keep linear algebra from starting threads of its own within a `with` block: the cores are busy already."""
+    return threadpool_limits(limits=1, user_api='blas')
 
 
 @contextmanager
