@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Write the tables of figures in the pages from the stored JSON: `python tools/figures.py`; `--check` only compares, and
-fails, too, where a stored experiment of a paper is not of today's code.
+"""Write the tables of figures in the pages from the stored JSON: `python tools/figures.py`; `--check` only compares.
+
+The check fails, too, where a stored experiment of a paper is not of today's code.
 
 A page marks where a table goes, and its rows between the marks are replaced:
 

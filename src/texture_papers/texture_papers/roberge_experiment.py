@@ -95,8 +95,8 @@ LINEAR = PaperProtocol(
     scene='ets_linear',
     paper='Roberge et al., "Textures recognition through tactile exploration", sections IV.A and IV.B.1',
     tasks=(RecognitionTask(LINEAR_SLIDES, LINEAR_VISITS, METHODS),),
-    divide=halves(2),
-    split='2 random halves of each texture',
+    divide=halves(1),
+    split='1 random half of each texture',
     anchor=Anchor(
         LINEAR_SLIDES,
         SVM,
