@@ -396,7 +396,7 @@ def test_the_live_lines_of_the_page_record_two_surfaces_and_train_a_model_as_pri
     launcher = ChildLauncher(launch[2], given, dict(os.environ), tmp_path / 'nodes.log')
     with launcher, Operator(domain_id=DOMAIN, guard=launcher.check) as operator:
         operator.wait_for_explorer(DEADLINE_S)
-        operator.wait_for_signal(DEADLINE_S)
+        operator.wait_for_listeners(('features', 'exploration'), 1, launcher.check)
         for order in orders[:-1]:
             if order[1] == 'param':
                 operator.set_parameters(order[3].removeprefix('/'), {order[4]: order[5]})

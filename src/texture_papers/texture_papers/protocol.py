@@ -651,7 +651,8 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
                     _add(part, [one[kind][name]['test'][0] for one in same], share=True)
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
-            _regressor_over_seeds(figures, [run['regressors'][regressor][part] for run in runs])
+            of_seeds = [run['regressors'][regressor] for run in runs]
+            _regressor_over_seeds(figures, [one[part] for one in of_seeds if part in one])
     for finding in numbers['findings']:
         same = [one for run in runs for one in run['findings'] if one['claim'] == finding['claim']]
         _add(finding, [one['interval'][0] for one in same])
