@@ -138,7 +138,7 @@ def accuracy_chart(
             _bars(axes, methods, drawn)
             axes.set_title(task)
         rows[-1].set_xlabel('test slides recognised (%)')
-        rows[0].legend(loc='lower left', bbox_to_anchor=(0.5, 1.0), ncols=2)
+        rows[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0))
     return Path(path)
 
 
