@@ -22,10 +22,11 @@ components
         has those of one linen.
 x and y
     Paper: Joined, 78 numbers (5.2).
-    Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, with components of their own.
+    Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, each with its components, about 150 numbers; the experiment
+        has 39 + 39, too.
 machine
     Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not told.
-    Here: `SvmMaxWins`: the usual ones.
+    Here: `SvmMaxWins`: those of scikit-learn's `SVC`, with C = 10.
 """
 
 from __future__ import annotations

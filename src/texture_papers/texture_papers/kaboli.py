@@ -32,8 +32,8 @@ online learning
         live.
 clusters
     Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not told.
-    Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, by the recipe of the
-        training slides.
+    Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, whose labels name the
+        clusters; by the recipe of the training slides.
 objects
     Paper: Ten balls and ten of various shapes; "regardless of object shape" (VI).
     Here: Scene `kaboli`: flat, one skin; scene `kaboli_shapes`: curved, fingers that differ. Sizes are guesses.

@@ -34,12 +34,15 @@ parts of a circle
 search
     Paper: 20 individuals, 30 generations, the mean of learning and test over 20 halves (IV); from there 10 and 10
         for the vote, 13 and 10 for ten textures. Test slides are part of the fitness.
-    Here: `texture optimise`, `--tune`: 4 of the halves in the search, 20 for the best three. Test slides are never
-        part.
+    Here: `texture experiment NAME --tune`: a search for each pair on the training half alone, of the size in the file;
+        4 of the halves in the search, all for the best three. Test slides are never part.
 variables
     Paper: A set for each pair (III.C), not printed.
-    Here: `…-pairs`: searched once on simulated slides of another seed, in the size that the file names. The other
-        recipes have one set, by which the scenes were made.
+    Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
+        recipes have one set for all pairs.
+standardisation
+    Paper: Not told.
+    Here: Features have zero mean and unit variance.
 friction
     Paper: The next question (VI).
     Here: `texture experiment friction`, simulated. Live, the recipe `friction-svm` needs the arm `ur` or
