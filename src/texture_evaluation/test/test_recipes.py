@@ -26,13 +26,12 @@ OF_CHANGES = ('taxels-any-day',)
 # The friction of these surfaces is not simulated.
 OF_FRICTION = ('friction-svm',)
 # Variables were searched for each pair of the ten textures of its scene; other pairs share all of its features.
-OF_TEN_TEXTURES = ('ets-fine-svm-pairs',)
 # The simulated slides are of one finger and along one axis.
 OF_ONE_FINGER = [
     name
     for name in SHIPPED
     if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names))
-    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION, *OF_TEN_TEXTURES)
+    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION)
 ]
 
 
@@ -115,7 +114,7 @@ def slides_of_days(days: tuple[int, ...]) -> SlideDataset:
 def test_what_changes_together_is_recognised_on_a_day_with_other_levels(name: str) -> None:
     recipe, trained, tested = load_recipe(name), slides_of_days((0, 1, 2)), slides_of_days((3,))
     model = train(recipe, training_examples(recipe, trained))
-    assert model.decisions.domain.reach['cork'] == {'sessions': 3, 'places': 1, 'fingers': 1}
+    assert model.acceptance.domain.reach['cork'] == {'sessions': 3, 'places': 1, 'fingers': 1}
     assert 'sessions held out in turn' in model.training['calibration']
     finals = [result.estimates[-1] for result in evaluate_dataset(model, tested).known]
     right = [final.label == slide.surface for final, slide in zip(finals, tested, strict=True)]

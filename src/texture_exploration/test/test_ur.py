@@ -561,7 +561,7 @@ def shared():
 def late():
     """Return a emulator whose controller acknowledges 300 ms late what the robot does, and an arm connected to it."""
     with bench_at('127.0.0.75') as emulator, connected(emulator.ip) as arm:
-        assert emulator.controller.ask('emulate slow 0.3') == 'Acknowledging late'
+        assert emulator.controller.ask('emulate slow 0.3') == 'set to 0.3 seconds'
         yield emulator, arm
 
 
