@@ -133,7 +133,7 @@ def _check_speed(request: ExplorationRequest, limits: SafetyLimits) -> None:
     if request.speed_m_s > fastest:
         raise MotionRefused(
             f'{request.motion}: speed_m_s is {request.speed_m_s:g}; on a circle of {request.radius_m:g} m allowed is '
-            f"at most {math.floor(fastest * 1000) / 1000:g} m/s; choose a larger one or raise 'max_turning_m_s2'"
+            f'at most {math.floor(fastest * 1000) / 1000:g} m/s; choose a larger one'
         )
 
 

@@ -287,35 +287,19 @@ class CommandedVelocity:
 
     def __init__(self, params: ForceLoopParams, period_s: float) -> None:
         self._loop = ForceLoop(params, period_s)
-        self._travelled_m = 0.0
-
-    @property
-    def lag_s(self) -> float:
-        """How late the arm follows, as measured while it came down; NaN until it is measured."""
-        return self._loop.lag.value_s
 
     def doubt(self) -> str:
         """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
-        return self._loop.doubt()
-
-    def travelled(self, distance_m: float) -> None:
-        """Take note of how far the finger has gone along the surface since the last call."""
-        self._travelled_m += distance_m
+        return self._loop.doubt
 
     def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
         """Return the velocity to ask for, m/s."""
-        normal_m_s = self._normal_m_s(command, state, held_s)
-        self._loop.asked(state.position[2], normal_m_s, held_s)
-        return (*command.tangential_m_s, normal_m_s)
-
-    def _normal_m_s(self, command: ArmCommand, state: ArmState, held_s: float) -> float:
-        contact = ContactState(state.time_ns, state.position[2], self._travelled_m, state.force_n)
-        speed_m_s = math.hypot(*command.tangential_m_s)
-        self._loop.observe(contact, speed_m_s)
         if command.force_n is None:
             self._loop.restart()
-            return max(command.normal_m_s, -self._loop.approach_m_s(contact.height_m))
-        return self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s)
+            self._loop.doubt = ''  # whoever lifts has read it
+            return (*command.tangential_m_s, max(command.normal_m_s, -self._loop.approach_m_s))
+        contact, speed_m_s = ContactState(state.time_ns, state.force_n), math.hypot(*command.tangential_m_s)
+        return (*command.tangential_m_s, self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s))
 
 
 # --------------------

@@ -10,7 +10,7 @@ the suite, or by a compliance controller if one is named. This file knows no ROS
 from __future__ import annotations
 
 import importlib
-import math
+import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -78,6 +78,7 @@ RESTS_WITHIN_NS = 2_000_000_000  # that zero velocity is commanded; then somebod
 GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
 UNSEEN_NS = 100_000_000  # without a pose, after which it is not known whether the arm follows
 POLL_S = 0.005
+LOGGER = logging.getLogger(__name__)
 NOT_CONNECTED = 'the arm is not connected; connect it first'
 DEFAULTS = RosControllersParams()
 
@@ -134,7 +135,6 @@ class RosControllersArm(SurfaceArm):
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._late = 0
-        self._place: Vector | None = None  # along the surface, at the last step
         self._command: tuple[ArmCommand, int] | None = None  # and when it came
         self._commanded: Vector = REST
         self._sent_ns = 0
@@ -142,6 +142,8 @@ class RosControllersArm(SurfaceArm):
         self._switched = False  # controllers were switched for this connection
         self._hand_over_fault = ''
         self._unsafe = ''  # why it may only be lifted, likewise
+        self._state: ArmState
+        self._failed = ''  # with an internal error
         self._lost = ''  # a fault that stays until the arm is recovered or connected again
         self._restart()
 
@@ -241,7 +243,7 @@ class RosControllersArm(SurfaceArm):
         """
         self._connected()
         self.stop()
-        self._lost = self._unsafe = self._tool.misplaced = self._tool.garbled = ''
+        self._lost = self._unsafe = self._failed = self._tool.misplaced = self._tool.garbled = ''
         self._tool.zero.forget()
         self._zeroed = False
         self._follow.restart()
@@ -261,18 +263,34 @@ class RosControllersArm(SurfaceArm):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of this connection, and the measured lag of the controller in ms, 0 until it is measured."""
+        """Totals of this connection."""
         self._connected()
-        lag_s = self._velocity.lag_s
         return {
             'zeroed': self._tool.zero.zeroings,
             'late_periods': self._late,
-            'lag_ms': 0 if math.isnan(lag_s) else round(1e3 * lag_s),
         }
 
     def step(self) -> None:
-        """Take what was measured, and send what the newest command needs now."""
+        """Take what was measured, and send what the newest command needs now; zero velocity if that fails.
+
+        After a first error the arm may only be lifted; one that comes again leaves it at rest for good.
+        """
         topics = self._connected()
+        try:
+            self._step(topics)
+        except Exception as error:
+            LOGGER.exception('a step of the arm failed')
+            reason = f'internal error, {type(error).__name__}: {error}'[:200]
+            self._lost = self._lost or (self._failed and reason)
+            self._failed = self._unsafe = reason
+            self._command = None
+            self._commanded = REST
+            self._stop_pressing(topics)
+            topics.send_velocity(REST)
+            self._state = replace(self._state, unsafe=reason, fault=self._lost)
+
+    def _step(self, topics: ControllerTopics) -> None:
+        """Take what was measured, and send what the newest command needs now."""
         now_ns = self._clock()
         held_s = (now_ns - self._sent_ns) * 1e-9 if self._sent_ns else 0.0
         if self._sent_ns and now_ns - self._sent_ns > GAP_NS:
@@ -306,12 +324,12 @@ class RosControllersArm(SurfaceArm):
         self._velocity = CommandedVelocity(loop, 1.0 / params.rate_hz)
         self._follow = FollowWatch()
         self._state = self._tool.state('')
-        self._place = self._command = None
+        self._command = None
         self._commanded = REST
         self._sent_ns = self._gone_ns = self._halted_ns = 0
         self._pressing = self._zeroed = False
         self._resting_first = True
-        self._lost = self._unsafe = ''
+        self._lost = self._unsafe = self._failed = ''
 
     def _take_over(self, topics: ControllerTopics) -> None:
         if self._params.controller_manager:
@@ -448,7 +466,6 @@ class RosControllersArm(SurfaceArm):
 
     def _carry_out(self, topics: ControllerTopics, command: ArmCommand | None, held_s: float) -> None:
         state = self._state
-        self._note_way(state)
         if command is not None and command.force_n is not None:
             self._tool.zero.presume_contact()
             self._press(topics, command)
@@ -475,11 +492,6 @@ class RosControllersArm(SurfaceArm):
         if command.force_n is not None and self._params.target_wrench_topic:
             command = replace(command, force_n=None, normal_m_s=0.0)
         return self._velocity.choose(command, state, held_s)
-
-    def _note_way(self, state: ArmState) -> None:
-        if self._place is not None:
-            self._velocity.travelled(math.dist(state.position[:2], self._place[:2]))
-        self._place = state.position
 
     def _send(self, topics: ControllerTopics, velocity: Vector) -> None:
         in_base = self._frame.to_base(velocity)

@@ -310,8 +310,6 @@ class SimulatedArm(Arm):
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
         moved = self._delayed.moved_m(now_ns) if self._velocity else self._moved_m(command, moving_s)
-        if self._velocity:
-            self._velocity.travelled(math.hypot(*moved[:2]))
         moved = (0.0, 0.0, moved[2]) if self._jammed else moved
         x, y, z = (at + step_m for at, step_m in zip(self._state.position, moved, strict=True))
         velocity = _speed(moved, moving_s)

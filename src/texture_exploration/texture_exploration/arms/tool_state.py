@@ -254,6 +254,7 @@ class ToolState:
         if not math.hypot(*sample.force_n) <= LARGEST_N:  # so NaN is none either
             numbers = f'{_shown(sample.force_n)} N'
             self.garbled = f"a force on '{self._topics['force']}' is none: {numbers}; see what sends it"
+            self.came_ns['force'] = now_ns  # the finger can be lifted without a force
             return
         before_ns = self._taken_ns['force']
         if not self._is_new('force', now_ns, sample):
