@@ -366,7 +366,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
                 'window_accuracy': metrics.window_accuracy(clean[name]),
                 'calibration_error': metrics.calibration_error(clean[name]),
                 'accepted_wrong': metrics.accepted_wrong(clean[name]),
-                'unknown': metrics.unknown(clean[name]),
+                'rejected': metrics.rejected(clean[name]),
                 'early': metrics.early_decision(clean[name]),
                 'above_allowed': [row for row, one in outcomes[name].items() if one.worst_wrong > MAX_WRONG_KNOWN],
                 'outcomes': {row: asdict(outcome) for row, outcome in outcomes[name].items()},
