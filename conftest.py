@@ -122,8 +122,8 @@ def make_examples() -> Any:
 
 @pytest.fixture(scope='session')
 def examples() -> Any:
-    """Return labelled windows of four surfaces."""
-    return gaussian_examples()
+    """Return labelled windows of four surfaces, of as many slides as a label needs to be accepted."""
+    return gaussian_examples(slides=12)
 
 
 @pytest.fixture(scope='session')

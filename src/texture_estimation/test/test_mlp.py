@@ -68,7 +68,8 @@ def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weigh
     np.testing.assert_allclose(log_softmax(answers), network.predict_log_proba(fresh), atol=1e-9)
 
 
-def test_a_training_that_would_take_too_long_makes_fewer_steps(examples, monkeypatch):
+def test_a_training_that_would_take_too_long_makes_fewer_steps(make_examples, monkeypatch):
+    examples = make_examples()
     codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
     counts = []
     step = MlpTraining.step
@@ -138,4 +139,4 @@ def test_a_first_window_is_estimated_live_by_the_discriminant_too():
     model = model_of({'onset_mlp': {'hidden': 4, 'epochs': 5}})
     first = examples_with_onset(seed=1).values[0]
     assert first[2] == 1.0
-    np.testing.assert_allclose(model.predict_with_activations(first)[0], model.predictor(first))
+    np.testing.assert_allclose(model.predict_and_compare(first)[0], model.predictor(first))
