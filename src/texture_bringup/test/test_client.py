@@ -18,7 +18,7 @@ from texture_msgs.msg import ExplorationRequest, ExplorationResult, ExplorationS
 from texture_core.ros import FEATURE_QOS, STATE_QOS, WaitingExecutor, quality_of_service, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FeatureVector
-from texture_estimation.acceptance import NEVER, Acceptance
+from texture_estimation.acceptance import NEVER, Acceptance, Limits
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -219,7 +219,7 @@ def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path):
     domain = dataclasses.replace(model.acceptance.domain, speed_m_s=(0.05, 0.05))
     models = {
         'a doubtful surface': with_acceptance(
-            model, levels=np.where(np.arange(8) == 3, NEVER, model.acceptance.levels)
+            model, levels=np.where(np.arange(len(Limits._fields)) == 3, NEVER, model.acceptance.levels)
         ),
         'a surface of few slides': dataclasses.replace(model, acceptance=Acceptance(12)),
         'another motion': with_acceptance(model, domain=domain),

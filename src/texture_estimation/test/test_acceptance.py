@@ -73,7 +73,8 @@ def test_as_few_new_slides_are_accepted_and_wrong_as_the_recipe_allows():
     found, new = fitted(held_out(rng, 3000, **confused)), held_out(rng, 3000, **confused)
     wrong = accepted(found, new) & ~np.array([slide.right for slide in new])
     unknown = accepted(found, new, unknown=True)
-    assert 0.5 * (wrong.mean(axis=0) + unknown.mean(axis=0)) == pytest.approx(RATES.max_accepted_wrong, abs=0.01)
+    assert (0.5 * (wrong.mean(axis=0) + unknown.mean(axis=0))).max() < RATES.max_accepted_wrong + 0.01
+    assert wrong.mean(axis=0).max() == pytest.approx(0.5 * RATES.max_accepted_wrong, abs=0.01)
 
 
 def test_as_many_right_labels_are_rejected_as_allowed_where_none_is_confused():
@@ -83,17 +84,18 @@ def test_as_many_right_labels_are_rejected_as_allowed_where_none_is_confused():
     assert rejected == pytest.approx(RATES.false_rejection_rate, abs=0.02)
 
 
-def test_slides_of_left_out_places_change_nothing_for_slides_as_near_as_those_of_the_training():
+def test_slides_of_left_out_places_take_no_acceptance_away_from_slides_as_near_as_those_of_the_training():
     rng = np.random.default_rng(0)
     near = held_out(rng, 400)
     alone, with_places = fitted(near), fitted(near, held_out(rng, 400, separation=0.5, away=4.0))
-    reach = [alone.limits(length).novel for length in LEVELS]
-    for slide in held_out(rng, 200):
-        for (margin, distance), length, most in zip(slide.scored, LEVELS, reach, strict=True):
-            if distance <= most and alone.judge(margin, distance, length).rejection is Rejection.NONE:
-                limits = with_places.limits(length)
-                assert limits.near == most
-                assert limits.score(margin, distance) >= limits.accepted - 1.0  # the factors alone are others
+    new = held_out(rng, 200)
+    as_near = np.array(
+        [
+            [pair[1] <= alone.limits(length).novel for pair, length in zip(one.scored, LEVELS, strict=True)]
+            for one in new
+        ]
+    )
+    assert not (accepted(alone, new) & ~accepted(with_places, new) & as_near).any()
 
 
 def test_few_slides_of_left_out_places_are_accepted_and_wrong():

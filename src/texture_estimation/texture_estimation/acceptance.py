@@ -149,9 +149,9 @@ class Limits(NamedTuple):
     offset: float  # of the score
     margin: float  # its factor
     distance: float  # its factor
-    accepted: float  # least score of a slide as near as those of the training
-    near: float  # distance of these
-    accepted_far: float  # least score of a slide further away
+    accepted: float  # least score
+    reach: float  # distance to which that holds, as slides of left-out places show
+    accepted_far: float  # least score beyond
     novel: float  # distance beyond which a surface that is rejected is novel, else it is ambiguous
     probable: float  # least probability of a label in the prediction set
 
@@ -161,7 +161,7 @@ class Limits(NamedTuple):
 
     def accepts(self, margin: float, distance: float) -> bool:
         """Return whether a slide is accepted."""
-        return self.score(margin, distance) >= (self.accepted if distance <= self.near else self.accepted_far)
+        return self.score(margin, distance) >= (self.accepted if distance <= self.reach else self.accepted_far)
 
 
 NEVER = 1e9  # as a limit of scores
@@ -195,10 +195,28 @@ def _rank(slides: int, rate: float) -> int:
     return math.floor((slides + 1) * rate + ROUNDING)
 
 
-def _least_score(wrong: Array, slides: int, rate: float) -> float:
-    """Return the score above which at most this fraction of so many slides is accepted and wrong."""
-    kept = int(slides * rate)
-    return math.nextafter(float(np.sort(wrong)[::-1][kept]), math.inf) if kept < len(wrong) else -NEVER
+def _least_score(fitted: tuple[float, float, float], wrong: Array, unknown: Array, rate: float) -> float:
+    """Return the score above which few labels are wrong: this fraction of all trials, and half of it as they are.
+
+    `unknown` are the slides without their label, one for each, and `wrong` those that are wrong with it.
+    """
+    own, every = _score(fitted, wrong), np.concatenate([_score(fitted, wrong), _score(fitted, unknown)])
+    limits = [-NEVER]
+    for scores, most in ((own, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
+        kept = int(most + ROUNDING)
+        if kept < len(scores):
+            limits.append(math.nextafter(float(np.sort(scores)[::-1][kept]), math.inf))
+    return max(limits)
+
+
+def _at(slides: Sequence[HeldOutSlide], length: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return margins and distances of the best label, (n, 2), without the true one, (n, 2), and what is right, (n,)."""
+    places = [slide.place(length) for slide in slides]
+    scored, unknown, right = (
+        np.array([getattr(slide, name)[place] for slide, place in zip(slides, places, strict=True)])
+        for name in ('scored', 'unknown', 'right')
+    )
+    return scored, unknown, right
 
 
 def _limits_at(
@@ -208,36 +226,35 @@ def _limits_at(
 
     `near` slides were held out one by one, `far` ones with all of their place, session or finger.
     """
-    at = [(slide, slide.place(length)) for slide in (*near, *far)]
-    scored, unknown = np.array([(slide.scored[place], slide.unknown[place]) for slide, place in at]).transpose(1, 0, 2)
-    right = np.array([slide.right[place] for slide, place in at])
-    of_near = np.arange(len(at)) < len(near)
-    regression = _regression(scored[right], unknown) if right.any() else (-NEVER, 0.0, 0.0)
-
-    def score(rows: Array) -> Array:
-        return regression[0] + rows @ np.array(regression[1:])
-
     # Slides like those of the training: few right ones are rejected, few wrong ones and few unknown ones accepted.
-    own, strange = score(scored), score(unknown)
-    known = np.sort(own[of_near & right])
+    scored, unknown, right = _at(near, length)
+    if not right.any():
+        return Limits(0.0, 0.0, 0.0, NEVER, math.inf, NEVER, 0.0, probable)
+    fitted = _regression(scored[right], unknown)
+    known = np.sort(_score(fitted, scored[right]))
     rank = max(_rank(len(known), rates.false_rejection_rate), 1)
-    wrong = np.concatenate([own[of_near & ~right], strange[of_near]])
-    accepted = max(
-        float(known[rank - 1]) if len(known) else NEVER,
-        _least_score(wrong, TRIALS * len(near), rates.max_accepted_wrong),
-    )
-    distances = np.sort(scored[of_near & right, 1])[::-1]
-    novel = float(distances[rank - 1]) if len(distances) else 0.0
-    reach, beyond = math.inf, accepted
-    if far:
-        # Beyond them it is the slides of left-out places, sessions and fingers that must rarely be accepted and wrong.
-        reach = novel
-        rest = [(own, scored, ~of_near & ~right), (strange, unknown, ~of_near)]
-        inside = sum(int((which & (rows[:, 1] <= reach) & (scores >= accepted)).sum()) for scores, rows, which in rest)
-        outside = np.concatenate([scores[which & (rows[:, 1] > reach)] for scores, rows, which in rest])
-        left = max(0.0, rates.max_accepted_wrong - inside / (TRIALS * len(far)))
-        beyond = _least_score(outside, TRIALS * len(far), left)
-    return Limits(*regression, accepted, reach, beyond, novel, probable)
+    accepted = max(float(known[rank - 1]), _least_score(fitted, scored[~right], unknown, rates.max_accepted_wrong))
+    novel = float(np.sort(scored[right, 1])[-rank])
+    if not far:
+        return Limits(*fitted, accepted, math.inf, NEVER, novel, probable)
+
+    # This holds so far that few slides of left-out places are accepted and wrong; beyond, more is needed.
+    scored, _, right = _at(far, length)
+    wrong = scored[~right]
+    allowed = int(len(far) * rates.max_accepted_wrong / TRIALS)
+    passed = np.sort(wrong[_score(fitted, wrong) >= accepted, 1])
+    reach = max(novel, float(passed[allowed])) if len(passed) > allowed else math.inf
+    inside, beyond = (wrong[where] for where in (wrong[:, 1] <= reach, wrong[:, 1] > reach))
+    left = max(0, allowed - int((_score(fitted, inside) >= accepted).sum()))
+    scores = np.sort(_score(fitted, beyond))[::-1]
+    accepted_far = math.nextafter(float(scores[left]), math.inf) if left < len(scores) else accepted
+    return Limits(*fitted, accepted, reach, max(accepted, accepted_far), novel, probable)
+
+
+def _score(fitted: tuple[float, float, float], rows: Array) -> Array:
+    offset, margin, distance = fitted
+    scores: Array = offset + margin * rows[:, 0] + distance * rows[:, 1]
+    return scores
 
 
 # --------------------

@@ -140,8 +140,10 @@ def _augmented_examples(
     )
 
 
-def held_out_parts(examples: LabelledFeatures) -> Codes | None:
+def held_out_parts(examples: LabelledFeatures, *, by_speed: bool = False) -> Codes | None:
     """Return the part in which each slide is held out, (n_slides,), by session, place and finger; None to go by slides.
+
+    `by_speed` slides at other speeds are in other parts, too.
 
     Slides of one session share what is of that day: with one of them in the training, another tells nothing of the next
     day. A label with one session is held out slide by slide, as if its slides were sessions.
@@ -149,7 +151,10 @@ def held_out_parts(examples: LabelledFeatures) -> Codes | None:
     slides, rows = np.unique(examples.groups, return_index=True)
     made = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
     alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide tells of no session
-    sessions = np.array([f'{"" if alone else one.session}\n{one.place}\n{one.sensor}' for one in made])
+    speeds = [f'{one.speed_m_s:.2g}' if by_speed else '' for one in made]
+    sessions = np.array(
+        [f'{"" if alone else one.session}\n{one.place}\n{one.sensor}\n{v}' for one, v in zip(made, speeds, strict=True)]
+    )
     labels = examples.labels[rows]
     own = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     order = _ranks(sessions, rows)
@@ -399,7 +404,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         far: list[HeldOutSlide] = []
         # Where slides are of several places, sessions or fingers, fit without each of these in turn, too.
         placed = in_places(examples, recipe.training.held_out_places)
-        parts = held_out_parts(placed)
+        parts = held_out_parts(placed, by_speed=bool(recipe.training.slowest_m_s))
         if parts is not None:
             kinds, slides_of = (np.unique(names, return_inverse=True)[1] for names in (placed.labels, placed.groups))
             without = fit_learner(bound, placed, kinds, slides_of, parts)
