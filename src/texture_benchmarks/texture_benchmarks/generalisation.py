@@ -591,13 +591,16 @@ WORDS = {'accuracy': 'accuracy', 'accepted_correct': 'accepted and correct', 'ac
 
 def generalisation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     """Draw how slides end by the distance from the trained track, by the trained places, and on other days."""
-    height = 7.4 + 0.17 * sum(map(len, numbers[OTHER].values()))
-    with chart(path, (8.0, height), points=10.5) as figure:
-        ratios = [3.6, 2.6, max(1.6, 0.17 * sum(len(cell) + 1 for cell in numbers[OTHER].values()))]
-        distance, spacing, other = figure.subplots(3, 1, height_ratios=ratios)
-        _draw_distance(distance, numbers[DISTANCE])
-        _draw_spacing(spacing, numbers[SPACING])
-        _draw_other(other, numbers[OTHER])
+    heights = [3.0, *(0.9 + 0.2 * sum(len(cells) + 0.6 for cells in numbers[x].values()) for x in (SPACING, OTHER))]
+    with chart(path, (9.0, sum(heights)), points=10.5) as figure:
+        parts: Any = figure.subfigures(3, 1, height_ratios=heights)
+        _draw_distance(parts[0].subplots(), numbers[DISTANCE])
+        spacing, other = (part.subplots() for part in parts[1:])
+        _draw_bars(spacing, numbers[SPACING], '2. Several of eight cells trained')
+        _draw_bars(other, numbers[OTHER], '3. Another day, finger, run or speed')
+        spacing.set_xlabel('')
+        handles, labels = other.get_legend_handles_labels()
+        other.legend(handles, labels, loc='upper center', bbox_to_anchor=(0.3, -0.6 / heights[2]), ncols=3)
     return Path(path)
 
 
@@ -619,40 +622,26 @@ def _draw_distance(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
     axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5))
 
 
-def _draw_spacing(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
-    names, drawn = list(rows), [name for name in DRAWN if any(name in cells for cells in rows.values())]
-    width = 0.8 / max(1, len(drawn))
-    for number, name in enumerate(drawn):
-        for row, cell in enumerate(rows[key].get(name) for key in names):
-            if cell:
-                _stack(axes.bar, row + (number - (len(drawn) - 1) / 2) * width, cell, width * 0.9, DRAWN[name])
-    axes.set_xticks(range(len(names)), [name.replace(': ', ':\n') for name in names], fontsize=8)
-    axes.set(ylim=(0, 101), ylabel='slides (%)')
-    axes.set_title('2. Several of eight cells trained: cells between, and the trained ones', loc='left')
-
-
-def _stack(bar: Callable[..., Any], at: float, cell: Mapping[str, Any], width: float, colour: str) -> None:
+def _draw_bars(axes: Any, rows: Mapping[str, Mapping[str, Any]], title: str) -> None:
     """Draw accepted and correct in colour, rejected but correct in its shade, accepted but wrong in black."""
-    correct, wrong, right = (100 * cell[key] for key in ('accepted_correct', 'accepted_wrong', 'accuracy'))
-    side = 'bottom' if bar.__name__ == 'bar' else 'left'
-    bar(at, correct, width, color=colour)
-    bar(at, right - correct, width, color=colour, alpha=0.35, **{side: correct})
-    bar(at, wrong, width, color='black', **{side: 100 - wrong})
-
-
-def _draw_other(axes: Any, rows: Mapping[str, Mapping[str, Any]]) -> None:
     ticks, names, at = [], [], 0.0
     for row, cells in rows.items():
         for name, cell in cells.items():
-            _stack(axes.barh, at, cell, 0.85, DRAWN.get(name, COLOURS[2]))
+            correct, wrong, right = (100 * cell[key] for key in ('accepted_correct', 'accepted_wrong', 'accuracy'))
+            colour = DRAWN.get(name, COLOURS[2])
+            axes.barh(at, correct, 0.85, color=colour)
+            axes.barh(at, right - correct, 0.85, left=correct, color=colour, alpha=0.35)
+            axes.barh(at, wrong, 0.85, left=100 - wrong, color='black')
             ticks.append(at)
             names.append(f'{row}: {name}')
             at += 1.0
         at += 0.6
     axes.set_yticks(ticks, names, fontsize=8)
-    axes.set(xlim=(0, 101), ylim=(at - 0.4, -0.6), xlabel='slides (%)')
-    axes.set_title('3. Another day, finger, run or speed', loc='left')
-    axes.barh(0, 0, color='grey', label='accepted and correct')
-    axes.barh(0, 0, color='grey', alpha=0.35, label='correct, rejected')
-    axes.barh(0, 0, color='black', label='accepted but wrong')
-    axes.legend(loc='upper center', bbox_to_anchor=(0.4, -0.12), ncols=3)
+    axes.set(xlim=(0, 101), ylim=(at - 0.8, -0.6), xlabel='slides (%)')
+    axes.set_title(title, loc='left')
+    for label, look in (
+        ('accepted and correct', {'color': 'grey'}),
+        ('correct, rejected', {'color': 'grey', 'alpha': 0.35}),
+        ('accepted but wrong (a peer: wrong)', {'color': 'black'}),
+    ):
+        axes.barh(0, 0, label=label, **look)
