@@ -48,7 +48,7 @@ def test_the_models_are_good_and_the_figures_are_written(data, capsys, tmp_path)
     figures = tmp_path / 'figures.json'
     bags = [str(data / 'glass'), str(data / 'leather')]
     assert main(['evaluate', str(data / 'fast'), *bags, '--json', str(figures)]) == 0
-    assert 'single windows right: 100.0 %' in capsys.readouterr().out
+    assert 'accuracy of single windows: 100.0 %' in capsys.readouterr().out
     assert '"window_accuracy": 1.0' in figures.read_text()
 
 

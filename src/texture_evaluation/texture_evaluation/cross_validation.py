@@ -114,7 +114,7 @@ RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
 
 def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are."""
+    """Return accuracy and acceptance of windows and slides with 95 % intervals, and rejections by their reason."""
     of_clusters = np.arange(len(results)).astype(str) if clusters is None else np.array(clusters, dtype=str)
     counts = {
         'window_accuracy': window_counts(results),
@@ -132,6 +132,7 @@ def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = Non
         n_at_s[key] = len(reached)
     shares = {name: _share_of(own, of_clusters) for name, own in counts.items()}
     return {
+        'rejections': metrics.rejections(results),
         'n_slides': len(results),
         'n_windows': sum(len(result.window_labels) for result in results),
         'n_clusters': len(set(of_clusters.tolist())),
@@ -245,8 +246,8 @@ class ChronologicalSplit:
 # The outcome of a cross-validation.
 
 SAME_TRACK, SAME_SESSION, OTHER_SESSION = 'same track', 'same session', 'other session'
-# Which border is crossed where this condition is on one side only; other splits test the same track.
-BORDERS: Mapping[str, str] = {
+# The shift between training and test where this condition is on one side only; other splits test the same track.
+SHIFTS: Mapping[str, str] = {
     'place': 'other place',
     'session': OTHER_SESSION,
     'sensor': 'other finger',
@@ -273,7 +274,7 @@ class CrossValidation:
     labels: tuple[str, ...]
     folds: tuple[FoldResult, ...]
     unusable: tuple[str, ...] = ()
-    border: str = SAME_TRACK
+    shift: str = SAME_TRACK
     clusters: Mapping[str, str] = field(default_factory=dict)
     untested: Mapping[str, int] = field(default_factory=dict)
 
@@ -296,7 +297,7 @@ class CrossValidation:
             'recipe': self.recipe,
             'feature_set': self.folds[0].model.feature_set,
             'version': version('texture_evaluation'),
-            'border': self.border,
+            'shift': self.shift,
             **self.figures(self.folds),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
@@ -597,8 +598,11 @@ def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -
     possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
     left = [(train, test) for train, test in possible if len(test)]
     if not left:
-        names = ', '.join(f"'{label}'" for label in np.unique(labels))
-        raise InvalidData(f'tested but never trained in the same fold: {names}; {SPLIT_ADVICE}')
+        trained, tested = (', '.join(np.unique(labels[rows]).tolist()) for rows in splits[0])
+        raise InvalidData(
+            f'no surface is tested where it is trained; in the first fold, trained are {trained}; tested are {tested}; '
+            f'{SPLIT_ADVICE}'
+        )
     return left
 
 
@@ -695,8 +699,8 @@ def cross_validate(
         for train, test, name in named
     )
     usable = set(tested.groups.tolist())
-    border = BORDERS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
-    of_slides = border == SAME_TRACK
+    shift = SHIFTS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
+    of_slides = shift == SAME_TRACK
     clusters = [
         slide.whole_name if of_slides else f'{slide.surface} {group}'
         for slide, group in zip(dataset, columns.tolist(), strict=True)
@@ -706,7 +710,7 @@ def cross_validate(
         tuple(np.unique(dataset.labels).tolist()),
         tuple(folds),
         tuple(name for name in names.tolist() if name not in usable),
-        border,
+        shift,
         dict(zip(names.tolist(), clusters, strict=True)),
         dict(Counter(dataset.labels[sorted(untested)].tolist())),
     )
