@@ -377,6 +377,8 @@ class Exploration:
         self.state = ExplorationState(
             stamp_ns, self.exploration_id, request.motion, phase, surface=request.surface, **numbers
         )
+        if phase in ENDED:
+            self.state = replace(self.state, error_code=int(self.outcome.error), lifted=self.outcome.lifted)
         self._on_state(self.state)
 
 
@@ -536,6 +538,7 @@ class Explorer:
         self._lock = threading.Lock()
         self._home: Vector | None = None
         self._lift_first = True  # nobody knows whether the finger presses
+        self.lifted = False  # known to be free of the surface
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = self._released = False
@@ -552,7 +555,7 @@ class Explorer:
         DeviceError
             If it cannot be reached.
         """
-        self._lift_first = True
+        self._lift_first, self.lifted = True, False
         self.arm.close()
         self.arm.connect()
         self._released = False
@@ -581,7 +584,8 @@ class Explorer:
         with self._lock:
             self._released = True
         self._end_motion('the explorer let go of the arm')
-        self._home = None
+        if not self.arm.keeps_start:
+            self._home = None
 
     def now_ns(self) -> int:
         """Return the time on the clock of the states."""
@@ -634,7 +638,7 @@ class Explorer:
                 raise MotionRefused(
                     f"planning '{request.motion}' failed with {told}; mend it there", ExplorationError.INVALID_REQUEST
                 ) from error
-            self._current = exploration
+            self._current, self.lifted = exploration, False
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
             self._thread.start()
             return exploration
@@ -695,7 +699,7 @@ class Explorer:
                 raise MotionRefused(f'the finger was not lifted: {trouble}') from trouble
             finally:
                 self.arm.stop()
-            height_m = self.arm.state().position[2]
+            height_m, self.lifted = self.arm.state().position[2], True
             x_m, y_m, z_m = self._home
             self._home = (x_m, y_m, max(z_m, height_m))  # a finger found pressed is no place to begin at
             return height_m - begin_m
@@ -828,7 +832,8 @@ class Explorer:
             try:
                 plan(request, start, self.touch, self.patch.within(self.limits))
             except MotionRefused as error:
-                raise MotionRefused(f'{error}; the workspace of a request with a start is the surface patch') from error
+                sentence = f'{error}; the workspace of a request with a start is the surface patch'
+                raise MotionRefused(sentence, error.error, error.field) from error
         if self._lift_first:
             motion.lift_first(lambda: self.arm.zeroed)
         return Exploration(
@@ -848,7 +853,8 @@ class Explorer:
             self._home = None  # the next request begins where the finger is then, as it has to be moved
             raise MotionRefused(
                 f'the start of the motion lies outside the workspace: {outside}; bring the finger inside and take '
-                'control again, or correct the pose of the surface or the limits'
+                'control again, or correct the pose of the surface or the limits',
+                ExplorationError.OUTSIDE_WORKSPACE,
             )
 
     def _check_idle(self) -> None:
@@ -877,7 +883,7 @@ class Explorer:
         try:
             exploration.run(Pacer(PERIOD_S, self._clock))
         finally:
-            self._lift_first = not exploration.outcome.success
+            self._lift_first, self.lifted = not exploration.outcome.success, exploration.outcome.lifted
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
             self.counts['late_steps'] += exploration.gaps
             exploration.ended.set()
