@@ -19,8 +19,14 @@ export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
 .PHONY: setup demo test test-pure test-benchmarks lint benchmark peers docs clean
 
+# The Python that is asked for comes first; a name on the path that does not run, such as the shim of a version manager, is passed over.
 setup:
-	@$(PYTHON) tools/workspace.py $(if $(filter file,$(origin PYTHON)),,--python)
+	@for python in $(PYTHON) python3 python3.13 python3.12 python3.11 python3.10; do \
+		if $$python -c '' 2> /dev/null; then \
+			[ "$$python" = "$(PYTHON)" ] || echo "set-up: $(PYTHON) does not run here; trying $$python"; \
+			exec $$python tools/workspace.py $(if $(filter file,$(origin PYTHON)),,--python); \
+		fi; \
+	done; echo 'set-up: no Python runs here; install one from 3.10 to 3.13 (on Debian and Ubuntu: python3-venv python3-dev)' >&2; exit 2
 
 demo: setup
 	@.venv/bin/texture demo --out out/demo

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -28,26 +27,10 @@ include_patterns = [
     'QUALITY_DECLARATION.md',
     'SECURITY.md',
 ]
-exclude_patterns = ['.*', 'build', 'install', 'log', 'out', 'src/*/[!R]*', '**/__pycache__']
+# Templates of tables of figures are parts of pages.
+exclude_patterns = ['.*', 'docs/tables', 'build', 'install', 'log', 'out', 'src/*/[!R]*', '**/__pycache__']
 
 html_theme = 'furo'
 html_title = f'Tactile Texture {release}'
 html_copy_source = False
 highlight_language = 'text'  # most blocks are commands and sentences
-
-# Sources of included numbers, which tools/figures.py reads: a forge hides them, and the site leaves them out.
-SOURCES = re.compile(r'<!--=.*?-->|<!-- (?:constants|measured once)(?:: \w+)? -->')
-# Tables that a benchmark wrote, linked from its page: without a title, so in no list of pages.
-TABLES = 'docs/charts/'
-
-
-def fill(app: object, docname: str, source: list[str]) -> None:
-    """Take the sources of numbers out of a page before Sphinx reads it."""
-    if docname.startswith(TABLES):
-        source[0] = f'---\norphan: true\n---\n{source[0]}'
-    source[0] = SOURCES.sub('', source[0])
-
-
-def setup(app: object) -> None:
-    """Tell Sphinx of `fill`."""
-    app.connect('source-read', fill)  # type: ignore[attr-defined]

@@ -48,7 +48,7 @@ EXTRAS = {
     'backports': 'rosbags',
     'lz4': 'rosbags',
     'skops': 'skops',
-    'sounddevice': 'sounddevice',
+    'miniaudio': 'miniaudio',
     'rtde_control': 'ur-rtde',
     'rtde_receive': 'ur-rtde',
     'dashboard_client': 'ur-rtde',

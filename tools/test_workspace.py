@@ -4,6 +4,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -46,17 +47,45 @@ def test_the_python_of_an_environment_is_kept_whatever_runs_the_set_up(
     assert workspace.choose_interpreter(workspace.own_interpreter()) == (sys.executable, sys.version_info[:2])
 
 
-def test_only_a_make_that_is_given_a_python_asks_for_another_environment() -> None:
+@pytest.mark.parametrize(
+    ('arguments', 'called'),
+    [
+        (['setup', 'PYTHON=python3.12'], 'python3.12 --python'),
+        (['setup', 'PYTHON=shim'], 'python3 --python'),
+        (['setup'], 'python3'),
+        (['demo'], 'python3'),
+        (['test-pure'], 'python3'),
+    ],
+)
+def test_only_a_make_that_is_given_a_python_asks_for_another_environment(
+    tmp_path: Path, arguments: list[str], called: str
+) -> None:
+    """Whatever python3 is, the environment of before has the last word; a shim that does not run is passed over."""
+    answers = {'python3': 0, 'python3.12': 0, 'shim': 127}
+    for name, code in answers.items():
+        script = tmp_path / name
+        script.write_text(f'#!/bin/sh\n[ {code} = 0 ] || exit {code}\n[ "$1" = -c ] || echo called: {name} $2\n')
+        script.chmod(0o755)
     environment = {name: value for name, value in os.environ.items() if name not in ('PYTHON', 'MAKEFLAGS')}
+    environment['PATH'] = f'{tmp_path}:{environment["PATH"]}'
+    command = ['make', '--no-print-directory', '-f', workspace.ROOT / 'Makefile', '-k', *arguments]
+    made = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert f'called: {called}' in made.stdout.splitlines()
 
-    def set_up(*arguments: str) -> str:
-        command = ['make', '--no-print-directory', '-n', *arguments]
-        said = subprocess.run(command, cwd=workspace.ROOT, env=environment, capture_output=True, text=True, check=True)
-        return said.stdout.split('\n')[0].strip()
 
-    assert set_up('setup', 'PYTHON=python3.12') == 'python3.12 tools/workspace.py --python'
-    # Whatever python3 is: the environment of before has the last word (the test above).
-    assert set_up('demo') == set_up('test-pure') == set_up('setup') == 'python3 tools/workspace.py'
+def test_no_python_that_runs_ends_the_set_up_with_one_sentence(tmp_path: Path) -> None:
+    environment = {'PATH': str(tmp_path)}
+    for tool in ('sh', 'make'):
+        (tmp_path / tool).symlink_to(shutil.which(tool))
+    made = subprocess.run(
+        [tmp_path / 'make', '-f', workspace.ROOT / 'Makefile', 'setup'],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
+    assert made.returncode == 2
+    assert made.stderr.startswith('set-up: no Python runs here; install one from 3.10 to 3.13')
 
 
 def test_a_second_set_up_does_nothing_and_another_python_makes_the_environment_anew(

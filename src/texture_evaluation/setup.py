@@ -58,7 +58,7 @@ def on_path() -> list[str]:
 
 setup(
     name=NAME,
-    version=PACKAGE.findtext('version'),
+    version='0.1.0',
     description=PACKAGE.findtext('description'),
     license=PACKAGE.findtext('license'),
     maintainer=MAINTAINER.text,

@@ -47,7 +47,7 @@ CONTROLS: Mapping[str, Callable[[LabelledSlide], tuple[float, ...]]] = {
     'direction alone': lambda one: (math.cos(one.direction_rad), math.sin(one.direction_rad)),
 }
 PLACES = ('any-place', 'any-place-and-taxels')
-VIBRATION = (*PLACES, 'default', 'onset', 'fast', 'vibration-and-taxels', *PEERS)
+VIBRATION = (*PLACES, 'default', 'fast', 'vibration-and-taxels', *PEERS)
 TAXELS = ('taxels-any-day', 'taxels', 'fast', *PEERS)  # `fast` and the peers read the taxels as channels of a vibration
 ARRAY = ('any-speed', 'taxels-signal', *PEERS)
 SOUND = ('default', *PEERS)

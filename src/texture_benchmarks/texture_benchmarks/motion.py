@@ -28,8 +28,9 @@ from texture_evaluation.charts import COLOURS, chart
 from texture_exploration.arms.arm import Arm, ArmState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
-from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.simulated import PLANE, RATE_HZ, SimulatedArm, SimulatedArmParams, SurfaceShape
+from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import PERIOD_S, Exploration, ExplorationOutcome, Explorer
 from texture_exploration.force_control import (
@@ -297,6 +298,7 @@ def ros_controllers(stiffness_n_m: float, finger_pipe: str) -> Iterator[Arm]:
         yield RosControllersArm(
             RosControllersParams(
                 accept_no_timeout=True,
+                accept_shared_group=True,
                 connect_timeout_s=DEADLINE_S,
                 deadman_s=1.0,
                 max_stiffness_n_m=20000.0,

@@ -48,7 +48,7 @@ OURS, PAPERS, PEERS = 'this suite', 'papers, word for word', 'general classifier
 RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
     VIBRATION: {
         PAPERS: ('hu-pca-svm', 'ets-fine-svm', 'ets-linear-svm', 'jamali-naive-bayes-5'),
-        OURS: ('default', 'fast', 'onset', 'any-place'),
+        OURS: ('default', 'fast', 'any-place'),
         PEERS: ('SVC on log bands',),
     },
     ALL_CHANNELS: {

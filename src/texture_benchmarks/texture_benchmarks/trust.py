@@ -18,7 +18,7 @@ from texture_benchmarks.borders import figures as border_figures
 from texture_benchmarks.disturbances import ROWS, SCENE, SIMULATED, TRAINED, DisturbanceSweep, disturbed, simulate
 from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, share_interval, trained_apart
 from texture_core.types import Array
-from texture_estimation.decisions import OUTSIDE
+from texture_estimation.domain import OUTSIDE
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe

@@ -18,7 +18,7 @@ from texture_msgs.msg import ExplorationRequest, ExplorationResult, ExplorationS
 from texture_core.ros import FEATURE_QOS, STATE_QOS, WaitingExecutor, quality_of_service, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FeatureVector
-from texture_estimation.decisions import ConfidenceFloor
+from texture_estimation.acceptance import NEVER, Acceptance, Limits
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
 from texture_estimation.training import train
@@ -89,6 +89,7 @@ class Program:
             E.REJECTION_OUTSIDE_TRAINING: 'slide as trained',
             E.REJECTION_TOO_LITTLE_EVIDENCE: 'slide longer',
             E.REJECTION_NO_MODEL: 'load a model',
+            E.REJECTION_TOO_LITTLE_TRAINING: 'train more',
         }[estimate.rejection]
 
 
@@ -192,8 +193,8 @@ def test_a_program_tells_a_missing_surface_or_sensor_by_its_code(graph, paramete
 @pytest.fixture(scope='module')
 def model():
     rng = np.random.default_rng(0)
-    values = np.repeat([[0.0, 0.0], [4.0, 0.0]], 48, axis=0) + rng.normal(size=(96, 2))
-    labels = np.repeat(['cork', 'felt'], 48)
+    values = np.repeat([[0.0, 0.0], [4.0, 0.0]], 96, axis=0) + rng.normal(size=(192, 2))
+    labels = np.repeat(['cork', 'felt'], 96)
     groups = np.array([f'{label}/{k // 4}' for k, label in enumerate(labels)])
     return train(load_recipe('default'), LabelledFeatures(values, labels, groups, NAMES, 'kind', 0.5, 0.25))
 
@@ -206,18 +207,22 @@ SLIDES = {
     'no window': ((4.0, 0.0), 0, {}, 'slide longer'),
     'features of another recipe': ((4.0, 0.0), 8, {'feature_set': 'other'}, 'load a model'),
     'a doubtful surface': ((4.0, 0.0), 8, {}, 'slide elsewhere'),
+    'a surface of few slides': ((4.0, 0.0), 8, {}, 'train more'),
 }
 
 
-def with_decisions(model, **changes):
-    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, **changes))
+def with_acceptance(model, **changes):
+    return dataclasses.replace(model, acceptance=dataclasses.replace(model.acceptance, **changes))
 
 
 def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path):
-    domain = dataclasses.replace(model.decisions.domain, speed_m_s=(0.05, 0.05))
+    domain = dataclasses.replace(model.acceptance.domain, speed_m_s=(0.05, 0.05))
     models = {
-        'a doubtful surface': with_decisions(model, confidence_floor=ConfidenceFloor((1.0,), (36.0,))),
-        'another motion': with_decisions(model, domain=domain),
+        'a doubtful surface': with_acceptance(
+            model, levels=np.where(np.arange(len(Limits._fields)) == 3, NEVER, model.acceptance.levels)
+        ),
+        'a surface of few slides': dataclasses.replace(model, acceptance=Acceptance(12)),
+        'another motion': with_acceptance(model, domain=domain),
     }
     classifier = graph.add(Classifier)
     with World(graph) as world:

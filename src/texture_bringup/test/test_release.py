@@ -31,12 +31,17 @@ def test_citation_and_image_carry_the_same_version() -> None:
             assert service['image'] == f'${{TACTILE_IMAGE:-tactile-texture:{VERSION}}}'
 
 
-def test_what_ubuntu_lacks_is_locked_in_versions_that_are_tested() -> None:
-    tested = set(re.findall(r'^([\w.-]+==[\w.]+)', (ROOT / 'tools' / 'requirements.txt').read_text().lower(), re.M))
-    wanted = set(re.findall(r'^([\w.-]+==[\w.]+)', (ROOT / 'docker' / 'requirements.in').read_text().lower(), re.M))
-    locked = set(re.findall(r'^([\w.-]+==[\w.]+)', (ROOT / 'docker' / 'requirements.txt').read_text(), re.M))
-    assert wanted <= tested
-    assert wanted <= locked
+def locked(path: str) -> dict[str, tuple[str, str]]:
+    """Return version and marker of each package of a lock."""
+    rows = re.findall(r'^([\w.-]+)==([\w.]+) ?(?:; ([^\\\n]*))?', (ROOT / path).read_text().lower(), re.M)
+    return {name: (version, marker.strip()) for name, version, marker in rows}
+
+
+def test_what_ubuntu_lacks_is_locked_with_the_versions_and_markers_that_are_tested() -> None:
+    tested, extra = locked('tools/requirements.txt'), locked('docker/requirements.txt')
+    for name in re.search(r'^names=\((.+)\)$', (ROOT / 'docker' / 'lock.sh').read_text(), re.M)[1].split():
+        assert extra[name] == tested[name]
+    assert 'python_full_version' in extra['ur-rtde'][1]  # no wheel from Python 3.13 on
 
 
 def test_a_container_is_stopped_by_the_signal_on_which_launch_ends_its_nodes() -> None:

@@ -32,7 +32,7 @@ HELP: Mapping[str, Sequence[str]] = {
     'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
     'Record': ('collect', 'record', 'replay', 'info', 'import', 'segment', 'export'),
     'Learn': ('train', 'add', 'remove', 'optimise'),
-    'Measure': ('evaluate', 'cross-validate', 'panel', 'scene', 'experiment', 'benchmark', 'endurance'),
+    'Measure': ('evaluate', 'cross-validate', 'panel', 'experiment', 'benchmark', 'endurance'),
 }
 
 

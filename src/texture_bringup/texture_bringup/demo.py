@@ -409,7 +409,7 @@ def _report(
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
     refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
-    note = '\n'.join(filter(None, [model.decisions.error_bound.reason, refusal]))
+    note = '\n'.join(filter(None, [model.acceptance.reason or model.acceptance.decided_reason, refusal]))
     draw(out / RECOGNITION_BAG, plan.shown, model, report, out / PICTURE, note=note)
     progress.section(f'Done. Look at {out / PICTURE}')
     progress.line(f'recordings, model, figures and the log of the nodes are in {out}/')

@@ -274,6 +274,7 @@ class Rejection(enum.IntEnum):
     OUTSIDE_TRAINING = 3
     TOO_LITTLE_EVIDENCE = 4
     NO_MODEL = 5
+    TOO_LITTLE_TRAINING = 6
 
 
 @dataclass(frozen=True)

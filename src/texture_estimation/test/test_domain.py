@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from texture_estimation.decisions import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
+from texture_estimation.domain import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
 from texture_features.feature_set import SlideConditions
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from texture_core.types import FeatureVector
-from texture_estimation.decisions import Domain, ErrorBound
+from texture_estimation.acceptance import NEVER
+from texture_estimation.domain import Domain
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.evidence_rules import EVIDENCE_RULES, GroupedEvidence, MajorityVote, SoftVote, running_means
 from texture_estimation.learners.learner import is_tied, log_softmax
@@ -34,9 +35,13 @@ def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
     return [*windows, FeatureVector(9_000_000_000, name, 0.0, hop_s, last=True)]
 
 
+def with_acceptance(model, **changes):
+    return dataclasses.replace(model, acceptance=dataclasses.replace(model.acceptance, **changes))
+
+
 def unlimited(model):
     """Return the model as if its few held-out slides showed any confidence."""
-    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, error_bound=ErrorBound(0, 1.0)))
+    return with_acceptance(model, slides=100_000, decided_score=-NEVER)
 
 
 def predict(model, stream):
@@ -56,7 +61,7 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
 
 
 def test_the_final_estimate_says_how_many_windows_are_missing_from_it(make_examples):
-    examples = make_examples(slides=5)  # enough for prediction sets, whose absence is another message
+    examples = make_examples(slides=12)
     model = unlimited(train(load_recipe('default'), examples))
     *windows, last = vectors(examples)
     final = predict(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]
@@ -79,7 +84,7 @@ def under(stream, **conditions):
 
 def trained_at(model, speed_m_s):
     domain = Domain(motions=('linear_slide',), speed_m_s=(speed_m_s, speed_m_s))
-    return dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, domain=domain))
+    return with_acceptance(model, domain=domain)
 
 
 def test_outside_what_was_trained_nothing_is_known_or_decided_and_every_estimate_says_why(model, examples):

@@ -66,8 +66,8 @@ def test_a_surface_without_a_slide_of_today_moves_with_the_others(model):
 
 def test_an_adapted_model_says_of_no_surface_that_it_is_known_and_is_saved_and_loaded(model, tmp_path):
     today = adapted(model, TRAINING, slides(TODAY, 1, 2))
-    assert (today.name, today.recipe.training.known) == (f'{model.name}-today', False)
-    assert today.decisions.novelty_detector is None
+    assert (today.name, today.acceptance.distance) == (f'{model.name}-today', None)
+    assert 'too little training: 0 slides could be held out' in today.acceptance.reason
     today.save(tmp_path / 'one')
     tested = slides(TODAY, 3, 1)
     assert load_model(tmp_path / 'one').decide(tested.values) == today.decide(tested.values)

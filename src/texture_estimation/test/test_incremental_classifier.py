@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.types import FeatureVector
-from texture_estimation.decisions import Domain, ErrorBound
+from texture_estimation.domain import Domain
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.model import load_model
 from texture_features.feature_set import SlideConditions
@@ -152,20 +152,20 @@ def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tm
 
 def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_restart(model, silk, tmp_path):
     domain = Domain(motions=('linear_slide',), speed_m_s=(0.05, 0.05))
-    path = dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, domain=domain)).save(
+    path = dataclasses.replace(model, acceptance=dataclasses.replace(model.acceptance, domain=domain)).save(
         tmp_path / 'surfaces'
     )
     classifier = IncrementalClassifier(load_model(path), path)
     for row in silk:
         classifier.observe(FeatureVector(0, 'e1', 0.5, 0.1, model.names, row, 0.1, feature_set=model.feature_set))
     fast = SlideConditions('linear_slide', speed_m_s=0.1)
-    assert classifier.model.active_decisions.domain.deviation(fast)
+    assert classifier.model.active_acceptance.domain.deviation(fast)
     classifier.add('silk')
-    assert classifier.model.active_decisions.domain.deviation(fast) == ''
+    assert classifier.model.active_acceptance.domain.deviation(fast) == ''
     again = IncrementalClassifier(load_model(path), path)
-    assert again.model.active_decisions.domain.deviation(fast) == ''
+    assert again.model.active_acceptance.domain.deviation(fast) == ''
     again.remove_last()
-    assert again.model.active_decisions.domain == domain
+    assert again.model.active_acceptance.domain == domain
 
 
 @pytest.fixture
@@ -234,14 +234,13 @@ def with_slides(measured, model, values, count):
 
 @pytest.mark.parametrize('count', [1, 2, 5])
 def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(model, silk, count, measured, estimates_of):
-    decisions = dataclasses.replace(model.decisions, error_bound=ErrorBound(600, 0.02))
-    trusting = dataclasses.replace(model, decisions=decisions)
+    trusting = dataclasses.replace(model, acceptance=dataclasses.replace(model.acceptance, slides=600))
     estimates = estimates_of(with_slides(measured, trusting, silk, count), silk + 0.1)
     assert {estimate.label for estimate in estimates} == {'silk'}
     assert not any(estimate.decided for estimate in estimates)
     highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].probabilities))
     assert max(estimate.confidence for estimate in estimates) <= highest + 1e-9
-    assert f'with {count} the confidence is' in estimates[-1].message
+    assert 'too few slides for early stopping' in estimates[-1].message
 
 
 @pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')

@@ -15,7 +15,6 @@ import pytest
 from texture_core.config import folder
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.types import SlideMotion
-from texture_estimation.decisions import ConfidenceFloor
 from texture_estimation.model import AddedSlide, load_model, read_added_slides, write_added_slide, write_tree
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import load_recipe
@@ -135,7 +134,7 @@ def array_file(array, name='parameters/hidden.npy'):
         (array_file(np.array([print])), 'no array that can be read'),
         (array_file(np.zeros(3, np.int8)), 'holds int8; float32, float64, int32, int64 are allowed'),
         (array_file(np.zeros(3), 'parameters/../../x.npy'), 'train it again'),
-        (array_file(np.zeros(3), 'decisions/domain.npy'), 'decisions, domain is array'),
+        (array_file(np.zeros(3), 'acceptance/domain.npy'), 'acceptance has the entries'),
     ],
 )
 def test_a_file_that_holds_no_arrays_of_a_model_is_refused(saved, content, sentence):
@@ -186,33 +185,30 @@ def test_a_model_whose_motions_are_no_numbers_is_refused(part, model, tmp_path):
     refused(dataclasses.replace(model, next_touch_model=broken).save(tmp_path / 'broken'), 'not finite')
 
 
-def test_what_was_fitted_for_decisions_is_the_same_after_it_was_saved(model, tmp_path):
-    floor = ConfidenceFloor((1.0, 10.0), (0.5, 3.0))
-    limited = dataclasses.replace(model, decisions=dataclasses.replace(model.decisions, confidence_floor=floor))
-    loaded = load_model(limited.save(tmp_path / 'model')).decisions
-    assert loaded.confidence_floor == floor
-    assert (loaded.domain, loaded.error_bound) == (model.decisions.domain, model.decisions.error_bound)
+def test_what_was_fitted_for_acceptance_is_the_same_after_it_was_saved(model, tmp_path):
+    loaded = load_model(model.save(tmp_path / 'model')).acceptance
+    assert loaded.limits(2.5) == model.acceptance.limits(2.5)
+    assert (loaded.slides, loaded.rates, loaded.domain, loaded.decided_score) == (
+        48, model.acceptance.rates, model.acceptance.domain, model.acceptance.decided_score
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ('entry', 'value', 'sentence'),
     [
-        ('error_bound', None, 'error_bound is None; the entries slides, max_error_rate are needed'),
-        ('error_bound', {'slides': 12}, 'the entries slides; slides, max_error_rate are needed'),
-        ('error_bound', {'slides': 12, 'max_error_rate': 0.02, 'more': 1}, 'slides, max_error_rate are needed'),
-        ('error_bound', {'slides': True, 'max_error_rate': 0.02}, 'slides is True'),
-        ('error_bound', {'slides': 12.5, 'max_error_rate': 0.02}, 'slides is 12.5'),
-        ('error_bound', {'slides': -1, 'max_error_rate': 0.02}, 'slides, 0 to 1000000, and max_error_rate, 0 to 1'),
-        ('error_bound', {'slides': 12, 'max_error_rate': float('nan')}, 'max_error_rate, 0 to 1'),
-        ('confidence_floor', {'effective_window_counts': [], 'log_odds': [1.0]}, 'as many of both are needed'),
-        ('confidence_floor', {'effective_window_counts': 3, 'log_odds': [1.0]}, 'effective_window_counts is 3'),
+        ('rates', None, 'rates is None; the entries max_accepted_wrong'),
+        ('rates', {'coverage': 0.9}, 'the entries coverage; max_accepted_wrong'),
+        ('slides', True, 'slides is True'),
+        ('slides', 12.5, 'slides is 12.5'),
+        ('slides', -1, 'acceptance has -1 slides'),
+        ('by_distance', 3, 'by_distance is 3'),
         ('domain', 'any', "domain is 'any'; the entries motions"),
     ],
 )
-def test_decisions_that_are_no_such_numbers_are_refused_in_one_sentence(saved, entry, value, sentence):
+def test_an_acceptance_of_no_such_numbers_is_refused_in_one_sentence(saved, entry, value, sentence):
     path = saved.with_suffix('.json')
     card = json.loads(path.read_text())
-    card['decisions'][entry] = value
+    card['acceptance'][entry] = value
     path.write_text(json.dumps(card))
     refused(saved, f"{sentence}.*; train it again with 'texture train'")
 
@@ -224,7 +220,7 @@ def test_decisions_that_are_no_such_numbers_are_refused_in_one_sentence(saved, e
 def test_a_domain_with_an_impossible_range_is_refused(saved, name, value):
     path = saved.with_suffix('.json')
     card = json.loads(path.read_text())
-    card['decisions']['domain'][name] = value
+    card['acceptance']['domain'][name] = value
     path.write_text(json.dumps(card))
     refused(saved, 'train it again')
 

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from texture_core.config import folder
 from texture_core.types import Window
-from texture_estimation.decisions import FEATURES, NOVELTY_WINDOWS, ClassDistance, NoveltyDetector
+from texture_estimation.gaussians import ClassDistance
 from texture_estimation.recipe import LEARNERS, Recipe, load_recipe
 from texture_estimation.roughness import REGRESSORS, ROUGH, SMOOTH
 from texture_estimation.training import train
@@ -19,7 +19,7 @@ from texture_features.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 # Where nothing distinguishes surfaces, these find all equally probable; votes between pairs go to one of them.
-EVEN = frozenset({'mlp', 'onset_mlp', 'svm_rbf'})
+EVEN = frozenset({'mlp', 'svm_rbf'})
 FLOORED = frozenset({'any-speed'})
 RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
 
@@ -76,7 +76,7 @@ def test_one_window_of_each_surface_is_enough_to_answer(name, make_examples):
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')
 @pytest.mark.parametrize('change', DIFFICULT.values(), ids=DIFFICULT)
-def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, make_examples):
+def test_what_is_far_from_all_is_further_than_any_slide_of_the_training(change, make_examples):
     examples = make_examples(slides=6)
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
     values = change(examples.values)
@@ -84,11 +84,9 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
     classes = codes[np.unique(groups, return_index=True)[1]]
     distance = ClassDistance.fit(means, classes)
     own = np.array([distance.score(mean, code) for mean, code in zip(means, classes.tolist(), strict=True)])
-    detector = NoveltyDetector.fit({FEATURES: distance}, [own[:, None]] * len(NOVELTY_WINDOWS), 0.05)
-    known = [detector.novelty_score([score], 5.0) <= detector.threshold(5.0) for score in own.tolist()]
-    assert np.mean(known) > 0.9
     far = distance.score(means[0] + 100.0 * np.ptp(values, axis=0), int(classes[0]))
-    assert detector.novelty_score([far], 5.0) > detector.threshold(5.0)
+    assert np.isfinite(own).all()
+    assert far > own.max() + 10.0 * np.ptp(own)
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')

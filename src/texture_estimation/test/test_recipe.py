@@ -51,14 +51,6 @@ def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence):
     assert '\n' not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ('scores', 'sentence'), [(['features', 'onsets'], 'novelty_scores'), (['hidden'], "add 'features'")]
-)
-def test_a_novelty_score_that_does_not_exist_or_no_distance_of_features_is_refused(scores, sentence):
-    with pytest.raises(InvalidParameter, match=sentence):
-        Recipe.from_mapping({**INPUTS, 'training': {'novelty_scores': scores}}, 'mine')
-
-
 def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_recipe():
     assert RoughnessRecipe.from_mapping({**INPUTS, 'training': {'folds': 5}}, 'mine').training.folds == 5
     with pytest.raises(InvalidParameter, match='false_rejection_rate'):

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
-from texture_estimation.decisions import ErrorBound, SlideNovelty
+from texture_estimation.acceptance import Acceptance, SlideDistance, margin_of
 from texture_estimation.evidence_rules import GroupedEvidence
 from texture_estimation.gaussians import SlideMoments
 from texture_estimation.learners.learner import is_tied
@@ -54,9 +54,6 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
     return ['' if none else model.labels[index] for index, none in zip(best, tied, strict=True)]
 
 
-NEVER_KNOWN = "recipe '{}' calls nothing known or decided: its features depend on mounting and surface"
-
-
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
@@ -97,8 +94,8 @@ class EvidenceAccumulator:
         )
         self._moments = SlideMoments(len(self.model.names)) if self.model and self.model.added_slides else None
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
-        detector = self.model.active_decisions.novelty_detector if self.model else None
-        self._novelty = SlideNovelty(detector.distances, len(self.model.labels)) if self.model and detector else None
+        distance = self.model.active_acceptance.distance if self.model else None
+        self._distance = SlideDistance(distance) if distance else None
         self._conditions = RunningConditions()
         self._deviation = ''  # of these conditions from those of the training
 
@@ -123,8 +120,8 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.active_decisions.domain.deviation(self._conditions)
-        scores, activations = model.predict_with_activations(vector.values)
+        self._deviation = model.active_acceptance.domain.deviation(self._conditions)
+        scores, compared = model.predict_and_compare(vector.values)
         window_evidence = model.recipe.evidence.window_evidence(scores)
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
@@ -139,9 +136,8 @@ class EvidenceAccumulator:
         self._end_ns = max(end, self._end_ns)
         if self._moments is not None:
             self._moments.add(vector.values)
-        if self._novelty is not None:
-            best = int(window_evidence.argmax())
-            self._novelty.add(vector.values, activations, best, effective_windows)
+        if self._distance is not None:
+            self._distance.add(compared, effective_windows)
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
         model = self.model
@@ -168,21 +164,16 @@ class EvidenceAccumulator:
         listed = probabilities.tolist()
         confidence = max(listed)
         best, single = listed.index(confidence), listed.count(confidence) == 1
-        within = not self._deviation
-        novelty_score, familiar = self._novelty_score(model, mean, best, effective_windows)
-        if not within or not model.recipe.training.known:
+        acceptance = model.acceptance_of(best)
+        second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
+        distance = self._distance.to(best) if self._distance else math.inf
+        rejection, decided = acceptance.judge(margin_of(first, second), distance, effective_windows)
+        if self._deviation:
             rejection = Rejection.OUTSIDE_TRAINING
-        elif not familiar:
-            rejection = Rejection.NOVEL
-        elif not single or not model.active_decisions.confidence_floor.reached(confidence, effective_windows):
+        elif not single and rejection is Rejection.NONE:
             rejection = Rejection.AMBIGUOUS
-        else:
-            rejection = Rejection.NONE
-        known = rejection is Rejection.NONE
-        bound = model.error_bound_of(best)
-        reported = tuple(bound.limited(listed))
-        sets = model.decisions.prediction_sets
-        members = sets.members(probabilities, effective_windows) if final and within else ()
+        reported = tuple(acceptance.limited(listed))
+        members = acceptance.members(probabilities, effective_windows) if final and not self._deviation else ()
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -191,13 +182,13 @@ class EvidenceAccumulator:
             rejection=rejection,
             confidence=max(reported),
             probabilities=reported,
-            decided=known and bound.shown and model.decisions.decided(confidence, effective_windows, novelty_score),
+            decided=decided and rejection is Rejection.NONE,
             prediction_set=tuple(model.labels[number] for number in members),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message=self._explanation(model, bound, final, known),
+            message=self._explanation(acceptance, final, rejection),
         )
 
     def _with_added(self, model: TextureModel, trained: Array, effective_windows: float) -> Array:
@@ -207,22 +198,10 @@ class EvidenceAccumulator:
         shares = model.slide_gaussians.shares(self._moments.mean, self._moments.variance, effective_windows)
         return model.slide_gaussians.combined(trained, shares)
 
-    def _explanation(self, model: TextureModel, bound: ErrorBound, final: bool, known: bool) -> str:
+    def _explanation(self, acceptance: Acceptance, final: bool, rejection: Rejection) -> str:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
-        missing = (model.decisions.prediction_sets.reason, bound.reason) if final and not self._deviation else ()
-        if final and not model.recipe.training.known:
-            missing = (NEVER_KNOWN.format(model.recipe.name), *missing)
-        reach = model.decisions.domain.reach_reason if final and not known and not self._deviation else ''
-        return '; '.join(filter(None, (self._deviation, self._message, *missing, reach)))
-
-    def _novelty_score(
-        self, model: TextureModel, mean: Array, best: int, effective_windows: float
-    ) -> tuple[float, bool]:
-        """Return the novelty score of the slide, and whether it is that of a known surface."""
-        detector = model.active_decisions.novelty_detector
-        if self._novelty is None or detector is None:
-            return 0.0, True
-        second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
-        scores = self._novelty.scores(best, first - second)
-        novelty_score, threshold = detector.score_and_threshold(scores, effective_windows)
-        return novelty_score, novelty_score <= threshold
+        missing: tuple[str, ...] = ()
+        if final and not self._deviation:
+            reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
+            missing = (acceptance.reason if acceptance.distance is None else acceptance.decided_reason, reach)
+        return '; '.join(filter(None, (self._deviation, self._message, *missing)))

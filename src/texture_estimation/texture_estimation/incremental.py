@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from texture_core.config import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import Array, FeatureVector, checked_label
-from texture_estimation.decisions import ErrorBound
+from texture_estimation.acceptance import Acceptance
 from texture_estimation.learners.discriminant import Discriminant
 from texture_estimation.learners.learner import shrunk_covariance
 from texture_estimation.model import AddedSlide, TextureModel, remove_added_slide, stored_numbers, write_added_slide
@@ -212,18 +212,9 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     return replace(
         model,
         name=f'{model.name}{DAY_SUFFIX}',
-        recipe=replace(
-            model.recipe,
-            learner_name='discriminant',
-            learner=Discriminant(),
-            training=replace(model.recipe.training, known=False),
-        ),
+        recipe=replace(model.recipe, learner_name='discriminant', learner=Discriminant()),
         parameters={'weights': weights, 'offsets': offsets - centre @ weights},
-        decisions=replace(
-            model.decisions,
-            error_bound=ErrorBound(0, model.decisions.error_bound.max_error_rate),
-            novelty_detector=None,
-        ),
+        acceptance=Acceptance(0, model.acceptance.rates, model.acceptance.domain),
         next_touch_model=None,
         examples=None,
         added_slides=(),

@@ -27,15 +27,14 @@ from numpy.typing import NDArray
 from texture_core.config import MAX_CARD_BYTES, MB, Arrays, FileRefused, load_json, read_bounded, safe_repr
 from texture_core.errors import InvalidData, MissingLibrary, ModelMismatch, TextureError
 from texture_core.types import AnyArray, Array
-from texture_estimation.decisions import Decisions, ErrorBound, SlideNovelty, space_means
-from texture_estimation.gaussians import SlideGaussians
-from texture_estimation.learners.learner import Codes, Predictor, hidden_layer, is_tied, log_softmax
+from texture_estimation.acceptance import Acceptance, SlideDistance
+from texture_estimation.gaussians import SlideGaussians, compared_start
+from texture_estimation.learners.learner import NOT_COMPARED, Codes, Predictor, hidden_layer, is_tied, log_softmax
 from texture_estimation.learners.mlp import MlpPredictor
 from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe
 from texture_features.correction import CORRECTED, read_correction
 from texture_features.feature_set import SlideConditions
-from texture_features.features import temporal as slide_onset
 
 # --------------------
 # The parts of a model as a tree: mappings, lists, plain values, and arrays as leaves.
@@ -400,8 +399,8 @@ class TextureModel(StoredModel):
         Textures in the training set, in the order of the probabilities; added ones last.
     tempering_exponent
         Exponent of the effective window count in the evidence, 0 to 1.
-    decisions
-        When a slide may end, and when its surface is known.
+    acceptance
+        Whether a label is accepted, when a slide may end, and which labels it may have.
     next_touch_model
         Class-conditional Gaussians of each motion, to choose the next touch; None if all slides were alike.
     examples
@@ -430,7 +429,7 @@ class TextureModel(StoredModel):
     labels: tuple[str, ...]
     recipe: Recipe
     tempering_exponent: float
-    decisions: Decisions
+    acceptance: Acceptance
     next_touch_model: NextTouchModel | None = None
     examples: TrainingExamples | None = None
     added_slides: tuple[AddedSlide, ...] = ()
@@ -457,16 +456,23 @@ class TextureModel(StoredModel):
         return len(self.labels) if self.learns_online else self.n_trained
 
     @cached_property
-    def active_decisions(self) -> Decisions:
-        """Decisions that include the added slides."""
+    def active_acceptance(self) -> Acceptance:
+        """The acceptance with the added slides."""
         added = self.added_slides
         if not added:
-            return self.decisions
-        means = [space_means(slide.values, self.activations(slide.values), self._overlap) for slide in added]
+            return self.acceptance
+        means = [compared_start(self.compared(slide.values), self._overlap) for slide in added]
         codes = np.array([self.labels.index(slide.label) for slide in added])
-        return self.decisions.with_slides(
-            means, codes, [slide.conditions for slide in added], [slide.label for slide in added]
+        return self.acceptance.with_slides(
+            np.stack(means), codes, [slide.conditions for slide in added], [slide.label for slide in added]
         )
+
+    def acceptance_of(self, number: int) -> Acceptance:
+        """Return the acceptance for the label of this number: few slides of an added one show little."""
+        if number < self.n_trained:
+            return self.active_acceptance
+        slides = sum(added.label == self.labels[number] for added in self.added_slides)
+        return replace(self.active_acceptance, slides=slides)
 
     @property
     def _overlap(self) -> float:
@@ -478,36 +484,20 @@ class TextureModel(StoredModel):
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
         return hidden_layer(self.recipe.learner.predictor(self.parameters))
 
-    def activations(self, X: Array) -> Array | None:
-        """Return the outputs of the trained hidden layer, (..., n_hidden); None if the classifier has none."""
-        return self._hidden_layer(X) if self._hidden_layer is not None else None
+    @cached_property
+    def _compared(self) -> Array:
+        return np.array([name.rsplit('/', 1)[-1] not in NOT_COMPARED for name in self.names], dtype=np.float64)
 
-    def error_bound_of(self, number: int) -> ErrorBound:
-        """Return what can be shown for the label of this number: few slides of an added texture show little."""
-        if number < self.n_trained:
-            return self.decisions.error_bound
-        slides = sum(added.label == self.labels[number] for added in self.added_slides)
-        return replace(self.decisions.error_bound, slides=slides)
+    def compared(self, X: Array) -> Array:
+        """Return what the distance compares: outputs of the trained hidden layer, (..., n_hidden), or the features."""
+        return self._hidden_layer(X) if self._hidden_layer is not None else X * self._compared
 
-    def predict_with_activations(self, X: Array) -> tuple[Array, Array | None]:
-        """Return what `predictor` and `activations` give, with the hidden layer computed once where both have it.
-
-        Parameters
-        ----------
-        X : (..., n_features)
-
-        Returns
-        -------
-        (..., n_trained)
-            Log-probabilities of the trained textures up to a constant of the window.
-        (..., n_hidden) or None
-            Outputs of the trained hidden layer; None if the classifier has none.
-        """
-        # A predictor derived from it may add to what the hidden layer gives, as that of `onset_mlp` does.
-        if type(self.predictor) is MlpPredictor:
+    def predict_and_compare(self, X: Array) -> tuple[Array, Array]:
+        """Return what `predictor` and `compared` give, with the hidden layer computed once where both have it."""
+        if isinstance(self.predictor, MlpPredictor):
             activations = self.predictor.activations(X)
             return self.predictor.scores(activations), activations
-        return self.predictor(X), self.activations(X)
+        return self.predictor(X), self.compared(X)
 
     @cached_property
     def trust(self) -> Callable[[Array], float]:
@@ -587,10 +577,7 @@ class TextureModel(StoredModel):
         known, windows = self.examples, self.recipe.training_windows
         kept = len(known.codes) / max(int(self.training.get('windows', 0)), len(known.codes))
         hop_share = min(windows.hop_s / windows.length_s / kept, 1.0)
-        compared = np.array(
-            [name.rsplit('/', 1)[-1] != slide_onset.SLIDE_ONSET for name in self.names], dtype=np.float64
-        )
-        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_share, compared)
+        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_share, self._compared)
 
     def validate(self) -> None:
         """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.
@@ -604,14 +591,11 @@ class TextureModel(StoredModel):
         answer = self.predict_log_proba(nothing)
         if answer.shape != (len(self.labels),) or np.isnan(answer).any():
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
-        decisions, detector = self.decisions, self.decisions.novelty_detector
-        decisions.prediction_sets.members(np.exp(answer), 1.0)
-        decisions.stopping_rule.decided(0.5, 1.0)
-        decisions.confidence_floor.reached(0.5, 1.0)
-        if detector is not None:
-            novelty = SlideNovelty(detector.distances, len(self.labels))
-            novelty.add(nothing, self.activations(nothing), 0, 1.0)
-            detector.novelty_score(novelty.scores(0, 0.0), 1.0)
+        if self.acceptance.distance is not None:
+            distance = SlideDistance(self.acceptance.distance)
+            distance.add(self.compared(nothing), 1.0)
+            self.acceptance.judge(0.0, distance.to(0), 1.0)
+            self.acceptance.members(np.exp(answer), 1.0)
         if self.slide_gaussians is not None:
             self.slide_gaussians.check(nothing)
         if self.next_touch_model is not None:
@@ -628,7 +612,7 @@ class TextureModel(StoredModel):
             **super().tree,
             'labels': list(self.trained_labels),
             'tempering_exponent': self.tempering_exponent,
-            'decisions': tree_of(self.decisions),
+            'acceptance': tree_of(self.acceptance),
             'next_touch_model': tree_of(self.next_touch_model),
             'examples': tree_of(self.examples),
         }
@@ -661,7 +645,7 @@ def load_model(path: str | Path) -> TextureModel:
             recipe=recipe,
             labels=part_of(tuple[str, ...], tree.get('labels'), 'labels'),
             tempering_exponent=part_of(float, tree.get('tempering_exponent'), 'tempering_exponent'),
-            decisions=part_of(Decisions, tree.get('decisions'), 'decisions'),
+            acceptance=part_of(Acceptance, tree.get('acceptance'), 'acceptance'),
             next_touch_model=part_of(NextTouchModel | None, tree.get('next_touch_model'), 'next_touch_model'),
             examples=part_of(TrainingExamples | None, tree.get('examples'), 'examples'),
         )

@@ -11,11 +11,12 @@ from typing import Any
 
 from texture_core.config import from_mapping, param, unknown_name
 from texture_core.errors import InvalidParameter
-from texture_estimation.decisions import FEATURES, NEVER, SCORES, DomainMargins
+from texture_estimation.acceptance import Rates
+from texture_estimation.domain import DomainMargins
 from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant
 from texture_estimation.learners.learner import Learner, extras_of
-from texture_estimation.learners.mlp import Mlp, OnsetMlp
+from texture_estimation.learners.mlp import Mlp
 from texture_estimation.learners.sklearn_learner import SklearnLearner
 from texture_estimation.learners.svm import SvmRbf
 from texture_features.augmentation import Augmentation
@@ -27,7 +28,6 @@ from texture_features.windows import WindowParams
 
 LEARNERS: Mapping[str, type[Learner]] = {
     'mlp': Mlp,  # one hidden layer, softmax, calibrated
-    'onset_mlp': OnsetMlp,  # and linear discriminant analysis of first windows
     'discriminant': Discriminant,  # Fisher 1936, shrunk as Friedman 1989, calibrated
     'force_discriminant': ForceDiscriminant,  # one for each range of forces
     'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated
@@ -70,61 +70,25 @@ class DecisionParams(TrainingParams):
         low=1,
         high=100,
     )
+    max_accepted_wrong: float = param(
+        0.033,
+        'Largest fraction of held-out slides, tried once as they are and once with their label taken out of the model, '
+        'that may be accepted under a wrong label; a smaller one accepts less, and needs more slides.',
+        low=0.001,
+        high=0.2,
+    )
+    false_rejection_rate: float = param(
+        0.04,
+        'Fraction of the slides with the right label that may be rejected as soon as they are long enough; a smaller '
+        'one accepts more unknown surfaces.',
+        low=0.0,
+        high=0.5,
+    )
     max_error_rate: float = param(
-        0.02, 'Largest fraction of wrong decisions when slides are stopped early.', low=0.0, high=1.0
-    )
-    max_disturbed_error_rate: float = param(
-        0.005,
-        'Largest fraction of wrong decisions when disturbed copies of held-out slides are stopped early; most of them '
-        'are too strange to be stopped at all.',
-        low=0.0,
-        high=1.0,
-    )
-    early_novelty_score: float = param(
-        NEVER,
-        'Largest novelty score at which a slide may end after its first window, and six times as much after each '
-        'further one that does not overlap; a smaller one costs sliding time and makes wrong decisions under '
-        'disturbances rarer.',
-        low=0.0,
-        high=NEVER,
+        0.02, 'Largest fraction of wrong decisions when slides are stopped early; 0: none is.', low=0.0, high=1.0
     )
     coverage: float = param(
         0.95, 'Coverage of the prediction set: fraction of slides whose texture it contains.', low=0.5, high=0.999
-    )
-    false_rejection_rate: float = param(
-        0.0,
-        'Fraction of slides over known textures that may be rejected as unknown; 0: no rejection.',
-        low=0.0,
-        high=0.5,
-    )
-    known: bool = param(
-        True,
-        'States whether an estimate may say that a surface is known and decided; false for features that '
-        'depend on the mounting as well as on the surface: no novelty detector rejects most of their errors on another '
-        'day.',
-    )
-    low_confidence_rejection_rate: float = param(
-        0.0,
-        'Fraction of slides over known textures that may be rejected as unknown because their label is too improbable '
-        'for the length of the slide; a larger one makes wrong labels under disturbances rarer at the end of a slide; '
-        '0: none. It needs a false_rejection_rate above 0.',
-        low=0.0,
-        high=0.5,
-    )
-    max_known_error_rate: float = param(
-        0.015,
-        'Largest fraction of slides at held-out places, in held-out sessions or with held-out fingers that may be '
-        'known under a wrong label, at each length of a slide: the confidence below which a slide is unknown rises '
-        'until it is kept; 1: no limit. It needs a false_rejection_rate above 0, and two places, sessions or fingers.',
-        low=0.0,
-        high=1.0,
-    )
-    max_known_error_rate_on_track: float = param(
-        0.005,
-        'The same of held-out slides where the training has one place, session and finger: the label of another finger '
-        'or place is wrong more often than these slides show, most of all early in a slide; 1: no limit.',
-        low=0.0,
-        high=1.0,
     )
     held_out_places: int = param(
         1,
@@ -132,13 +96,6 @@ class DecisionParams(TrainingParams):
         'held-out slides is fitted to held-out parts of the track, as places that the training does not have; 1: none.',
         low=1,
         high=20,
-    )
-    novelty_scores: list[str] = param(  # noqa: RUF009 – it gives a field
-        list(SCORES),
-        'Names the scores that are summed to the novelty score: distances to training slides by the features, by the '
-        'hidden layer and by the features of the first windows, log-odds of the two best labels, agreement of the '
-        'windows; each one costs computing time.',
-        choices=SCORES,
     )
     slowest_m_s: float = param(
         0.0,
@@ -180,10 +137,6 @@ class DecisionParams(TrainingParams):
     )
 
     def __post_init__(self) -> None:
-        if FEATURES not in self.novelty_scores:
-            raise InvalidParameter(
-                f"training: novelty_scores is {self.novelty_scores}; add '{FEATURES}', which every learner has"
-            )
         if self.slowest_m_s > self.fastest_m_s or (self.fastest_m_s > 0.0 and not self.slowest_m_s):
             raise InvalidParameter(
                 f'training: slowest_m_s is {self.slowest_m_s:g} and fastest_m_s is {self.fastest_m_s:g}; '
@@ -196,6 +149,11 @@ class DecisionParams(TrainingParams):
             return ()
         ratio = self.fastest_m_s / self.slowest_m_s
         return tuple(self.slowest_m_s * window_s * ratio ** (step / (SPEEDS - 1)) for step in range(SPEEDS))
+
+    @property
+    def rates(self) -> Rates:
+        """How often what may go wrong when a slide is judged."""
+        return Rates(self.max_accepted_wrong, self.false_rejection_rate, self.max_error_rate, self.coverage)
 
     @property
     def domain_margins(self) -> DomainMargins:

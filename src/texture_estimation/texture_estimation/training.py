@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -15,31 +15,14 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.errors import InvalidData
 from texture_core.types import AnyArray, Array
-from texture_estimation.decisions import (
-    HIDDEN,
-    NOVELTY_WINDOWS,
-    SCORES,
-    ClassDistance,
-    ConfidenceFloor,
-    Decisions,
-    Domain,
-    ErrorBound,
-    NoveltyDetector,
-    SlideCourse,
-    StoppingRule,
-    fit_confidence_floor,
-    fit_prediction_sets,
-    fit_stopping_rule,
-    slide_scores,
-    space_means,
-    window_count,
-)
-from texture_estimation.evidence_rules import EvidenceRule, followed, running_means
-from texture_estimation.learners.discriminant import FORCE, ForceDiscriminant
+from texture_estimation.acceptance import Acceptance, HeldOutSlide
+from texture_estimation.domain import Domain
+from texture_estimation.evidence_rules import EvidenceRule, followed
+from texture_estimation.gaussians import ClassDistance, compared_start
 from texture_estimation.learners.learner import (
+    NOT_COMPARED,
     Codes,
     Fitted,
-    Learner,
     Predictor,
     assign_folds,
     extras_of,
@@ -47,6 +30,7 @@ from texture_estimation.learners.learner import (
     hidden_layer,
     is_tied,
     log_loss,
+    log_softmax,
     of_examples,
     trust,
 )
@@ -56,7 +40,6 @@ from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import DecisionParams, Recipe
 from texture_features.augmentation import NOISE
 from texture_features.feature_set import LOAD, FeatureCopies, LabelledFeatures, SlideConditions
-from texture_features.features import temporal
 
 # --------------------
 # Fit the learner of a recipe to labelled windows, with what else the recipe trains it on.
@@ -64,8 +47,12 @@ from texture_features.features import temporal
 MIN_CALIBRATION_SLIDES = 2
 
 
-def fit_learner(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes) -> Fitted:
+def fit_learner(
+    recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes, parts: Codes | None = None
+) -> Fitted:
     """Fit the learner; windows that begin within the length of the first one of their slide count more often.
+
+    Slides of one of these parts, (n_slides,), are held out together; slides are held out by themselves without parts.
 
     Where a label has a single slide, its windows are held out one by one and must not be there twice: then every window
     counts once, and nothing is drawn besides.
@@ -77,7 +64,8 @@ def fit_learner(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups
         return recipe.learner.fit(examples.values, codes, groups)
     times = _times(groups, examples, recipe.training.start_weight)
     rows = np.repeat(np.arange(len(codes)), times)
-    extras = {name: EXTRAS[name](recipe, examples, codes, groups) for name in extras_of(recipe.learner)}
+    makers = {**EXTRAS, 'parts': lambda *_: parts}
+    extras = {name: makers[name](recipe, examples, codes, groups) for name in extras_of(recipe.learner)}
     fit: Callable[..., Fitted] = recipe.learner.fit  # which takes the extras that the learner declares
     fitted = fit(*_with_resized(examples, codes, groups, rows), **extras)
     if fitted.held_out is None:
@@ -152,8 +140,10 @@ def _augmented_examples(
     )
 
 
-def held_out_parts(examples: LabelledFeatures) -> Codes | None:
+def held_out_parts(examples: LabelledFeatures, *, by_speed: bool = False) -> Codes | None:
     """Return the part in which each slide is held out, (n_slides,), by session, place and finger; None to go by slides.
+
+    `by_speed` slides at other speeds are in other parts, too.
 
     Slides of one session share what is of that day: with one of them in the training, another tells nothing of the next
     day. A label with one session is held out slide by slide, as if its slides were sessions.
@@ -161,7 +151,10 @@ def held_out_parts(examples: LabelledFeatures) -> Codes | None:
     slides, rows = np.unique(examples.groups, return_index=True)
     made = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
     alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide tells of no session
-    sessions = np.array([f'{"" if alone else one.session}\n{one.place}\n{one.sensor}' for one in made])
+    speeds = [f'{one.speed_m_s:.2g}' if by_speed else '' for one in made]
+    sessions = np.array(
+        [f'{"" if alone else one.session}\n{one.place}\n{one.sensor}\n{v}' for one, v in zip(made, speeds, strict=True)]
+    )
     labels = examples.labels[rows]
     own = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     order = _ranks(sessions, rows)
@@ -176,11 +169,14 @@ def held_out_parts(examples: LabelledFeatures) -> Codes | None:
     return parts
 
 
+GAP = 0.2  # of a part of the track, left out before the next one: neighbours are too alike
+
+
 def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
     """Return slides over one track cut into so many parts of it, each a slide at a place of its own.
 
-    Windows that lie in two parts are left out. Where the slides are of several places, sessions or fingers already, and
-    where a slide has too few windows, they stay as they are.
+    Windows that lie in two parts are left out, and more, so that a gap lies between the parts. Where the slides are of
+    several places, sessions or fingers already, and where a slide has too few windows, they stay as they are.
     """
     if count < 2 or held_out_parts(examples) is not None:
         return examples
@@ -196,7 +192,8 @@ def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
             name = f'{slide} part {number + 1}/{count}'
             own = rows[parts == number]
             groups[own] = name
-            kept[own[len(own) - spanned :] if number < count - 1 else []] = False
+            gap = max(spanned, round(GAP * len(own)))
+            kept[own[len(own) - gap :] if number < count - 1 else []] = False
             made = examples.conditions.get(slide, SlideConditions())
             conditions[name] = replace(made, place=f'{number + 1}/{count}')
     return replace(examples, groups=groups.astype(np.str_), conditions=conditions).take(kept)
@@ -213,34 +210,16 @@ def _ranks(names: Any, rows: Codes) -> Codes:
 EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
     'augmented': _augmented_examples,
     'differences': _touch_differences,
-    'parts': lambda _recipe, examples, _codes, _groups: held_out_parts(examples),
 }
 
 
 # --------------------
-# Fit novelty detection on slides held out of the training, and follow these slides window by window.
+# Follow slides and disturbed copies window by window, as models do that have not seen them.
 
-MIN_NOVELTY_SLIDES = 3  # of a class: with one held out, two tell how much slides differ
-MIN_ALL_SLIDES = 20
 FOLDS = 5
 # Of the copies of each slide, so many are among the slides to which the distance is measured, at random gains, if they
 # have no noise: what is tolerated as noise would let strong noise pass. Chosen on slides 21-30, trained on 1-20.
 REFERENCE_COPIES = 6
-
-
-@dataclass(frozen=True, eq=False)
-class HeldOutSlide:
-    """A held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it."""
-
-    truth: int
-    means: Array
-    effective_windows: Array
-    scores: Array | None = None
-    disturbance: str = ''
-
-    def posterior(self, rule: EvidenceRule, tempering_exponent: float) -> Array:
-        """Return the log-probabilities after each window."""
-        return rule.log_posterior(self.means, self.effective_windows[:, None], tempering_exponent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,87 +241,67 @@ class _Slide:
         return values
 
 
-def fit_novelty(
-    learner: Learner,
-    fitted: Fitted,
-    examples: LabelledFeatures,
-    rule: EvidenceRule,
-    false_rejection_rate: float,
-    *,
-    gain_range: float = 1.0,
-    scores: Collection[str] = SCORES,
-) -> tuple[NoveltyDetector, Sequence[HeldOutSlide]] | None:
-    """Return the detector, and the held-out slides and disturbed copies by which it was fitted.
+class Followed:
+    """The slides of examples, the distance to them, and how those that were held out are followed."""
 
-    Returns None if there are too few slides: MIN_SLIDES of each class are needed, and in all MIN_ALL_SLIDES or one over
-    the rate of false rejections.
-    """
-    classes = np.unique(examples.labels, return_inverse=True)[1]
-    names, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
-    counts = np.bincount(classes[first])
-    enough = len(names) >= MIN_ALL_SLIDES or (len(names) + 1) * false_rejection_rate >= 1.0
-    if fitted.held_out is None or len(counts) < 2 or counts.min() < MIN_NOVELTY_SLIDES or not enough:
-        return None
-    hop_share = min(examples.hop_s / examples.window_s, 1.0)
-    slides = [
-        _Slide(number, int(classes[first[number]]), examples.values, np.flatnonzero(groups == number))
-        for number in range(len(names))
-    ]
-    augmented = examples.augmented
-    disturbed = [*_copied_slides(augmented.disturbed, names, classes[first])] if augmented else []
-    copies = _reference_copies(examples, names, classes[first], gain_range)
-    # what says when and how a window was made, and not what of: not compared
-    apart = {temporal.SLIDE_ONSET, FORCE} if isinstance(learner, ForceDiscriminant) else {temporal.SLIDE_ONSET}
-    compared = np.array([name.rsplit('/', 1)[-1] not in apart for name in examples.names], dtype=np.float64)
-    traces: list[HeldOutSlide] = []
-    for held_out, predictor in _folds(learner, fitted, classes, groups, held_out_parts(examples)):
-        distances = _fit_distances(
-            [slide for slide in slides if slide.group not in held_out],
-            [copy for copy in copies if copy.group not in held_out],
-            predictor,
-            hop_share,
-            compared=compared,
-            scores=scores,
-        )
+    def __init__(self, recipe: Recipe, examples: LabelledFeatures) -> None:
+        self._recipe, self._examples = recipe, examples
+        self._hop_share = min(examples.hop_s / examples.window_s, 1.0)
+        self._classes = np.unique(examples.labels, return_inverse=True)[1]
+        names, first, self._groups = np.unique(examples.groups, return_index=True, return_inverse=True)
+        truths = self._classes[first]
+        self._compared = np.array([name.rsplit('/', 1)[-1] not in NOT_COMPARED for name in examples.names], dtype=float)
+        self._slides = [
+            _Slide(number, int(truths[number]), examples.values, np.flatnonzero(self._groups == number))
+            for number in range(len(names))
+        ]
+        augmented = examples.augmented
+        self._disturbed = [*_copied_slides(augmented.disturbed, names, truths)] if augmented else []
+        self._copies = _reference_copies(examples, names, truths, recipe.augmentation.gain_range)
+
+    def held_out(self, fitted: Fitted, temperature: float, parts: Codes | None) -> Iterator[HeldOutSlide]:
+        """Yield each held-out slide; its evidence is that of a model of this temperature."""
+        rule, scale = self._recipe.evidence, fitted.temperature / temperature
+        for held_out, predictor in self._folds(fitted, parts):
+            distance = self.distance(predictor, held_out)
+            for slide in (one for one in (*self._slides, *self._disturbed) if one.group in held_out):
+                values = slide.values
+                trusted: Array | float = 1.0
+                if predictor is not None:
+                    scores, trusted = predictor(values), trust(predictor, values)
+                elif not slide.disturbance and fitted.held_out is not None:
+                    scores = fitted.held_out[self._groups == slide.group]
+                else:
+                    continue
+                evidence = rule.window_evidence(log_softmax(scores) * scale)
+                counts: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * self._hop_share
+                means, _ = followed(rule, evidence, self._hop_share, trusted)
+                yield HeldOutSlide.follow(
+                    slide.truth, means, counts, self._values(values, predictor), distance, disturbance=slide.disturbance
+                )
+
+    def distance(self, predictor: Predictor | None, held_out: Collection[int] = ()) -> ClassDistance:
+        """Return the distance to slides that are not held out: their metric, and among the references copies, too."""
+        means, codes = [], []
+        for those in (self._slides, self._copies):
+            kept = [slide for slide in those if slide.group not in held_out]
+            codes.append(np.array([slide.truth for slide in kept], dtype=np.intp))
+            means.append([compared_start(self._values(one.values, predictor), self._hop_share) for one in kept])
+        found = ClassDistance.fit(np.stack(means[0]), codes[0])
+        return found.with_slides(np.stack(means[1]), codes[1]) if means[1] else found
+
+    def _values(self, values: Array, predictor: Predictor | None) -> Array:
+        """Return what is compared of windows: the hidden layer of the predictor, without one the features."""
         hidden = hidden_layer(predictor) if predictor is not None else None
-        for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
-            values = slide.values
-            trusted: Array | float = 1.0
-            if predictor is not None:
-                log_probabilities, trusted = predictor(values), trust(predictor, values)
-            elif not slide.disturbance:
-                log_probabilities = fitted.held_out[groups == slide.group]
-            else:
-                continue
-            evidence = rule.window_evidence(log_probabilities)
-            effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share
-            means = running_means(rule, evidence, effective_windows, trusted)
-            activations = hidden(values) if hidden else None
-            found = slide_scores(
-                distances, values, activations, evidence, means=means, effective_windows=effective_windows
-            )
-            traces.append(HeldOutSlide(slide.truth, means, effective_windows, found, slide.disturbance))
-    final = learner.predictor(fitted.parameters)
-    layered = final if hidden_layer(final) else None
-    distances = _fit_distances(slides, copies, layered, hop_share, compared=compared, scores=scores)
-    held_out_scores = [_scores_at(traces, level) for level in NOVELTY_WINDOWS]
-    if min(map(len, held_out_scores)) < MIN_NOVELTY_SLIDES:
-        return None
-    return NoveltyDetector.fit(distances, held_out_scores, false_rejection_rate, scores), traces
+        return hidden(values) if hidden else values * self._compared
 
-
-def _folds(
-    learner: Learner, fitted: Fitted, classes: Codes, groups: Codes, parts: Codes | None
-) -> Iterator[tuple[frozenset[int], Predictor | None]]:
-    """Yield the slides that are held out together, and what was fitted without them, if the learner keeps it."""
-    if fitted.folds:
+    def _folds(self, fitted: Fitted, parts: Codes | None) -> Iterator[tuple[frozenset[int], Predictor | None]]:
+        """Yield the slides that are held out together, and what was fitted without them, if the learner keeps it."""
         for held_out, parameters in fitted.folds:
-            yield frozenset(held_out.tolist()), learner.predictor(parameters)
-        return
-    split = assign_folds(classes, groups, FOLDS, parts)
-    parts = split[0] if split else np.zeros(len(groups), np.intp)
-    for part in np.unique(parts):
-        yield frozenset(groups[parts == part].tolist()), None
+            yield frozenset(held_out.tolist()), self._recipe.learner.predictor(parameters)
+        split = None if fitted.folds else assign_folds(self._classes, self._groups, FOLDS, parts)
+        for part in np.unique(split[0]) if split else ():
+            yield frozenset(self._groups[split[0] == part].tolist()), None  # type: ignore[index]
 
 
 def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, gain_range: float) -> list[_Slide]:
@@ -369,148 +328,30 @@ def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterato
             yield _Slide(group, int(classes[group]), copies.values, slice(start, stop), disturbance=kind)
 
 
-def _fit_distances(
-    slides: Sequence[_Slide],
-    copies: Sequence[_Slide],
-    predictor: Predictor | None,
-    hop_share: float,
-    *,
-    compared: Array,
-    scores: Collection[str],
-) -> Mapping[str, ClassDistance]:
-    """Return the distances that count, with the metric of undisturbed slides and references among the copies, too.
-
-    `compared` is 0 for features that only say when a window was, which slides cut in another way have otherwise.
-    """
-    hidden = hidden_layer(predictor) if predictor is not None and HIDDEN in scores else None
-    means, more = (
-        [_space_means(slide.values, hidden, hop_share, compared) for slide in those] for those in (slides, copies)
-    )
-    classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
-    spaces = [space for space in means[0] if space in scores]
-    found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in spaces}
-    if not more:
-        return found
-    return {
-        space: distance.with_slides(np.stack([own[space] for own in more]), more_classes)
-        for space, distance in found.items()
-    }
-
-
-def _space_means(
-    values: Array, hidden: Callable[[Array], Array] | None, hop_share: float, compared: Array
-) -> dict[str, Array]:
-    start = values[: window_count(NOVELTY_WINDOWS[-1], hop_share)]  # later windows are in no mean
-    return space_means(compared * start, hidden(start) if hidden else None, hop_share)
-
-
-def _scores_at(traces: Sequence[HeldOutSlide], effective_windows: float) -> Array:
-    """Return the scores of undisturbed slides with the right label after so many windows, (n_slides, n_scores)."""
-    found = []
-    for trace in traces:
-        place = int(np.abs(trace.effective_windows - effective_windows).argmin())
-        if trace.scores is not None and not trace.disturbance and int(trace.means[place].argmax()) == trace.truth:
-            found.append(trace.scores[place])
-    return np.array(found)
-
-
-# --------------------
-# Fit when a slide may end, which textures stay candidates and how fast evidence grows, on held-out slides.
-
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_TEMPERING_EXPONENT = 0.5
 
 
-def held_out_slides(
-    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_share: float
-) -> Sequence[HeldOutSlide]:
-    """Return the slides, as evaluated when they were held out; none if nothing was."""
+def fit_tempering_exponent(
+    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_share: float, *, temperature: float
+) -> float:
+    """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
     if fitted.held_out is None:
-        return []
-    evidence = rule.window_evidence(fitted.held_out)
+        return DEFAULT_TEMPERING_EXPONENT
+    evidence = rule.window_evidence(log_softmax(fitted.held_out * fitted.temperature / temperature))
     slides = []
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
-        trusted = 1.0 if fitted.trusted is None else fitted.trusted[rows]
-        slides.append(HeldOutSlide(int(codes[rows[0]]), *followed(rule, evidence[rows], hop_share, trusted)))
-    return slides
-
-
-def fit_tempering_exponent(slides: Sequence[HeldOutSlide], rule: EvidenceRule) -> float:
-    """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
-    if not slides:
-        return DEFAULT_TEMPERING_EXPONENT
-    mean = np.concatenate([slide.means for slide in slides])
-    effective_window_counts = np.concatenate([slide.effective_windows for slide in slides])[:, None]
-    truth = np.concatenate([np.full(len(slide.effective_windows), slide.truth) for slide in slides])
+        means, counts = followed(
+            rule, evidence[rows], hop_share, 1.0 if fitted.trusted is None else fitted.trusted[rows]
+        )
+        slides.append((means, counts, codes[rows]))
+    means, counts, truth = (np.concatenate(parts) for parts in zip(*slides, strict=True))
 
     def loss(tempering_exponent: float) -> float:
-        return log_loss(rule.log_posterior(mean, effective_window_counts, tempering_exponent), truth)
+        return log_loss(rule.log_posterior(means, counts[:, None], tempering_exponent), truth)
 
     return float(minimize_scalar(loss, bounds=(0.0, 1.0), method='bounded').x)
-
-
-def fit_open_set(
-    recipe: Recipe,
-    fitted: Fitted,
-    examples: LabelledFeatures,
-    slides: Sequence[HeldOutSlide],
-    tempering_exponent: float,
-) -> tuple[StoppingRule, NoveltyDetector | None, ConfidenceFloor]:
-    """Return when a slide may end, the novelty detector, and the smallest confidence of known surfaces.
-
-    Without a novelty detector, as none is asked for or there are too few slides, there is no smallest confidence.
-    """
-    decisions = recipe.training
-    found = None
-    if decisions.false_rejection_rate:
-        found = fit_novelty(
-            recipe.learner,
-            fitted,
-            examples,
-            recipe.evidence,
-            decisions.false_rejection_rate,
-            gain_range=recipe.augmentation.gain_range,
-            scores=decisions.novelty_scores,
-        )
-    detector, traces = found or (None, slides)
-    courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
-    if not courses:
-        return StoppingRule(), None, ConfidenceFloor()
-    if detector is None:
-        return fit_stopping_rule(courses, decisions.max_error_rate, by_novelty=False), None, ConfidenceFloor()
-    one_track = held_out_parts(examples) is None
-    most = decisions.max_known_error_rate_on_track if one_track else decisions.max_known_error_rate
-    floor = fit_confidence_floor(courses, decisions.low_confidence_rejection_rate, most)
-    courses = [
-        replace(
-            course,
-            known=course.known & [*map(floor.reached, course.confidences.tolist(), course.effective_windows.tolist())],
-        )
-        for course in courses
-    ]
-    rule = fit_stopping_rule(
-        courses, decisions.max_error_rate, decisions.max_disturbed_error_rate, decisions.early_novelty_score
-    )
-    return rule, detector, floor
-
-
-def _course(
-    trace: HeldOutSlide, detector: NoveltyDetector | None, rule: EvidenceRule, tempering_exponent: float
-) -> SlideCourse:
-    posterior = trace.posterior(rule, tempering_exponent)
-    novelty_scores: Array = np.zeros(len(posterior))
-    thresholds: Array = novelty_scores
-    if detector is not None and trace.scores is not None:
-        novelty_scores, thresholds = detector.scores_and_thresholds(trace.scores, trace.effective_windows)
-    return SlideCourse(
-        confidences=np.exp(posterior.max(axis=1)),
-        right=(posterior.argmax(axis=1) == trace.truth) & ~is_tied(posterior),
-        effective_windows=trace.effective_windows,
-        known=novelty_scores <= thresholds,
-        novelty_scores=novelty_scores,
-        disturbance=trace.disturbance,
-    )
 
 
 # --------------------
@@ -545,16 +386,35 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         If there are no examples, only one label, or a value that is not finite.
     """
     _check(examples)
-    made, examples = examples, in_places(examples, recipe.training.held_out_places)
     labels, codes = np.unique(examples.labels, return_inverse=True)
     groups = np.unique(examples.groups, return_inverse=True)[1]
-    trained = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
-    fitted = fit_learner(trained, examples, codes, groups)
     hop_share = min(examples.hop_s / examples.window_s, 1.0)
-    slides_held_out = held_out_slides(fitted, codes, groups, recipe.evidence, hop_share)
-    tempering_exponent = fit_tempering_exponent(slides_held_out, recipe.evidence)
-    decisions = recipe.training
-    rule, novelty_detector, floor = fit_open_set(trained, fitted, examples, slides_held_out, tempering_exponent)
+    # Fit to all slides, and without some of them in turn.
+    bound = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
+    fitted = fit_learner(bound, examples, codes, groups)
+    tempering_exponent = fit_tempering_exponent(
+        fitted, codes, groups, recipe.evidence, hop_share, temperature=fitted.temperature
+    )
+    held_out = 0 if fitted.held_out is None else len(np.unique(groups))
+    calibrated, truth = fitted, codes
+    acceptance = Acceptance(held_out, recipe.training.rates, _domain(examples, recipe.training))
+    if not acceptance.reason:
+        slides = Followed(bound, examples)
+        near = [*slides.held_out(fitted, fitted.temperature, None)]
+        far: list[HeldOutSlide] = []
+        # Where slides are of several places, sessions or fingers, fit without each of these in turn, too.
+        placed = in_places(examples, recipe.training.held_out_places)
+        parts = held_out_parts(placed, by_speed=bool(recipe.training.slowest_m_s))
+        if parts is not None:
+            kinds, slides_of = (np.unique(names, return_inverse=True)[1] for names in (placed.labels, placed.groups))
+            without = fit_learner(bound, placed, kinds, slides_of, parts)
+            calibrated, truth = without, kinds
+            far = [*Followed(bound, placed).held_out(without, fitted.temperature, parts)]
+            tempering_exponent = fit_tempering_exponent(
+                without, kinds, slides_of, recipe.evidence, hop_share, temperature=fitted.temperature
+            )
+        distance = slides.distance(bound.learner.predictor(fitted.parameters))
+        acceptance = acceptance.fitted(near, far, recipe.evidence, tempering_exponent, distance)
     return TextureModel(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),
@@ -563,27 +423,15 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         recipe=recipe,
         parameters=fitted.parameters,
         tempering_exponent=tempering_exponent,
-        decisions=Decisions(
-            ErrorBound(min(len(slides_held_out), len(np.unique(made.groups))), decisions.max_error_rate),
-            rule,
-            fit_prediction_sets(
-                [slide.posterior(recipe.evidence, tempering_exponent) for slide in slides_held_out],
-                [slide.truth for slide in slides_held_out],
-                [slide.effective_windows for slide in slides_held_out],
-                decisions.coverage,
-            ),
-            floor,
-            _domain(made, recipe.training),
-            novelty_detector,
-        ),
-        next_touch_model=_fit_next_touch_model(made),
+        acceptance=acceptance,
+        next_touch_model=_fit_next_touch_model(examples),
         training={
             'windows': len(codes),
-            'slides': len(np.unique(made.groups)),
+            'slides': len(np.unique(groups)),
             'window_s': examples.window_s,
             'hop_s': examples.hop_s,
-            'calibration': fitted.note,
-            'held_out_window_accuracy': _held_out_accuracy(fitted, codes),
+            'calibration': calibrated.note,
+            'held_out_window_accuracy': _held_out_accuracy(calibrated, truth),
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
     )

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import argparse
 import json
+import socket
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -25,6 +26,7 @@ from texture_evaluation.cross_validation import (
     compare,
     compare_all,
     cross_validate,
+    dask_backend,
     interval,
     parse_split,
     slide_counts,
@@ -35,6 +37,25 @@ from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.tables import import_tables, load_mapping
+
+
+@pytest.fixture
+def silent_scheduler():
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        yield f'tcp://127.0.0.1:{server.getsockname()[1]}'
+
+
+def test_a_dask_scheduler_that_takes_connections_and_is_silent_is_named_in_time(silent_scheduler, monkeypatch):
+    monkeypatch.setattr('texture_evaluation.cross_validation.ANSWER_S', 0.5)
+    with pytest.raises(InvalidParameter, match='no Dask scheduler answers at'), dask_backend(silent_scheduler):
+        pass
+
+
+@pytest.mark.parametrize('address', ['foo://x', 'nonsense', 'http://127.0.0.1:8'])
+def test_an_address_that_is_none_of_a_dask_scheduler_is_named(address):
+    with pytest.raises(InvalidParameter, match=f"no Dask scheduler answers at '{address}'"), dask_backend(address):
+        pass
+
 
 RECIPE = Recipe.from_mapping(
     {

@@ -11,7 +11,6 @@ import pytest
 from texture_core.config import refuse_inputs
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.types import TactileSignal
-from texture_estimation.decisions import ErrorBound
 from texture_estimation.model import TextureModel, both_files, load_model
 from texture_estimation.recipe import Recipe
 from texture_estimation.roughness import load_roughness_model
@@ -44,8 +43,8 @@ def model() -> TextureModel:
 def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: TextureModel) -> None:
     lines = summary(model, Path('model.npz'))
     assert lines[0] == "recipe 'tiny' trained on 2 surfaces: cork, felt"
-    assert 'too few slides for early stopping: at most 2 % wrong decisions need 149 slides or more' in lines[2]
-    assert 'with 6 the confidence is 0.61 at most' in lines[2]
+    assert lines[2] == model.acceptance.reason
+    assert 'too little training: 6 slides could be held out' in lines[2]
 
 
 @pytest.mark.parametrize(
@@ -53,8 +52,8 @@ def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: Text
     [({'cork': 4, 'felt': 1}, 'few slides of felt: 1, of others up to 4'), ({'cork': 4, 'felt': 3}, '')],
 )
 def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, said: str) -> None:
-    domain = replace(model.decisions.domain, slides=slides)
-    uneven = replace(model, decisions=replace(model.decisions, domain=domain))
+    domain = replace(model.acceptance.domain, slides=slides)
+    uneven = replace(model, acceptance=replace(model.acceptance, domain=domain))
     found = [line for line in summary(uneven, Path('model.npz')) if line.startswith('few slides')]
     assert [line.partition(';')[0] for line in found] == ([said] if said else [])
 
@@ -65,8 +64,9 @@ def test_a_training_with_one_slide_of_a_label_is_said_to_be_too_confident(simula
 
 
 def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:
-    enough = replace(model, decisions=replace(model.decisions, error_bound=ErrorBound(149, 0.02)))
-    assert not any('early stopping' in line for line in summary(enough, Path('model.npz')))
+    domain = replace(model.acceptance.domain, slides={'cork': 75, 'felt': 75})
+    enough = replace(model, acceptance=replace(model.acceptance, slides=150, domain=domain))
+    assert not any('too ' in line for line in summary(enough, Path('model.npz')))
 
 
 GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')
@@ -145,7 +145,7 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert 0.5 <= figures['early']['mean_s'] <= 1.2
     assert figures['unknown_accepted'] is None
     assert figures['accepted_wrong'] == {'early': 0.0, 'final': 0.0}
-    assert figures['unknown'] == {'early': 0.0, 'final': 0.0}
+    assert figures['unknown'] == {'early': 1.0, 'final': 1.0}  # four slides a surface are too few
     assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -65,8 +66,10 @@ def dask_backend(address: str) -> Iterator[None]:
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
 
     try:
+        # A scheduler that takes connections and is silent would hold up the client for minutes.
+        asyncio.run(asyncio.wait_for(_reach(cluster_of.comm.connect, address), ANSWER_S))
         client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+    except (OSError, ValueError, TimeoutError, RuntimeError, ImportError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise InvalidParameter(
             f"no Dask scheduler answers at '{address}' ({reason}); {CLUSTER_ADVICE}, "
@@ -76,6 +79,10 @@ def dask_backend(address: str) -> Iterator[None]:
         _check_cluster(client, address)
         with client.as_current(), parallel_config(backend='dask'):
             yield
+
+
+async def _reach(connect: Any, address: str) -> None:
+    await (await connect(address, timeout=ANSWER_S)).close()
 
 
 def _check_cluster(client: Any, address: str) -> None:

@@ -162,7 +162,7 @@ def test_a_model_card_has_the_facts_and_ranges_of_the_training(tmp_path) -> None
         'name': 'm', 'labels': ['cork', 'felt'], 'feature_set': 'ab12 signal=1000Hz*1',
         'recipe': {'description': 'Bands.'},
         'training': {'slides': 8, 'windows': 16, 'held_out_window_accuracy': 0.875},
-        'decisions': {'domain': {
+        'acceptance': {'domain': {
             'sensors': ['tsf85/dynamic'], 'motions': ['linear_slide'], 'speed_m_s': [0.02, 0.1], 'force_n': None,
             'reach': {
                 'cork': {'sessions': 2, 'places': 3, 'fingers': 1}, 'felt': {'sessions': 1, 'places': 4, 'fingers': 1},

@@ -395,7 +395,7 @@ def model_card(path: str | Path, licence: str = 'other') -> str:
     try:
         card = parse_json(read_bounded(Path(path), MAX_CARD_BYTES).decode())
         labels, recipe, training = (card[name] for name in ('labels', 'recipe', 'training'))
-        domain = card['decisions']['domain']
+        domain = card['acceptance']['domain']
         rows = [
             ('surfaces', ', '.join(labels)),
             ('features', card['feature_set']),

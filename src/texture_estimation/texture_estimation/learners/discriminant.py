@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.learner import (
+    FORCE,
     UNBOUND,
     Codes,
     Fitted,
@@ -157,7 +158,6 @@ class Discriminant:
 # --------------------
 # One discriminant for each range of forces: the spectrum that a surface excites changes with the force of the finger.
 
-FORCE = 'force'  # ends the name of the feature
 STRETCHES = 6  # of a slide
 ELSEWHERE = 0.02  # of the weight of a window at the middle of a range, for those far from it: no class is without any
 FURTHEST = 30.0  # times the reach: a slide made wholly outside still has a label

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.types import Array
+from texture_features.features.temporal import SLIDE_ONSET
 
 # --------------------
 # What a learner is: parameters that fit examples, and the predictor that it exports.
@@ -55,6 +56,8 @@ class Fitted:
         ones; () if the learner does not say.
     trusted : (n,) or None
         How much each example counts in its slide, by the learner that has not seen it; all the same if None.
+    temperature
+        By which scores were divided to be calibrated.
 
     Examples
     --------
@@ -68,6 +71,7 @@ class Fitted:
     note: str
     folds: Sequence[tuple[Codes, Mapping[str, Any]]] = ()
     trusted: Array | None = None
+    temperature: float = 1.0
 
 
 class Learner(Protocol):
@@ -209,7 +213,7 @@ def fit_in_folds(
     for rows in chunks(*scores.shape):
         scores[rows] = log_softmax(scores[rows] / temperature)
     fits = [(held_out, calibrated(parameters)) for held_out, parameters in fits]
-    return Fitted(calibrated(fit(nothing)), scores, note, fits, trusted)
+    return Fitted(calibrated(fit(nothing)), scores, note, fits, trusted, temperature)
 
 
 # --------------------
@@ -229,6 +233,12 @@ def standardisation(values: Array) -> tuple[Array, Array]:
     constant = deviation <= ROUNDING * np.abs(values).max(axis=0)
     return mean, np.where(constant, 1.0, deviation)
 
+
+# --------------------
+# Features that say how a window was made, and not what of.
+
+FORCE = 'force'  # ends the name of the feature
+NOT_COMPARED = (SLIDE_ONSET, FORCE)
 
 # --------------------
 # Means of the rows that belong together, such as the windows of a slide or the slides of a texture.

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -226,6 +226,8 @@ class SklearnLearner:
     True
     """
 
+    extras: ClassVar[tuple[str, ...]] = ('parts',)
+
     estimator: str = DEFAULT
     parameters: tuple[tuple[str, Any], ...] = ()
 
@@ -284,9 +286,9 @@ class SklearnLearner:
             if name not in known:
                 raise InvalidParameter(str(unknown_name(name, known, f"parameter of '{self.estimator}'")))
         seed = {'random_state': 0} if 'random_state' in known else {}
-        return estimator.set_params(**seed, **dict(self.parameters))
+        return estimator.set_params(**{**seed, **dict(self.parameters)})
 
-    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+    def fit(self, X: Array, y: Codes, groups: Codes, parts: Codes | None = None) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         Raises
@@ -297,7 +299,7 @@ class SklearnLearner:
         n_labels = int(y.max()) + 1
         fitted = self._fit(X, y, n_labels)
         parameters = {'packed': packed(fitted.estimator, self.estimator), 'mean': fitted.mean, 'scale': fitted.scale}
-        split = assign_folds(y, groups, FOLDS)
+        split = assign_folds(y, groups, FOLDS, parts)
         if split is None:
             note = UNCALIBRATED
             return Fitted({**parameters, 'n_labels': n_labels, 'temperature': 1.0}, None, note)
@@ -307,6 +309,7 @@ class SklearnLearner:
             {**parameters, 'n_labels': n_labels, 'temperature': temperature},
             log_softmax(held_out / temperature),
             f'temperature from {split[1]}',
+            temperature=temperature,
         )
 
     @staticmethod

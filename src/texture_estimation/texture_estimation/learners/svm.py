@@ -322,7 +322,12 @@ class SvmRbf:
             )  # fmt: skip
             coupling = fit_coupling(decisions, y, n_labels)
             held_out = coupling(decisions)
-        return Fitted({'machines': asdict(machines), 'coupling': asdict(coupling)}, held_out, note)
+        return Fitted(
+            {'machines': asdict(machines), 'coupling': asdict(coupling)},
+            held_out,
+            note,
+            temperature=coupling.temperature,
+        )
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:

@@ -55,9 +55,11 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *(f'this fraction is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
-        *_uneven(model.decisions.domain.slides),
+        *_uneven(model.acceptance.domain.slides),
         *training.get('tare', []),
-        *filter(None, [model.decisions.error_bound.reason, model.decisions.domain.reach_reason]),
+        *filter(
+            None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
+        ),
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]
