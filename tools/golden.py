@@ -105,7 +105,6 @@ SOURCES = {
             'taxels',
             'taxels-changes',
             'vibration-and-taxels',
-            'hu-log-pca-svm',
         ),
         ('glass', 'brushed_metal', 'ridge_1mm', 'ridge_3mm'),
         'twelve_textures',
@@ -132,7 +131,7 @@ SOURCES = {
     'jamali': Source(('jamali-*',), ('carpet_1', 'sponge_1', 'tile_1', 'vinyl_1'), 'jamali', _plan(0.05, 2.0, 2.2)),
     'hu': Source(('hu-pca-*',), ('linen_1', 'linen_2', 'linen_3', 'linen_5'), 'hu', _plan(0.0255, 1.5, 3.2)),
     'kaboli': Source(
-        ('kaboli-em', 'kaboli-pa', 'kaboli-pa-ovr', 'kaboli-svm', 'kaboli-svm-rbf', 'vibration-and-taxels', 'taxels'),
+        ('kaboli-em', 'kaboli-pa', 'kaboli-svm', 'vibration-and-taxels', 'taxels'),
         ('red_ball', 'rough_ball', 'orange', 'sponge_ball'),
         'kaboli',
         _plan(0.02, 0.7, 2.4),

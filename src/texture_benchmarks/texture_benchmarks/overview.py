@@ -34,10 +34,15 @@ from texture_benchmarks.study import (
 from texture_core.config import find
 from texture_core.types import AnyArray, Array
 from texture_estimation.recipe import FAST_TOPIC
-from texture_estimation.search import single_blas_thread
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, pareto_front
-from texture_evaluation.cross_validation import ChronologicalSplit, Split, cross_validate, split_slides
+from texture_evaluation.cross_validation import (
+    ChronologicalSplit,
+    Split,
+    cross_validate,
+    single_blas_thread,
+    split_slides,
+)
 from texture_evaluation.evaluate import run_model
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_papers.protocol import digest_of

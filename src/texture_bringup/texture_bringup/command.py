@@ -31,7 +31,7 @@ HELP: Mapping[str, Sequence[str]] = {
     'Explore with the running robot': ('explore', 'watch', 'identify', 'stop', 'lift', 'recover', 'reboot'),
     'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
     'Record': ('collect', 'record', 'replay', 'info', 'import', 'segment', 'export'),
-    'Learn': ('train', 'add', 'remove', 'optimise'),
+    'Learn': ('train', 'add', 'remove'),
     'Measure': ('evaluate', 'cross-validate', 'panel', 'experiment', 'benchmark', 'endurance'),
 }
 

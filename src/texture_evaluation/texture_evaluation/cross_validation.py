@@ -8,7 +8,7 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +19,7 @@ from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+from threadpoolctl import threadpool_limits
 
 from texture_core.config import library, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
@@ -26,7 +27,6 @@ from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
-from texture_estimation.search import single_blas_thread
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
@@ -46,6 +46,11 @@ CLUSTER_ADVICE = (
     'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
     'suite'
 )
+
+
+def single_blas_thread() -> AbstractContextManager[Any]:
+    """Keep linear algebra from starting threads of its own within a `with` block: the cores are busy already."""
+    return threadpool_limits(limits=1, user_api='blas')
 
 
 @contextmanager
