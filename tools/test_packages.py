@@ -32,6 +32,7 @@ KEYS = {
     'matplotlib': 'python3-matplotlib',
     'numpy': 'python3-numpy',
     'pytest': 'python3-pytest',
+    'rich': 'python3-rich',
     'scipy': 'python3-scipy',
     'serial': 'python3-serial',
     'sklearn': 'python3-sklearn',

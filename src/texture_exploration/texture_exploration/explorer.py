@@ -420,6 +420,8 @@ class Exploration:
         self.state = ExplorationState(
             stamp_ns, self.exploration_id, request.motion, phase, surface=request.surface, **numbers
         )
+        if phase in ENDED:
+            self.state = replace(self.state, error_code=int(self.outcome.error), lifted=self.outcome.lifted)
         self._on_state(self.state)
 
 
@@ -580,6 +582,7 @@ class Explorer:
         self._home: Vector | None = None
         self._lift_first = True  # nobody knows whether the finger presses
         self._zero_n: Vector | None = None  # what the sensor showed before the first lift, until it is zeroed
+        self.lifted = False  # known to be free of the surface
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = self._released = False
@@ -596,7 +599,7 @@ class Explorer:
         DeviceError
             If it cannot be reached.
         """
-        self._lift_first, self._zero_n = True, None
+        self._lift_first, self.lifted, self._zero_n = True, False, None
         self.arm.close()
         self.arm.connect()
         self._released = False
@@ -625,7 +628,8 @@ class Explorer:
         with self._lock:
             self._released = True
         self._end_motion('the explorer let go of the arm')
-        self._home = None
+        if not self.arm.keeps_start:
+            self._home = None
 
     def now_ns(self) -> int:
         """Return the time on the clock of the states."""
@@ -678,7 +682,7 @@ class Explorer:
                 raise MotionRefused(
                     f"planning '{request.motion}' failed with {told}; mend it there", ExplorationError.INVALID_REQUEST
                 ) from error
-            self._current = exploration
+            self._current, self.lifted = exploration, False
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
             self._thread.start()
             return exploration
@@ -739,7 +743,7 @@ class Explorer:
                 raise MotionRefused(f'the finger was not lifted: {trouble}') from trouble
             finally:
                 self.arm.stop()
-            height_m = self.arm.state().position[2]
+            height_m, self.lifted = self.arm.state().position[2], True
             x_m, y_m, z_m = self._home
             self._home = (x_m, y_m, max(z_m, height_m))  # a finger found pressed is no place to begin at
             return height_m - begin_m
@@ -872,7 +876,8 @@ class Explorer:
             try:
                 plan(request, start, self.touch, self.patch.within(self.limits))
             except MotionRefused as error:
-                raise MotionRefused(f'{error}; the workspace of a request with a start is the surface patch') from error
+                sentence = f'{error}; the workspace of a request with a start is the surface patch'
+                raise MotionRefused(sentence, error.error, error.field) from error
         if self._lift_first:
             if self._zero_n is None or self.arm.zeroed:
                 self._zero_n = self.arm.state().force_vector_n
@@ -894,7 +899,8 @@ class Explorer:
             self._home = None  # the next request begins where the finger is then, as it has to be moved
             raise MotionRefused(
                 f'the start of the motion lies outside the workspace: {outside}; bring the finger inside and take '
-                'control again, or correct the pose of the surface or the limits'
+                'control again, or correct the pose of the surface or the limits',
+                ExplorationError.OUTSIDE_WORKSPACE,
             )
 
     def _check_idle(self) -> None:
@@ -923,7 +929,7 @@ class Explorer:
         try:
             exploration.run(Pacer(PERIOD_S, self._clock))
         finally:
-            self._lift_first = not exploration.outcome.success
+            self._lift_first, self.lifted = not exploration.outcome.success, exploration.outcome.lifted
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
             self.counts['internal_errors'] += exploration.outcome.error is ExplorationError.INTERNAL
             self.counts['late_steps'] += exploration.gaps

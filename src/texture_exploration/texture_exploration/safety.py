@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from texture_core.config import param
-from texture_core.errors import CommandRefused, InvalidParameter, MotionRefused
+from texture_core.errors import CommandRefused, ExplorationError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading, Vector
 
@@ -245,6 +245,11 @@ class SafetyLimits:
         low, high = (getattr(self, limit) if isinstance(limit, str) else limit for limit in (low, high))
         return low, high, unit
 
+    def default(self, name: str, value: float) -> float:
+        """Return the default of a motion, or the nearest value that is allowed here."""
+        low, high, _ = self.range(name)
+        return min(max(value, low), high)
+
     def complete(self, request: ExplorationRequest, defaults: Mapping[str, float]) -> ExplorationRequest:
         """Return a request with the motion's defaults for those of its numbers that are 0.
 
@@ -253,17 +258,23 @@ class SafetyLimits:
         MotionRefused
             If a number is out of its range, or belongs to another motion.
         """
-        numbers: dict[str, Any] = {name: getattr(request, name) or value for name, value in defaults.items()}
+        numbers: dict[str, Any] = {
+            name: getattr(request, name) or self.default(name, value) for name, value in defaults.items()
+        }
         given, request = request, replace(request, **numbers)
         for name in defaults:
             value, (low, high, unit) = getattr(request, name), self.range(name)
             if not low <= value <= high:
                 shown = stated(getattr(given, name), value)
-                raise MotionRefused(f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}')
+                raise MotionRefused(
+                    f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}', field=name
+                )
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
             allowed = f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
-            raise MotionRefused(f'{request.motion}: direction_rad is {request.direction_rad:g}; {allowed}')
+            raise MotionRefused(
+                f'{request.motion}: direction_rad is {request.direction_rad:g}; {allowed}', field='direction_rad'
+            )
         return request
 
     @staticmethod
@@ -277,7 +288,11 @@ class SafetyLimits:
         """
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
-            raise MotionRefused(f'{request.motion} knows no {" and no ".join(given)}; leave it at 0')
+            raise MotionRefused(
+                f'{request.motion} knows no {" and no ".join(given)}; leave it at 0',
+                ExplorationError.UNUSED_FIELD,
+                given[0],
+            )
 
     def free_distance_m(self, start: Vector, direction_rad: float) -> float:
         """Return how far the finger can go from `start` along the surface before it leaves the workspace, m."""
@@ -425,7 +440,9 @@ class SurfacePatch:
         if not (self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m):
             raise MotionRefused(
                 f'{request.motion}: no surface is taught, so a start means nothing; touch the corners of the surface '
-                "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'"
+                "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'",
+                ExplorationError.OUTSIDE_WORKSPACE,
+                'use_start',
             )
         for name, low, high in (
             ('start_x_m', max(limits.x_low_m, self.patch_x_low_m), min(limits.x_high_m, self.patch_x_high_m)),
@@ -434,7 +451,9 @@ class SurfacePatch:
             at = getattr(request, name)
             if not low <= at <= high:  # so NaN is off, too
                 raise MotionRefused(
-                    f'{request.motion}: {name} is {at:g}, off the surface patch; allowed is {low:g} to {high:g} m'
+                    f'{request.motion}: {name} is {at:g}, off the surface patch; allowed is {low:g} to {high:g} m',
+                    ExplorationError.OUTSIDE_WORKSPACE,
+                    name,
                 )
         return request.start_x_m, request.start_y_m, home[2]
 

@@ -104,6 +104,7 @@ class Arm:
     Params: type[Any]
     force_reading = ForceReading.CONTROLLED
     reboots = False
+    keeps_start = False  # nobody else moves it: explorations begin where they did before it was let go
 
     def __init__(self, params: Any) -> None:
         """Take the parameters; nothing is reached yet."""

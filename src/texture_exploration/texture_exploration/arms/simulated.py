@@ -184,6 +184,7 @@ class SimulatedArm(Arm):
     """
 
     Params = SimulatedArmParams
+    keeps_start = True
 
     def __init__(
         self,
