@@ -73,12 +73,12 @@ def _recording(rng: np.random.Generator, material: str, number: int, errors: tup
     grip = 120.0 + 30.0 * number + rng.normal(scale=0.5, size=len(phases))
     channels = np.column_stack([200.0 * (tone * sliding[:, None] + errors_mg), grip]).round(3)
     time_ms = 5e6 + 1000.0 * np.arange(len(phases)) / RATE_HZ + rng.uniform(-jitter_ms, jitter_ms, len(phases))
-    return Recording(f'2031-05-0{number} {material} v20', material, channels, phases, time_ms.round(2))
+    return Recording(f'2031-05-0{number}, {material}, v20', material, channels, phases, time_ms.round(2))
 
 
 MAPPING = """
-# '2031-05-01 linen v20.csv': day, material, speed in mm/s
-files: '{day} {material} v{speed}.csv'
+# '2031-05-01, linen, v20.csv': day, material, speed in mm/s
+files: '{day}, {material}, v{speed}.csv'
 streams:
   signal:
     columns: ['acc_*']

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the tables of figures in the pages from the stored JSON: `python tools/figures.py`; `--check` only compares.
 
+The check fails, too, where a stored experiment of a paper is not of today's code.
+
 A page marks where a table goes, and its rows between the marks are replaced:
 
     <!-- table: NAME -->
@@ -19,6 +21,7 @@ import argparse
 import json
 import re
 import sys
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from statistics import fmean
@@ -93,6 +96,21 @@ def fill(page: str, root: Path) -> str:
     return BLOCK.sub(block, page)
 
 
+def stale(root: Path, digests: Mapping[str, Callable[[], Mapping[str, str]]]) -> list[str]:
+    """Return which stored experiments of papers are not of today's code, scenes, recipes, splits and libraries."""
+    faults = []
+    for name, now in digests.items():
+        path = root / 'docs' / 'charts' / f'{name}.json'
+        if not path.exists():
+            continue
+        stored, today = numbers(path).get('digests', {}), now()
+        changed = [row for row in {**stored, **today} if stored.get(row) != today.get(row)]
+        command = f'texture experiment {name.removesuffix("-tuned")}{" --tune" if name.endswith("-tuned") else ""}'
+        if changed:
+            faults.append(f'{path.name}: changed since it was measured: {"; ".join(changed)}; run {command} --seeds 5')
+    return faults
+
+
 def main(root: Path = ROOT) -> int:
     """Fill the tables of the pages, or check them."""
     parser = argparse.ArgumentParser(description=main.__doc__)
@@ -111,6 +129,10 @@ def main(root: Path = ROOT) -> int:
             faults.append(f'{path.relative_to(root)}: a table is not as stored; run python tools/figures.py')
         elif filled != page:
             path.write_text(filled, encoding='utf-8')
+    if only_check:
+        from texture_papers.catalogue import DIGESTS  # noqa: PLC0415  # takes seconds, and filling tables needs none
+
+        faults += stale(root, DIGESTS)
     unused = {path.stem for path in (root / 'docs' / 'tables').glob('*.md')} - used
     faults += [f'docs/tables/{name}.md: no page shows this table' for name in sorted(unused)]
     print('\n'.join(faults), end='\n' if faults else '')

@@ -207,7 +207,8 @@ def experiment(name: str, root: Path) -> str:
     content = json.loads(path.read_text(encoding='utf-8')) if path.is_file() else {'numbers': {}}
     numbers = content['numbers']
     if numbers.get('digests') != DIGESTS[name]():
-        return f'Not measured since something of it changed. Run `texture experiment {name} --seeds 5`.\n'
+        command = f'{name.removesuffix("-tuned")}{" --tune" if name.endswith("-tuned") else ""}'
+        return f'Not measured since something of it changed. Run `texture experiment {command} --seeds 5`.\n'
     seeds = numbers.get('seeds', [numbers.get('seed', 0)])
     count = f'{len(seeds)} seeds' if len(seeds) > 1 else 'one seed'
     rows = [
@@ -232,11 +233,11 @@ def experiment(name: str, root: Path) -> str:
     anchor = difficulty(numbers.get('difficulty') or {})
     unit = 100.0 if numbers.get('tasks') else 1.0  # points of a share, or grades
     data = f'Data: {content["data"]}. Split: {content["split"]}.'
-    return f'{data}\n\n{table}\n\n{anchor}\n{_findings(numbers["findings"], count, unit)}\n'
+    return f'{data}\n\n{table}\n\n{anchor}\n{_findings(numbers["findings"], seeds[0], count, unit)}\n'
 
 
-def _findings(found: list[dict[str, Any]], seeds: str, unit: float) -> str:
-    rows = [f'| finding | seed 0 | decided by the mean over {seeds} (95 %) | verdict |', '|---|---|---|---|']
+def _findings(found: list[dict[str, Any]], seed: int, seeds: str, unit: float) -> str:
+    rows = [f'| finding | seed {seed} | decided by the mean over {seeds} (95 %) | verdict |', '|---|---|---|---|']
     for finding in found:
         decides = signed(finding.get('over_seeds', finding['interval']), unit)
         claim = finding['claim'].replace('|', '\\|')  # of |s|
@@ -261,13 +262,8 @@ def difficulty(chosen: dict[str, Any]) -> str:
     if not chosen:
         return ''
     shortfall = f'; {chosen["shortfall"]}' if chosen.get('shortfall') else ''
-    parts = [
-        f'{task}: {percent(part["here"])}, in the paper {percent(part["paper"])}'
-        for task, part in chosen.get('parts', {}).items()
-    ]
-    along = f'; set along with it: {"; ".join(parts)}' if parts else ''
     setting = f'Anchor (no finding): the scene setting "{chosen["setting"]}" was chosen by {chosen["set_by"]}'
-    return f'{setting}{shortfall}{along}.\n'
+    return f'{setting}{shortfall}.\n'
 
 
 def grades(root: Path) -> str:

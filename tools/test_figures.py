@@ -34,6 +34,7 @@ def root(tmp_path: Path) -> Path:
 def run(root: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     """Run the tool as a person does."""
     monkeypatch.setattr(sys, 'argv', ['figures.py', *arguments])
+    monkeypatch.setattr(figures, 'stale', lambda *_: [])  # minutes on a busy machine: `make check` has it
     return figures.main(root)
 
 
@@ -79,6 +80,18 @@ def test_a_table_that_is_missing_or_not_shown_is_a_fault(root: Path, monkeypatch
     (root / 'docs/tables/two.md').unlink()
     (root / 'docs/tables/one.md').unlink()
     assert run(root, monkeypatch, '--check') == 1
+
+
+def test_a_stored_experiment_of_other_code_than_todays_is_a_fault_that_gives_its_rows_and_the_command(
+    root: Path,
+) -> None:
+    now = {'task, one': 'abcd1234', 'versions': 'numpy 2'}
+    stored = {**now, 'task, one': 'ffff0000', 'task, gone': 'abcd1234'}
+    (root / 'docs/charts/hu-tuned.json').write_text(json.dumps({'numbers': {'digests': stored}}))
+    [fault] = figures.stale(root, {'hu-tuned': lambda: now, 'not stored': dict})
+    assert 'task, one; task, gone; run texture experiment hu --tune --seeds 5' in fault
+    (root / 'docs/charts/jamali.json').write_text(json.dumps({'numbers': {'digests': now}}))
+    assert figures.stale(root, {'jamali': lambda: now}) == []
 
 
 def test_every_table_of_the_pages_is_the_stored_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,15 +53,14 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.mark.benchmark
 def test_the_page_shows_the_file_that_its_script_writes(said: str) -> None:
-    first = Path('my_csv/2031-05-01 linen v20.csv').read_text().split('\n')[:4]
+    first = Path('my_csv/2031-05-01, linen, v20.csv').read_text().split('\n')[:4]
     assert '\n'.join(first) in PAGE
 
 
 @pytest.mark.benchmark
 def test_the_page_shows_what_the_import_prints(said: str) -> None:
     shown = TUTORIAL.split('```text\n')[2].split('```')[0]
-    assert shown in said
-    assert 'signal: 9000 samples at 100 Hz; 0 samples lost in 0 gaps, 0 rows out of order left out' in said
+    assert said.count(shown) == 2  # once by --dry-run
 
 
 @pytest.mark.benchmark
@@ -70,6 +69,7 @@ def test_a_reader_ends_with_figures_charts_and_a_file(said: str) -> None:
         assert Path(name).stat().st_size > 200, name
     assert "'mine' against 'fast' on 36 slides" in said
     assert '36 (250, 3)' in said
+    assert "36 ['cork_thick', 'linen', 'oak board']" in said
 
 
 @pytest.mark.parametrize('text', BLOCK.findall(REFERENCE))

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_benchmarks import overview
-from texture_benchmarks.borders import recipe_of
+from texture_benchmarks import overview, peers
 from texture_benchmarks.catalogue import BENCHMARKS
-from texture_benchmarks.overview import ALL_CHANNELS, CLASSIFIERS, RECIPES, VIBRATION, jobs_of, right_over_time, spread
+from texture_benchmarks.overview import ALL_CHANNELS, RECIPES, VIBRATION, jobs_of, spread
+from texture_benchmarks.peers import CLASSIFIERS, recipe_of, right_over_time
 from texture_benchmarks.study import APART_S, BenchmarkOptions, trained_apart
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import FAST_TOPIC, load_recipe
@@ -39,8 +39,8 @@ def test_only_the_distance_of_training_windows_differs_from_the_released_recipe(
 
 
 def test_peers_are_left_out_where_their_packages_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    for spec, names in ((None, set()), ('there', set(CLASSIFIERS))):
-        monkeypatch.setattr(overview, 'find_spec', lambda _, spec=spec: spec)
+    for there, names in ((False, set()), (True, set(CLASSIFIERS))):
+        monkeypatch.setattr(peers, 'available', lambda there=there: there)
         assert {job.name for job in jobs_of(quick=False)} & set(CLASSIFIERS) == names
 
 

@@ -47,11 +47,11 @@ def test_every_band_holds_the_power_of_its_frequencies() -> None:
 
 
 def test_a_term_that_decides_is_found_and_one_that_does_nothing_changes_nothing() -> None:
-    scene = two_ridges(noise={'fast_count': 300.0}, drift={'count_per_sqrt_s': 1e-6})
+    scene = two_ridges(noise={'fast_count': 300.0}, unevenness={'relative': 1e-6})
     terms = ablate(scene, TOUCHING, 80, 4, 0)
     easier = terms['noise']['accuracy_without']
     assert easier['change'] > max(0.05, easier['half_interval'])
-    assert abs(terms['drift']['accuracy_trained_without']['change']) < 0.05
+    assert abs(terms['unevenness']['accuracy_trained_without']['change']) < 0.05
 
 
 def test_what_grows_with_the_force_stays_at_its_mean_when_removed_and_comes_back_the_same(monkeypatch) -> None:

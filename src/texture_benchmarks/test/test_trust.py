@@ -6,27 +6,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_benchmarks.disturbances import (
-    ROWS,
-    SCENE,
-    TRAINED,
-    VIBRATION,
-    DisturbanceSweep,
-    at_other_speed,
-    disturbed,
-    simulate,
-)
 from texture_benchmarks.study import BenchmarkOptions
 from texture_benchmarks.trust import (
     RECIPES,
+    ROWS,
+    SCENE,
+    TRAINED,
     TRAINED_SLIDES,
     UNDISTURBED,
+    VIBRATION,
+    DisturbanceSweep,
     Outcome,
+    at_other_speed,
     breakdown,
     breakdown_strengths,
     breakdowns,
+    disturbed,
     ordered,
     run,
+    simulate,
 )
 from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
 from texture_estimation.acceptance import slides_needed
@@ -128,7 +126,7 @@ def test_a_loss_stays_a_loss() -> None:
 
 @pytest.fixture(scope='module')
 def slide() -> LabelledSlide:
-    return simulate(TRAINED, 1, np.random.default_rng(0), told=True)[0]
+    return simulate(TRAINED, 1, np.random.default_rng(0), conditions=True)[0]
 
 
 @pytest.fixture(params=ROWS)
@@ -191,8 +189,8 @@ def test_the_quick_form_on_simulated_slides_gives_figures_of_all_compared(tmp_pa
         assert outcome['early_right'] + outcome['early_wrong'] <= outcome['slides']
         low, high = outcome['interval']
         assert low <= outcome['label_right'] / outcome['slides'] <= high
-    told = result.numbers['told_outside_what_was_trained']['fast']
-    assert told == {'undisturbed, simulated': 0.0, 'circle, simulated': 1.0}
+    outside = result.numbers['rejected_as_outside_training']['fast']
+    assert outside == {'undisturbed, simulated': 0.0, 'circle, simulated': 1.0}
 
 
 @pytest.mark.parametrize('name', RECIPES)

@@ -11,15 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from texture_benchmarks import (
-    borders,
-    finger_check,
+    generalisation,
     latency,
     learning,
     motion,
     next_motion,
     overview,
     papers,
-    places,
     scale,
     scenes,
     trust,
@@ -33,11 +31,9 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     # accuracy over sliding time and over computing time: ours, the papers' and peers, in one run
     'overview': overview.run,
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
-    'borders': borders.run,  # at another place, on another day, with another finger
-    'places': places.run,  # trained at six places against six slides of one track, simulated samples that vary
-    'finger_check': finger_check.run,  # another finger and another day, before and after `texture check`
+    'generalisation': generalisation.run,  # against the distance from what was trained: place, day, finger, run
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
-    'trust': trust.run,  # where recognition fails: how slides end under disturbances and across borders
+    'trust': trust.run,  # where recognition fails: how slides end under disturbances and over unknown materials
     'roughness': latency.run_roughness,  # from window to grade
     'learning': learning.run,  # trained slide by slide against trained again on the same slides
     'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
@@ -46,7 +42,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
 }
 # What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes or more.
-LONG = frozenset({'borders', 'finger_check', 'motion', 'overview', 'scale', 'scenes', 'trust'})
+LONG = frozenset({'generalisation', 'motion', 'overview', 'scale', 'scenes', 'trust'})
 
 Act = Callable[[str], int]  # runs a study by its name and returns the exit code of its process
 

@@ -4,13 +4,10 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
@@ -19,7 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.transforms import Bbox
 
-from texture_benchmarks.borders import recipe_of
+from texture_benchmarks import peers
+from texture_benchmarks.peers import CNN, MINIROCKET, QUANT, SVC, recipe_of, right_over_time, windows_of
 from texture_benchmarks.study import (
     DATA,
     QUICK_MATERIALS,
@@ -31,25 +29,28 @@ from texture_benchmarks.study import (
     share_interval,
     trained_apart,
 )
-from texture_core.config import find
 from texture_core.types import AnyArray, Array
 from texture_estimation.recipe import FAST_TOPIC
-from texture_estimation.search import single_blas_thread
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, pareto_front
-from texture_evaluation.cross_validation import ChronologicalSplit, Split, cross_validate, split_slides
+from texture_evaluation.cross_validation import (
+    ChronologicalSplit,
+    Split,
+    cross_validate,
+    single_blas_thread,
+    split_slides,
+)
 from texture_evaluation.evaluate import run_model
-from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_papers.protocol import digest_of
-from texture_recordings.dataset import LabelledSlide, SlideDataset, cut_slide
+from texture_recordings.dataset import SlideDataset, cut_slide
 
 VIBRATION, ALL_CHANNELS = 'vibration', 'all channels'
 OURS, PAPERS, PEERS = 'this suite', 'papers, word for word', 'general classifiers'
 RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
     VIBRATION: {
         PAPERS: ('hu-pca-svm', 'ets-fine-svm', 'ets-linear-svm', 'jamali-naive-bayes-5'),
-        OURS: ('default', 'fast', 'onset', 'any-place'),
-        PEERS: ('SVC on log bands',),
+        OURS: ('default', 'fast', 'any-place'),
+        PEERS: (SVC,),
     },
     ALL_CHANNELS: {
         OURS: ('vibration-and-taxels', 'any-place-and-taxels', 'taxels-changes'),
@@ -59,44 +60,13 @@ RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
 QUICK_RECIPES = {'default', 'jamali-naive-bayes-5', 'kaboli-pa', 'vibration-and-taxels'}
 AUTHORS = {'ets': 'Roberge et al.', 'hu': 'Hu et al.', 'jamali': 'Jamali & Sammut', 'kaboli': 'Kaboli et al.'}
 FIRST = {False: 30 / 40, True: 4 / 6}  # fraction of the slides of each material that trains, by whether it is quick
+# The features of 23 channels take QUANT gigabytes, and a tenth of a second each.
+OF_ALL_CHANNELS = (MINIROCKET, CNN)
+PEERS_SHOWN = (SVC, MINIROCKET)  # over the sliding time: QUANT lies between them
 AT_S = 3.0  # the longest window of a paper is complete
 TIMED_SLIDES, LATENCY_ROUNDS = 40, 5  # the round with the lowest median counts, as other work only adds
 DATA_SET = f'{DATA["biotac20"]}; PAC at 2.2 kHz, and with all channels 19 electrodes and the slow ones'
 SPLIT = 'by time: trained on slides 1-30 of each surface, tested on slides 31-40; the same track'
-
-# --------------------
-# Peers: general classifiers of time series, from packages of their own.
-
-PACKAGES = 'TEXTURE_PEERS'  # environment variable: the folder of the packages of the peers
-NEEDED = ('aeon', 'torch')
-CLASSIFIERS: Mapping[str, str] = {
-    'MiniRocket': 'aeon.classification.convolution_based:MiniRocketClassifier',  # Dempster et al. 2021
-    'QUANT': 'aeon.classification.interval_based:QUANTClassifier',  # Dempster et al. 2024
-}
-OF_ALL_CHANNELS = ('MiniRocket',)  # the features of 23 channels take the other gigabytes, and a tenth of a second each
-PEERS_SHOWN = ('SVC on log bands', 'MiniRocket')  # over the sliding time: QUANT lies between them
-PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.5)
-FIRST_COUNTS = 1e-6  # of a vote: of equal counts, the label that was voted for first wins
-
-
-def windows_of(slide: LabelledSlide, topics: Sequence[str]) -> AnyArray:
-    """Return the windows of a slide, (n, n_channels, n_samples); slow channels keep each value until the next."""
-    signals = {topic: slide.signals[topic] for topic in topics}
-    found = []
-    for event in cut_recording(signals, slide.states, PEER_WINDOWS):
-        if isinstance(event, CutWindow):
-            count = len(event.windows[topics[0]].samples)
-            own = [event.windows[topic].samples for topic in topics]
-            found.append(np.concatenate([one[np.arange(count) * len(one) // count] for one in own], axis=1).T)
-    return np.stack(found).astype(np.float32)
-
-
-def right_over_time(votes: Array, code: int) -> list[bool]:
-    """Return whether the sum of the votes (n_windows, n_labels) is right after the first window, the second, and on."""
-    weights = 1.0 - FIRST_COUNTS * np.arange(len(votes))
-    right: list[bool] = (np.cumsum(votes * weights[:, None], axis=0).argmax(axis=1) == code).tolist()
-    return right
-
 
 # --------------------
 # One run.
@@ -125,8 +95,6 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     with imported(options, 'biotac20', *some) as bags:
         dataset = SlideDataset.from_bags(bags)
     split = Split('by time', ChronologicalSplit(FIRST[options.quick]))
-    if folder := os.environ.get(PACKAGES):
-        sys.path.append(folder)  # behind those of the suite, which stay as they are
     jobs = jobs_of(options.quick)
     tried = dict(zip(jobs, map_forked(partial(_try, dataset, split, options.seed), jobs), strict=True))
     with single_blas_thread():
@@ -152,9 +120,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 def jobs_of(quick: bool) -> list[_Job]:
     """Return what is tried, the longest first; peers only where their packages are."""
     # The first recipe takes the most memory: it has a worker that nothing has used before.
-    there = all(find_spec(name) for name in NEEDED) and not quick
-    by_channels = {VIBRATION: tuple(CLASSIFIERS), ALL_CHANNELS: OF_ALL_CHANNELS}
-    peers = [_Job(channels, PEERS, name) for channels, names in by_channels.items() for name in names if there]
+    there = not quick and peers.available()
+    by_channels = {VIBRATION: (MINIROCKET, QUANT, CNN), ALL_CHANNELS: OF_ALL_CHANNELS}
+    others = [_Job(channels, PEERS, name) for channels, names in by_channels.items() for name in names if there]
     recipes = [
         _Job(channels, kind, name)
         for channels, kinds in RECIPES.items()
@@ -162,11 +130,11 @@ def jobs_of(quick: bool) -> list[_Job]:
         for name in names
         if not quick or name in QUICK_RECIPES
     ]
-    return [*recipes[:1], *peers, *recipes[1:]]
+    return [*recipes[:1], *others, *recipes[1:]]
 
 
 def _try(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
-    return _try_peer(dataset, split, seed, job) if job.name in CLASSIFIERS else _try_recipe(dataset, split, job)
+    return _try_peer(dataset, split, seed, job) if job.name in peers.CLASSIFIERS else _try_recipe(dataset, split, job)
 
 
 def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
@@ -213,7 +181,7 @@ def _try_peer(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tri
     windows = [windows_of(slide, topics) for slide in dataset]
     [(trained, tested)] = split_slides(dataset, split.splitter, split.groups)
     start = time.process_time()
-    classifier: Any = find({}, CLASSIFIERS[job.name], 'estimator')(random_state=seed)
+    classifier = peers.classifier(job.name, seed)
     labels = np.repeat(dataset.labels[trained], [len(windows[row]) for row in trained])
     classifier.fit(np.concatenate([windows[row] for row in trained]), labels)
     taken_s = time.process_time() - start
@@ -222,7 +190,7 @@ def _try_peer(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tri
         votes, code = classifier.predict_proba(windows[row]), classifier.classes_.tolist().index(dataset.labels[row])
         alone += (votes.argmax(axis=1) == code).tolist()
         over_time.append(right_over_time(votes, code))
-    hop_s = PEER_WINDOWS.hop_s
+    hop_s = peers.WINDOWS.hop_s
     right = {round(hop_s * number, 6): list(own) for number, own in enumerate(zip(*over_time, strict=False), 1)}
     figures = {
         'kind': job.kind,

@@ -5,25 +5,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_benchmarks.borders import (
-    EARLIER,
-    LATER,
-    PLACE,
-    SAME,
-    BorderTrial,
-    across_places,
-    figures,
-    tried,
-)
-from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported
+from texture_benchmarks.generalisation import Answer, Trial, TrialSet, answers_of, figures, names_of
+from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked
 from texture_core.types import Array
 from texture_estimation.learners.learner import of_examples
 from texture_estimation.recipe import Recipe, load_recipe
@@ -47,6 +39,8 @@ RECIPES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 OF_TWO = ('kaboli-svm', 'kaboli-pa', 'kaboli-pa, 200 passes', 'kaboli-em')
 QUICK = ('ets-linear-svm-vote', 'kaboli-pa')
 PLACES = ('1/2', '2/2')
+EARLIER, LATER = '21-30', '31-40'
+SAME, PLACE = 'same track', 'other place'
 
 
 def recipe_of(name: str) -> Recipe:
@@ -72,17 +66,25 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     earlier, later = ('1-8', '9-12') if options.quick else (EARLIER, LATER)
     numbers: dict[str, dict[str, Any]] = {SAME: {}, PLACE: {}}
     names = QUICK if options.quick else tuple(RECIPES)
-    trials = [BorderTrial('biotac20 halves', names, *own) for own in _halves(slides, earlier, later)]
-    for (border, _, name), answers in tried(trials, recipe_of).items():
-        known = figures(answers)
-        numbers[border][name] = {
+    trials = []
+    for place, other in (PLACES, PLACES[::-1]):
+        tested = {('', shift): names_of(slides, later, where) for shift, where in ((SAME, place), (PLACE, other))}
+        trials.append(Trial(place, names_of(slides, earlier, place), tested))
+    halves = TrialSet('halves of biotac20', names, slides, trials)
+    found: defaultdict[tuple[str, str], list[Answer]] = defaultdict(list)
+    for answered in map_forked(partial(answers_of, halves, options.seed, recipe_of), names):
+        for (_, shift, name, _), answers in answered:
+            found[shift, name] += answers
+    for (shift, name), answers in found.items():
+        ends = figures(answers)
+        numbers[shift][name] = {
             'slides': len(answers),
-            'right': known['right'],
-            'interval': known['interval']['right'],
+            'right': ends['accuracy'],
+            'interval': ends['interval']['accuracy'],
         }
     for name in (one for one in OF_TWO if one in names):
-        for border, right in _of_two(slides, earlier, later, recipe_of(name)).items():
-            numbers[border][f'{name}, two fingers'] = right
+        for shift, right in _of_two(slides, earlier, later, recipe_of(name)).items():
+            numbers[shift][f'{name}, two fingers'] = right
     return BenchmarkResult(
         name='papers',
         measured=run.__doc__,
@@ -92,29 +94,21 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _halves(
-    slides: SlideDataset, earlier: str, later: str
-) -> Iterator[tuple[SlideDataset, Mapping[str, SlideDataset]]]:
-    """Yield what is trained, and what is tested by border, for each half of the track."""
-    for place in PLACES:
-        trained = slides.select(earlier, where=lambda one, place=place: one.place == place)  # type: ignore[misc]
-        yield trained, across_places(slides.select(later), trained)
-
-
 def _of_two(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> Mapping[str, dict[str, Any]]:
     """Return the fraction of right pairs of slides, each pair joined to one vector."""
     right: defaultdict[str, list[tuple[str, bool]]] = defaultdict(list)
-    for trained, tested in _halves(slides, earlier, later):
+    for place, other in (PLACES, PLACES[::-1]):
+        trained = slides.take(np.isin(slides.names, names_of(slides, earlier, place)))
         X, labels = _joined(trained.features(recipe.feature_set))
         names, codes = np.unique(labels, return_inverse=True)
         learner = of_examples(recipe.learner, [f'{n}' for n in range(X.shape[1])], names.tolist())
         predictor = learner.predictor(learner.fit(X, codes, np.arange(len(codes))).parameters)
-        for border, others in tested.items():
+        for shift, half in ((SAME, place), (PLACE, other)):
+            others = slides.take(np.isin(slides.names, names_of(slides, later, half)))
             asked, true = _joined(others.features(recipe.feature_set))
-            said = names[predictor(asked).argmax(axis=1)]
-            half = others[0].place
-            right[border] += [(f'{label} {half}', bool(label == one)) for label, one in zip(true, said, strict=True)]
-    return {border: _share(pairs) for border, pairs in right.items()}
+            named = names[predictor(asked).argmax(axis=1)]
+            right[shift] += [(f'{label} {half}', bool(label == one)) for label, one in zip(true, named, strict=True)]
+    return {shift: _share(pairs) for shift, pairs in right.items()}
 
 
 def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:

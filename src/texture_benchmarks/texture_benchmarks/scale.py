@@ -29,9 +29,9 @@ from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.learners.learner import group_means
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.search import single_blas_thread
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
+from texture_evaluation.cross_validation import single_blas_thread
 from texture_features.feature_set import LabelledFeatures
 from texture_recordings.dataset import SlideDataset
 

@@ -23,8 +23,7 @@ from scipy.stats import binomtest
 
 from texture_core.errors import DeviceError, InvalidData
 from texture_estimation.recipe import Recipe
-from texture_estimation.search import single_blas_thread
-from texture_evaluation.cross_validation import interval
+from texture_evaluation.cross_validation import interval, single_blas_thread
 from texture_recordings.public_sets import IMPORTS
 
 CPU_INFO = Path('/proc/cpuinfo')

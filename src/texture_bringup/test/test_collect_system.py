@@ -73,7 +73,7 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
 
     operator.set_parameters('emulator', {'surface': 'sandpaper_240'})
     end, other = collect_surface(operator, 'sandpaper', folder / 'bags', QUICK, lambda text, slides: told.append(text))
-    assert 'left-out places right' in end.message, end.message
+    assert 'left-out places correct' in end.message, end.message
     train_from_bags('fast', [bag, other], out=folder / 'two')
 
 

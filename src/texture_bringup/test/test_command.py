@@ -62,7 +62,7 @@ def test_ros2_run_finds_the_command() -> None:
     assert "did you mean 'train'?" in done.stderr
 
 
-@pytest.mark.parametrize('arguments', [[], ['scene', '--help']])
+@pytest.mark.parametrize('arguments', [[], ['train', '--help']])
 def test_a_reader_who_has_seen_enough_ends_the_command_quietly(arguments) -> None:
     read, write = os.pipe()
     os.close(read)
@@ -95,9 +95,6 @@ def test_every_sub_command_explains_itself(name, capsys) -> None:
         (['launch', 'emulator', 'surface'], 'write NAME:=VALUE'),
         (['launch', 'replay'], 'give bag:=VALUE'),
         (['replay', 'my_bag', '--rate', 'nan'], '--rate is nan; allowed is 0.01 to 1000.0'),
-        (['scene', 'ets_lnear'], "no scene 'ets_lnear'; did you mean 'ets_linear'?"),
-        (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),
-        (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
         (['identify', 'm', '--most', '0'], '--most is 0'),
         (['identify', '/nowhere'], "there is no model '/nowhere'"),
         (['identify', '/nowhere.npz'], "there is no model '/nowhere.npz'"),
@@ -117,12 +114,6 @@ def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:
     assert 'ip:=$(var devices)/ur' in shown
     assert 'surface:=glass' in shown
     assert shown.count('devices:=') == 1
-
-
-def test_a_scene_is_drawn_and_explained(capsys, tmp_path) -> None:
-    assert main(['scene', 'ets_linear', 'grid_1', '--duration', '0.2', '-o', str(tmp_path / 'grid.png')]) == 0
-    assert (tmp_path / 'grid.png').read_bytes().startswith(b'\x89PNG')
-    assert 'surfaces: ridge_1, ridge_2a, ridge_2b, grid_1' in capsys.readouterr().out
 
 
 def test_the_version_is_that_of_the_package(capsys):

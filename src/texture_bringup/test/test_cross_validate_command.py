@@ -31,7 +31,7 @@ def test_a_recipe_is_cross_validated_from_the_command_line(bags: Path, tmp_path:
     arguments = ['cross-validate', 'stratified:2', 'peaks-naive-bayes', str(bags), '--json', str(figures)]
     assert main(arguments) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "recipe 'peaks-naive-bayes', split stratified:2: 2 surfaces; border: same track"
+    assert lines[0] == "recipe 'peaks-naive-bayes', split stratified:2: 2 surfaces; same track"
     assert [line.split()[0] for line in lines[2:5]] == ['1', '2', 'all']
     written = json.loads(figures.read_text())
     assert written['n_slides'] == 8
@@ -114,13 +114,3 @@ def test_two_workers_of_a_cluster_give_the_figures_of_one_process(bags: Path, tm
     with cluster(tmp_path, 2, with_suite=True) as address:
         assert main([*arguments, str(files[1]), '--dask', address]) == 0
     assert files[0].read_text() == files[1].read_text()
-
-
-@pytest.mark.benchmark
-def test_a_cluster_of_two_workers_searches_as_one_core_does(bags: Path, tmp_path: Path) -> None:
-    recipes = [tmp_path / name for name in ('one.yaml', 'cluster.yaml')]
-    size = ['--population', '4', '--generations', '2', '--halves', '2']
-    with cluster(tmp_path, 2, with_suite=True) as address:
-        for file, where in zip(recipes, (['--jobs', '1'], ['--dask', address]), strict=True):
-            assert main(['optimise', 'ets-linear-svm', str(bags), '-o', str(file), *size, *where]) == 0
-    assert recipes[0].read_text() == recipes[1].read_text()

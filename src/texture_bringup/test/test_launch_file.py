@@ -1,5 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+import os
 import re
 from pathlib import Path
 
@@ -55,6 +56,18 @@ def test_a_node_can_depend_on_whether_an_argument_is_given(launch, model, starte
 def test_a_required_argument_must_be_given(launch) -> None:
     with pytest.raises(InvalidLaunch, match='give bag:=VALUE'):
         launch('<arg name="bag"/>')
+
+
+@pytest.mark.parametrize('name', ['model', 'device'])
+def test_an_argument_that_names_a_pipe_is_refused_at_once_unless_it_is_a_device(launch, name) -> None:
+    pipe = launch.folder / 'pipe'
+    os.mkfifo(pipe)
+    elements = f'<arg name="{name}"/>'
+    if name == 'device':
+        assert launch(elements, device=str(pipe)) == []
+        return
+    with pytest.raises(InvalidLaunch, match=r"argument 'model' is '.*pipe', which is no regular file"):
+        launch(elements, model=str(pipe))
 
 
 def test_an_argument_outside_its_choices_is_refused(launch) -> None:

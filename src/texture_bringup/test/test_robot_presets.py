@@ -17,7 +17,7 @@ from texture_core.errors import InvalidLaunch, UnknownName
 from texture_exploration.arms.arm import SurfacePoseParams
 from texture_exploration.arms.in_hand import InHandParams
 from texture_exploration.arms.rails import RailsParams
-from texture_exploration.arms.ros_controllers import RosControllersParams
+from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.arms.ur import UrArmParams
 from texture_exploration.safety import SafetyLimits, SignalWatchParams
 from texture_exploration.stages import TouchParams

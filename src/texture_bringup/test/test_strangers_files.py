@@ -40,7 +40,6 @@ from texture_estimation.roughness import (
     read_grades,
     train_grades,
 )
-from texture_estimation.search import RecipeSpace, read_scores, write_scores
 from texture_estimation.training import train
 from texture_evaluation.panel import read_ratings
 from texture_exploration.arms.hand import load_profile
@@ -141,10 +140,6 @@ def make_wav(folder: Path) -> None:
     wavfile.write(folder / 'good.wav', 1000, samples)
 
 
-def make_checkpoint(folder: Path) -> None:
-    write_scores(folder / 'good.json', 'abc', {(1, 2): 0.5})
-
-
 def make_biotac(folder: Path) -> None:
     rng = np.random.default_rng(5)
     arrays = {
@@ -226,9 +221,6 @@ READERS = {
     'state': Reader(make_message(STATE), read_message(ExplorationState), ('message',)),
     'recipe': text_file('texture_estimation', 'config/recipes/vibration-and-taxels.yaml', load_recipe),
     'roughness recipe': text_file('texture_estimation', 'config/roughness/roughness.yaml', load_roughness_recipe),
-    'search space': text_file(
-        'texture_estimation', 'config/search/mlp.yaml', lambda path: RecipeSpace.load(path, load_recipe('default'))
-    ),
     'scene': text_file('texture_simulation', 'config/scenes/twelve_textures.yaml', load_scene),
     'hand profile': text_file('texture_exploration', 'config/hands/leap.yaml', load_profile),
     'preset': text_file('texture_papers', 'config/presets/ets-linear.yaml', load_preset),
@@ -239,7 +231,6 @@ READERS = {
         'texture_bringup', 'launch/emulator.launch.xml', lambda path: all_arguments(Path(path), {})
     ),
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
-    'checkpoint': Reader(make_checkpoint, lambda folder: read_scores(folder / 'good.json', 'abc'), ('good.json',)),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
     'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
     **{f'recording {ending}': recording(ending) for ending in ('csv', 'npy', 'npz')},

@@ -27,12 +27,12 @@ from texture_core.config import find
 GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 # In what order the help shows the commands; those of other packages come last.
 HELP: Mapping[str, Sequence[str]] = {
-    'Start': ('demo', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
-    'Explore with the running robot': ('explore', 'identify', 'stop', 'lift', 'recover', 'reboot'),
+    'Start': ('demo', 'doctor', 'list', 'launch', 'dashboard', 'activate', 'deactivate', 'set'),
+    'Explore with the running robot': ('explore', 'watch', 'identify', 'stop', 'lift', 'recover', 'reboot'),
     'Prepare': ('tare', 'touch-surface', 'forget-touches', 'check'),
-    'Record': ('collect', 'record', 'replay', 'import', 'segment', 'export'),
-    'Learn': ('train', 'add', 'remove', 'optimise'),
-    'Measure': ('evaluate', 'cross-validate', 'panel', 'scene', 'experiment', 'benchmark', 'endurance'),
+    'Record': ('collect', 'record', 'replay', 'info', 'import', 'segment', 'export'),
+    'Learn': ('train', 'add', 'remove'),
+    'Measure': ('evaluate', 'cross-validate', 'panel', 'experiment', 'benchmark', 'endurance'),
 }
 
 

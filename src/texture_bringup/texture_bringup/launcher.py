@@ -581,8 +581,20 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
     return given
 
 
+def _refuse_special(given: Mapping[str, str]) -> None:
+    """Refuse an argument that names what nodes would wait for or read without end; a device may be given as one."""
+    for name, value in given.items():
+        path = Path(value).expanduser()
+        if '/' not in value or 'device' in name or not path.exists() or path.is_file() or path.is_dir():
+            continue
+        raise InvalidLaunch(
+            f"argument '{name}' is '{value}', which is no regular file and no folder; give the path of one"
+        )
+
+
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
     """Return the nodes that a launch file asks for, in its order."""
+    _refuse_special(given)
     reader = _Reader()
     reader.read_file(path, Scope(dict(given), dict(environment)))
     for name in given:

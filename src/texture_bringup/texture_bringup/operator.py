@@ -9,10 +9,12 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import TracebackType
 from typing import Any
 
 from action_msgs.msg import GoalStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import ParameterType
@@ -23,9 +25,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
+from rclpy.utilities import get_rmw_implementation_identifier
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
+from texture_bringup.feed import Feed
 from texture_core.cli import task
 from texture_core.config import unknown_name
 from texture_core.errors import (
@@ -36,8 +40,23 @@ from texture_core.errors import (
     MotionAborted,
     TextureError,
 )
-from texture_core.ros import FEATURE_QOS, SENSOR_QOS, STATE_QOS, from_msg, to_msg
+from texture_core.ros import (
+    FEATURE_QOS,
+    LEVELS,
+    SENSOR_QOS,
+    STATE_QOS,
+    from_msg,
+    has_ended,
+    quality_of_service,
+    to_msg,
+)
 from texture_core.types import ExplorationRequest, ExplorationState, FeatureVector, RoughnessEstimate, TextureEstimate
+
+
+def middleware() -> str:
+    """Return the name of the implementation of ROS that is used."""
+    return str(get_rmw_implementation_identifier())
+
 
 # --------------------
 # Wait in a coroutine for what ROS answers in its own thread.
@@ -91,9 +110,39 @@ def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
 
 
 # --------------------
+# The messages of the nodes in a namespace, to what shows them.
+
+
+def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> None:
+    """Let a feed take what is published from now on; `on_bad` is called with what contradicts itself."""
+
+    def taking(take: Callable[[Any], None]) -> Callable[[Any], None]:
+        def on_message(message: Any) -> None:
+            try:
+                take(from_msg(message))
+            except InvalidData as error:
+                on_bad(error)
+
+        return on_message
+
+    for topic, (kind, take) in feed.topics.items():
+        node.create_subscription(getattr(msg, kind), topic, taking(take), quality_of_service(topic))
+
+
+def note_diagnostics(node: Node, feed: Feed, message: DiagnosticArray) -> None:
+    """Give the statuses of the nodes in the namespace of `node` to a feed."""
+    ours = node.get_namespace().rstrip('/') + '/'
+    for status in message.status:
+        if status.name.startswith(ours):
+            level, name = LEVEL_NAMES.get(status.level, 'ERROR'), status.name.removeprefix(ours)
+            feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
+
+
+# --------------------
 # What an operator does with the running nodes: explore, stop, set parameters.
 
 STEP_S = 0.1
+LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
@@ -426,6 +475,16 @@ class Operator:
     def remove_last_added(self, deadline_s: float = 30.0) -> str:
         """Let the classifier remove the slide that was added last; return what happened. Raises as `add` does."""
         return str(self._ask_classifier(Trigger, 'classifier/remove_last_added', Trigger.Request(), deadline_s).message)
+
+    def watch(self, feed: Feed, show: Callable[[], None]) -> None:
+        """Let a feed take what the nodes publish, and call `show` after each message, until Ctrl-C."""
+        subscribe(self._node, feed, lambda _error: None)
+        self._node.create_subscription(
+            DiagnosticArray, '/diagnostics', partial(note_diagnostics, self._node, feed), 100
+        )
+        while True:
+            self._step()
+            show()
 
     def _listen_to_features(self) -> list[FeatureVector]:
         """Return the list to which feature vectors are added as they come, once they would come."""

@@ -43,7 +43,11 @@ def test_a_given_value_is_used(make_node: Any) -> None:
     assert declare(make_node(length_s=2.0), Params).length_s == 2.0
 
 
-@pytest.mark.parametrize('bad', [{'length_s': 11.0}, {'length_s': 'long'}, {'length_s': 1}, {'name': 'z'}])
+def test_a_whole_number_is_taken_for_a_float(make_node: Any) -> None:
+    assert declare(make_node(length_s=2), Params).length_s == 2.0
+
+
+@pytest.mark.parametrize('bad', [{'length_s': 11.0}, {'length_s': 'long'}, {'name': 'z'}])
 def test_a_bad_value_is_refused_in_one_sentence(make_node: Any, bad: dict[str, Any]) -> None:
     with pytest.raises(InvalidParameter, match=next(iter(bad))):
         declare(make_node(**bad), Params)

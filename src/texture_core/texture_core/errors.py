@@ -15,10 +15,11 @@ ERRNO = re.compile(r"\[Errno -?\d+\] ([^:'\"]*)(: '[^']*')?")
 class TextureError(Exception):
     """Base of all errors that a user can cause or meet; its text, always one line, is shown to the user as it is."""
 
-    def __init__(self, sentence: str = '') -> None:
+    def __init__(self, sentence: str = '', field: str = '') -> None:
         # What came, and what others said about it, may be many lines or long ones.
         line = ' '.join(ERRNO.sub(r'\1', sentence).split())
         super().__init__(line if len(line) <= MAX_CHARACTERS else f'{line[: MAX_CHARACTERS - 1]}…')
+        self.field = field  # of a request, if one is to blame
 
 
 class UnknownName(TextureError):
@@ -58,6 +59,8 @@ class ExplorationError(enum.IntEnum):
     BUSY = 12
     NOT_ACTIVE = 13
     ARM_NOT_READY = 14
+    UNUSED_FIELD = 15
+    OUTSIDE_WORKSPACE = 16
     STOPPED = 20
     CANCELLED = 21
     TIMEOUT = 22
@@ -89,8 +92,10 @@ class CollectionError(enum.IntEnum):
 class MotionRefused(TextureError):
     """A motion that is unknown, unsafe or impossible now."""
 
-    def __init__(self, sentence: str = '', error: ExplorationError = ExplorationError.INVALID_REQUEST) -> None:
-        super().__init__(sentence)
+    def __init__(
+        self, sentence: str = '', error: ExplorationError = ExplorationError.INVALID_REQUEST, field: str = ''
+    ) -> None:
+        super().__init__(sentence, field)
         self.error = error
 
 

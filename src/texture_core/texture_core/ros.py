@@ -157,6 +157,9 @@ def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
     for item in parameters_of(cls):
         if node.has_parameter(item.name):
             continue
+        given = node._parameter_overrides.get(item.name)
+        if item.type is float and given is not None and given.type_ is RosParameter.Type.INTEGER:
+            node._parameter_overrides[item.name] = RosParameter(item.name, value=float(given.value))
         try:
             node.declare_parameter(item.name, item.default, _descriptor(item, read_only=not changeable))
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
@@ -226,7 +229,6 @@ def _descriptor(item: Parameter, *, read_only: bool) -> ParameterDescriptor:
         type=TYPES[item.type].value,
         description=f'{item.description}{unit}',
         additional_constraints=item.range_text if item.choices else '',
-        # A YAML file may give 1 where 1.0 is meant; check() makes it a number of the right type.
         dynamic_typing=False,
         read_only=read_only,
     )
@@ -325,6 +327,8 @@ def run(
                 executor.shutdown(ANSWERING_S)  # who waited for an answer still gets it
             node.destroy_node()
         rclpy.try_shutdown()
+        for number in STOP_SIGNALS:  # one more must not end a process that is ending
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _wake_on_signals(executor: Executor) -> None:

@@ -48,6 +48,8 @@ QUALITIES: Mapping[str, Quality] = {
     'roughness': Quality(50, reliable=True, latched=True),
     # The labels of the estimates, once for each change of the model.
     'model_info': Quality(1, reliable=True, latched=True),
+    # What the explorer can do, once for each change.
+    'explorer_info': Quality(1, reliable=True, latched=True),
     # A node that starts late learns at once what is going on.
     'exploration': Quality(100, reliable=True, latched=True),
 }
@@ -383,6 +385,8 @@ class ExplorationState:
     z_m: float = math.nan
     frame_id: str = ''
     tangential_force_n: float = math.nan
+    error_code: int = 0  # an ExplorationError, 0 before the end
+    lifted: bool = False  # known to be free of the surface
 
 
 @dataclass(frozen=True)
@@ -412,14 +416,20 @@ class ExplorationRequest:
     start_y_m: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, 'surface', checked_label(self.surface))
+        try:
+            object.__setattr__(self, 'surface', checked_label(self.surface))
+        except InvalidData as error:
+            raise InvalidData(str(error), 'surface') from error
         if not self.use_start and (self.start_x_m or self.start_y_m):
             raise InvalidData(
                 f'the start is ({self.start_x_m:g}, {self.start_y_m:g}) m, but use_start is false; set it, or leave '
-                'start_x_m and start_y_m at 0'
+                'start_x_m and start_y_m at 0',
+                'use_start',
             )
         if not 0.0 <= self.timeout_s < math.inf:
-            raise InvalidData(f'timeout_s is {self.timeout_s}; 0, for none, or a positive number of seconds is needed')
+            raise InvalidData(
+                f'timeout_s is {self.timeout_s}; 0, for none, or a positive number of seconds is needed', 'timeout'
+            )
 
 
 # --------------------

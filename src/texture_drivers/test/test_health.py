@@ -321,3 +321,11 @@ def test_the_baseline_is_subtracted_only_if_wanted_and_known() -> None:
         watched.start_tare()
         feed(watched, stream, 3)
         assert watched.add('signal', stream.batch())[0].tared is subtract
+
+
+def test_what_was_lost_at_a_restart_is_named_unknown() -> None:
+    sensor, reader, _ = run('', 3)
+    health = SensorHealth(reader, 0.0)
+    assert 'lost at restarts' not in health.report(1.0)[2]
+    sensor.counts['restarts'] = 1
+    assert 'unknown' in health.report(2.0)[2]['lost at restarts']

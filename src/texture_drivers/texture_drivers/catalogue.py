@@ -13,7 +13,6 @@ from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.biotac import BioTac
 from texture_drivers.daq import daq
 from texture_drivers.file import FilePlayer
-from texture_drivers.papillarray import PapillArray
 from texture_drivers.pvdf import pvdf
 from texture_drivers.sensor import SensorParams
 from texture_drivers.sound_card import SoundCard
@@ -34,8 +33,6 @@ SENSORS: Mapping[str, MakeSensor] = {
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
     'pvdf': pvdf,  # PVDF film and force sensor, Hu et al. 2014
     'anyskin': anyskin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
-    'papillarray': PapillArray,  # Contactile PapillArray, 9 pillars
-    'papillarray_pair': partial(PapillArray, arrays=(0, 1)),  # both of a hub; topics finger0/signal and so on
-    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card, through PortAudio
+    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card
     'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

@@ -313,6 +313,9 @@ MAX_BAD_PACKETS_PER_S = 5.0  # WARN: a damaged line; single refusals come with e
 HealthReport = tuple[str, str, Mapping[str, Any]]
 # Who is started again numbers anew: nobody can tell what its stream lost until then, least of all in a flood.
 BEFORE_THE_START = {'lost before the start': 'unknown'}
+# A bridge that starts again numbers anew, too: what was lost between is told by the time, to about a packet.
+INTERRUPTIONS = ('restarts', 'reopened')
+AT_INTERRUPTIONS = {'lost at restarts': 'estimated by time; less than a packet is unknown'}
 
 
 class SensorHealth:
@@ -354,6 +357,7 @@ class SensorHealth:
             **{f'{topic} expected [Hz]': rate for topic, rate in self._reader.sensor.expected_rates_hz.items()},
             **counts,
             **BEFORE_THE_START,
+            **(AT_INTERRUPTIONS if any(counts.get(name, 0) > 0 for name in INTERRUPTIONS) else {}),
             'age of last sample [s]': age_s,
             **self.details,
             **watched,

@@ -7,7 +7,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,20 +27,20 @@ from texture_drivers.timing import PPM, SLOW_CLOCK, ArrivalNumbering, Decimator
 SIGNAL = 'signal'
 SENSOR = 'sound_card'
 RATE_HZ = 48_000
-BLOCK_FRAMES = 480  # in a call of PortAudio: 10 ms at 48 kHz
+BLOCK_FRAMES = 480  # in a call: 10 ms at 48 kHz
 QUEUED_S = 1.0  # blocks are kept so long for a busy reader
 FULL_SCALE = 'FS'  # unit of uncalibrated samples: 1 is the largest
 
 
 # --------------------
-# Blocks of samples from a sound card, through PortAudio: captured in its thread, handed over in order.
+# Blocks of samples from a sound card, through miniaudio: captured in its thread, handed over in order.
 
 CAPTURE_FULL_SCALE = 2.0**15
-LONGEST_LATENCY_S = 1.0  # a time of conversion that lies further off is none: some drivers tell 0
+NULL = 'null'  # the name of a card that is always there and delivers zeros
 
 
 class AudioBlock(NamedTuple):
-    """What PortAudio delivered at once."""
+    """What miniaudio delivered at once."""
 
     samples: NDArray[np.float32]
     end_ns: int
@@ -51,21 +51,35 @@ class Capture:
     """An opened input of a sound card."""
 
     def __init__(self, device: str, rate_hz: int, channels: int, now_ns: Callable[[], int]) -> None:
-        self._rate_hz = rate_hz
+        self._channels = channels
         self._now_ns = now_ns
         self._overflowed = False
         self._blocks: deque[AudioBlock] = deque()
         self._most_blocks = round(QUEUED_S * rate_hz / BLOCK_FRAMES)
-        with open_errors(device) as sounddevice:
-            self._stream = sounddevice.InputStream(
-                device=int(device) if device.isdecimal() else device or None,
-                samplerate=rate_hz,
-                channels=channels,
-                dtype='int16',  # what every card has; PortAudio rounds what a card of 24 bits delivers
-                blocksize=BLOCK_FRAMES,
-                callback=self._on_block,
+        try:
+            import miniaudio  # noqa: PLC0415  # optional
+        except ImportError as error:
+            raise DeviceError(
+                f"sound card '{device}' cannot be opened: {error}; install the Python package miniaudio"
+            ) from error
+        try:
+            backends = [miniaudio.Backend.NULL] if device == NULL else None
+            self._stream = miniaudio.CaptureDevice(
+                input_format=miniaudio.SampleFormat.SIGNED16,  # what every card has
+                nchannels=channels,
+                sample_rate=rate_hz,
+                buffersize_msec=round(1000 * BLOCK_FRAMES / rate_hz),
+                device_id=find_card(device, miniaudio.Devices(backends).get_captures()) if device else None,
+                backends=backends,
             )
-            self._stream.start()
+            receiver = self._receive()
+            next(receiver)
+            self._stream.start(receiver)
+        except miniaudio.MiniaudioError as error:
+            raise DeviceError(
+                f"sound card '{device}' cannot be opened: {error}; check its plug, its rate and number of channels, "
+                'and that no other program has it open'
+            ) from error
 
     def take(self) -> Sequence[AudioBlock]:
         """Return the blocks that have come since the last call."""
@@ -73,44 +87,31 @@ class Capture:
 
     def close(self) -> None:
         """Stop and close; never raises."""
-        with contextlib.suppress(Exception):  # PortAudio raises an error of its own for each way a device can be gone
-            self._stream.abort()
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(Exception):  # a device may be gone in many ways
             self._stream.close()
 
-    def _on_block(self, samples: NDArray[np.int16], frames: int, times: Any, status: Any) -> None:
-        """Keep a block; called in PortAudio's thread."""
-        self._overflowed = self._overflowed or bool(status.input_overflow)
-        if len(self._blocks) >= self._most_blocks:
-            self._overflowed = True  # the reader is too busy: this block is lost
-            return
-        latency_s = times.currentTime - times.inputBufferAdcTime - frames / self._rate_hz
-        believed_s = latency_s if 0 <= latency_s < LONGEST_LATENCY_S else 0.0
-        end_ns = self._now_ns() - round(believed_s * NANOSECONDS)
-        self._blocks.append(AudioBlock((samples / CAPTURE_FULL_SCALE).astype(np.float32), end_ns, self._overflowed))
-        self._overflowed = False
+    def _receive(self) -> Generator[None, bytes, None]:
+        """Keep each block that is sent; runs in miniaudio's thread."""
+        while True:
+            samples = np.frombuffer((yield), '<i2').reshape(-1, self._channels)
+            if len(self._blocks) >= self._most_blocks:
+                self._overflowed = True  # the reader is too busy: this block is lost
+                continue
+            scaled = (samples / CAPTURE_FULL_SCALE).astype(np.float32)
+            self._blocks.append(AudioBlock(scaled, self._now_ns(), self._overflowed))
+            self._overflowed = False
 
 
-@contextlib.contextmanager
-def open_errors(device: str) -> Iterator[Any]:
-    """Yield the module sounddevice with a fresh list of devices."""
-    try:
-        import sounddevice  # noqa: PLC0415  # optional, and it fails without PortAudio
-    except (ImportError, OSError) as error:
+def find_card(device: str, cards: Sequence[Mapping[str, Any]]) -> Any:
+    """Return the identity of the card of a number, or of the first whose name contains a text."""
+    names = [str(card['name']) for card in cards]
+    found = [number for number, name in enumerate(names) if str(number) == device or device.lower() in name.lower()]
+    if not found:
+        shown = ', '.join(f'{number}: {name}' for number, name in enumerate(names)) or 'none'
         raise DeviceError(
-            f"sound card '{device}' cannot be opened: {error}; install PortAudio (Debian: libportaudio2) and the "
-            'Python package sounddevice'
-        ) from error
-    try:
-        # PortAudio lists the devices once; a card that was plugged in later is found only after a new start.
-        sounddevice._terminate()
-        sounddevice._initialize()
-        yield sounddevice
-    except (sounddevice.PortAudioError, ValueError) as error:
-        raise DeviceError(
-            f"sound card '{device}' cannot be opened: {error}; check its plug, its rate and number of channels, and "
-            'that no other program has it open (`python -m sounddevice` lists the cards)'
-        ) from error
+            f"sound card '{device}' cannot be opened: the cards are {shown}; name one of them, or plug it in"
+        )
+    return cards[found[0]]['id']
 
 
 # --------------------
@@ -152,14 +153,14 @@ class SoundCardSettings:
 class SoundCard:
     """Read a sound card. See `texture_core.types.Sensor`.
 
-    Samples come without a number: their order and the host's clock number them, and where PortAudio reports an
-    overflow, the clock tells how many are missing. They are filtered and decimated in blocks.
+    Samples come without a number: their order and the host's clock number them, and where the reader was too
+    busy, the clock gives how many are missing. They are filtered and decimated in blocks.
 
     Parameters
     ----------
     params
-        `device` is a card's name or a part of it, or its number; '' is the default input. `config` means
-        `SoundCardSettings`.
+        `device` is a card's name or a part of it, or its number; '' is the default input, 'null' a card of zeros.
+        `config` means `SoundCardSettings`.
     now_ns
         The host's clock.
 
@@ -215,7 +216,7 @@ class SoundCard:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals: samples published and lost (at the lower rate), overflows of the card or of a busy host."""
+        """Totals: samples published and lost (at the lower rate), and overflows of a busy host."""
         return {
             'samples': self._samples,
             'lost': self._lost,

@@ -274,3 +274,11 @@ def test_what_cannot_be_added_is_answered_with_a_sentence(graph, model, tmp_path
     assert 'explore first' in answer.message
     node.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))
     assert 'train it again' in node.call(Trigger, 'classifier/remove_last_added').message
+
+
+def test_two_classifiers_in_one_namespace_are_named(graph):
+    first, _second = (graph.add(Classifier) for _ in range(2))
+    graph.until(lambda: first.count_publishers('texture') == 2)
+    level, sentence, _ = first._report()
+    assert level == 'WARN'
+    assert sentence == "2 nodes publish on '/texture'; end all but one, or give each a namespace"

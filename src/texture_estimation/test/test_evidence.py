@@ -9,10 +9,16 @@ from texture_core.types import FeatureVector
 from texture_estimation.acceptance import NEVER
 from texture_estimation.domain import Domain
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.evidence_rules import EVIDENCE_RULES, GroupedEvidence, MajorityVote, SoftVote, running_means
+from texture_estimation.evidence_rules import (
+    EVIDENCE_RULES,
+    GroupedEvidence,
+    MajorityVote,
+    SoftVote,
+    followed,
+    running_means,
+)
 from texture_estimation.learners.learner import is_tied, log_softmax
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search import decided_by_slide
 from texture_estimation.training import train
 from texture_features.feature_set import fingerprint_difference
 
@@ -183,9 +189,10 @@ def test_the_live_vote_is_that_of_the_search():
     rng = np.random.default_rng(0)
     scores = rng.normal(size=(12, 2))
     rule = MajorityVote()
-    decided, _ = decided_by_slide(scores, np.zeros(12, dtype=int), rule, 1.0)
+    means, counts = followed(rule, rule.window_evidence(log_softmax(scores)), 1.0)
+    decided = [int(rule.log_posterior(means[-1], counts[-1], 1.0).argmax())]
     votes = scores.argmax(axis=1)[5:10]  # the second complete group of five
-    assert decided.tolist() == [int(votes.mean() > 0.5)]
+    assert decided == [int(votes.mean() > 0.5)]
     assert voted(scores.argmax(axis=1))[-1] == decided[0]
 
 

@@ -10,9 +10,6 @@ from texture_estimation.learners import mlp
 from texture_estimation.learners.discriminant import linear_discriminant
 from texture_estimation.learners.learner import log_loss, log_softmax
 from texture_estimation.learners.mlp import Mlp, MlpTraining
-from texture_estimation.recipe import Recipe
-from texture_estimation.training import train
-from texture_features.feature_set import LabelledFeatures
 
 
 def test_slopes_are_the_derivatives_of_the_cross_entropy():
@@ -88,35 +85,6 @@ NAMES = ('signal/a', 'signal/b', 'signal/slide_onset')
 SLIDES, WINDOWS = 20, 6
 
 
-def examples_with_onset(seed=0):
-    """Return slides of two textures that differ in `a` while they slide, and in `b`, the other way, as they start."""
-    rng = np.random.default_rng(seed)
-    values, labels, groups = [], [], []
-    for number, label in enumerate(('cork', 'felt')):
-        for slide in range(SLIDES):
-            own = rng.normal(size=(WINDOWS, 3))
-            own[1:, 0] += 6.0 * number
-            own[0, 0] += 3.0
-            own[0, 1] += 8.0 * (1 - number)
-            own[:, 2] = np.arange(WINDOWS) == 0
-            values.append(own)
-            labels += [label] * WINDOWS
-            groups += [f'{label}/{slide}'] * WINDOWS
-    return LabelledFeatures(np.concatenate(values), np.array(labels), np.array(groups), NAMES, 'a1', 0.5, 0.5)
-
-
-def model_of(learner, training=None):
-    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner, 'training': training or {}}
-    return train(Recipe.from_mapping(recipe, 'mine'), examples_with_onset())
-
-
-def shares(model):
-    """Return the shares of first and of later windows that are right."""
-    examples = examples_with_onset(seed=1)
-    right, first = np.array(model.decide(examples.values)) == examples.labels, examples.values[:, 2] > 0
-    return right[first].mean(), right[~first].mean()
-
-
 def test_shrunk_to_the_diagonal_a_discriminant_is_that_of_independent_gaussians():
     rng = np.random.default_rng(0)
     X, y = rng.normal(size=(60, 3)) * [1.0, 2.0, 5.0], np.repeat([0, 1, 2], 20)
@@ -126,17 +94,3 @@ def test_shrunk_to_the_diagonal_a_discriminant_is_that_of_independent_gaussians(
     log_densities = -0.5 * (((X[:, None] - means) ** 2) / variance).sum(axis=-1)
     scores = X @ weights + offsets
     np.testing.assert_allclose(scores - scores[:, :1], log_densities - log_densities[:, :1], atol=1e-8)
-
-
-def test_first_windows_that_look_different_are_recognised_by_what_first_windows_look_like():
-    first, later = shares(model_of({'onset_mlp': {'hidden': 1, 'epochs': 20}}))
-    assert first > 0.95
-    assert later > 0.95
-    assert shares(model_of({'mlp': {'hidden': 1, 'epochs': 20}}))[0] < 0.9
-
-
-def test_a_first_window_is_estimated_live_by_the_discriminant_too():
-    model = model_of({'onset_mlp': {'hidden': 4, 'epochs': 5}})
-    first = examples_with_onset(seed=1).values[0]
-    assert first[2] == 1.0
-    np.testing.assert_allclose(model.predict_and_compare(first)[0], model.predictor(first))

@@ -494,8 +494,7 @@ class TextureModel(StoredModel):
 
     def predict_and_compare(self, X: Array) -> tuple[Array, Array]:
         """Return what `predictor` and `compared` give, with the hidden layer computed once where both have it."""
-        # A predictor derived from it may add to what the hidden layer gives.
-        if type(self.predictor) is MlpPredictor:
+        if isinstance(self.predictor, MlpPredictor):
             activations = self.predictor.activations(X)
             return self.predictor.scores(activations), activations
         return self.predictor(X), self.compared(X)

@@ -16,7 +16,7 @@ from texture_estimation.domain import DomainMargins
 from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.discriminant import Discriminant, ForceDiscriminant
 from texture_estimation.learners.learner import Learner, extras_of
-from texture_estimation.learners.mlp import Mlp, OnsetMlp
+from texture_estimation.learners.mlp import Mlp
 from texture_estimation.learners.sklearn_learner import SklearnLearner
 from texture_estimation.learners.svm import SvmRbf
 from texture_features.augmentation import Augmentation
@@ -28,7 +28,6 @@ from texture_features.windows import WindowParams
 
 LEARNERS: Mapping[str, type[Learner]] = {
     'mlp': Mlp,  # one hidden layer, softmax, calibrated
-    'onset_mlp': OnsetMlp,  # and linear discriminant analysis of first windows
     'discriminant': Discriminant,  # Fisher 1936, shrunk as Friedman 1989, calibrated
     'force_discriminant': ForceDiscriminant,  # one for each range of forces
     'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated

@@ -8,6 +8,8 @@ import pytest
 
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter
 from texture_evaluation.collection import (
+    BANDS_M,
+    Band,
     CollectionParams,
     Patch,
     PlaceAccuracy,
@@ -108,7 +110,7 @@ def test_a_range_of_force_that_the_explorer_does_not_allow_is_refused_in_one_sen
         PlacePlan('oak', params, PATCH, UR5E)
 
 
-def features(shift_of_place, n_places=6):
+def features(shift_of_place, n_places=6, spacing_mm=15):
     """Two surfaces at 0 and 1; a place of oak shifts its feature by some multiple of the distance of the surfaces."""
     rng = np.random.default_rng(0)
     values, labels, groups, conditions = [], [], [], {}
@@ -119,19 +121,42 @@ def features(shift_of_place, n_places=6):
             values += (centre + shift + 0.1 * rng.standard_normal((10, 1))).tolist()
             labels += [surface] * 10
             groups += [name] * 10
-            conditions[name] = SlideConditions(place=f'at {place},0 mm')
+            conditions[name] = SlideConditions(place=f'at {spacing_mm * place},0 mm')
     return LabelledFeatures(
         np.array(values), np.array(labels), np.array(groups), ('one',), 'a1', 0.5, 0.1, conditions=conditions
     )
 
 
-def test_left_out_places_are_told_right_or_taken_for_another_surface():
-    assert evaluate_places(features(lambda place: 0.0), 'oak') == PlaceAccuracy(6, 6, '', 1)
-    # One place of six is like felt: trained on the others it is taken for that.
-    assert evaluate_places(features(lambda place: float(place == 2)), 'oak') == PlaceAccuracy(6, 5, 'felt', 1)
+def test_left_out_places_are_correct_or_misidentified_as_another_surface():
+    found = evaluate_places(features(lambda place: 0.0), 'oak')
+    assert (found.places, found.correct, found.confused, found.others) == (6, 6, '', 1)
+    # One place of six is like felt: trained on the others it is misidentified as that.
+    found = evaluate_places(features(lambda place: float(place == 2)), 'oak')
+    assert (found.places, found.correct, found.confused) == (6, 5, 'felt')
     # Clopper and Pearson: 6 of 6 show 0.1^(1/6) at 90 %.
     assert PlaceAccuracy(6, 6, '', 1).bound == pytest.approx(0.1 ** (1 / 6))
     assert PlaceAccuracy(6, 6, '', 0).bound == 0.0
+
+
+def test_accuracy_is_given_by_the_distance_from_the_nearest_trained_place():
+    # The surface changes along its track, until after 4.5 cm it is as far from its begin as felt is.
+    found = evaluate_places(features(lambda place: 0.24 * place, n_places=7), 'oak')
+    near, far = found.bands[0], found.bands[-1]
+    assert (near.far_m, near.places) == (0.02, 7)  # the next place is 1.5 cm away
+    assert near.correct / near.places > far.correct / far.places
+    assert all(band.accepted <= band.correct <= band.places for band in found.bands)
+    assert f'2 cm {near.correct} of 7 ({near.accepted} accepted)' in found.sentence
+
+
+def test_neighbours_of_a_left_out_place_are_left_out_too():
+    assert evaluate_places(features(lambda place: 0.0, n_places=2, spacing_mm=5), 'oak').places == 0
+    assert evaluate_places(features(lambda place: 0.0, n_places=2), 'oak').places == 2
+
+
+@pytest.mark.parametrize(('bands', 'spacing_m'), [((5, 5, 1), 0.08), ((5, 1, 5), 0.04), ((1, 5, 5), 0.0), ((), 0.0)])
+def test_tracks_may_be_twice_as_far_apart_as_the_farthest_good_band(bands, spacing_m):
+    counted = tuple(Band(far_m, 5, correct, 0) for far_m, correct in zip(BANDS_M, bands, strict=False))
+    assert PlaceAccuracy(5, 5, '', 1, counted).spacing_m == pytest.approx(spacing_m)
 
 
 DONE = (ExplorationError.NONE, '')
@@ -161,13 +186,13 @@ def test_it_ends_at_the_bound_not_before_the_fewest_places():
     end, told = run([PlaceAccuracy(3, 3, '', 2), PlaceAccuracy(4, 3, 'felt', 2), PlaceAccuracy(6, 6, '', 2)])
     assert (end.error, end.slides) == (CollectionError.NONE, 6)
     assert [slides for slides, _ in told] == [3, 4, 6]
-    assert end.message.startswith('6 of 6 left-out places right; at new places at least 68 %')
+    assert end.message.startswith('6 of 6 left-out places correct; at new places at least 68 %')
 
 
 def test_a_bound_that_is_not_met_says_what_is_missing():
     end, _ = run([PlaceAccuracy(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
     assert (end.error, end.slides) == (CollectionError.BOUND_MISSED, 9)
-    assert 'mostly taken for felt' in end.message and 'collect felt at more places, too' in end.message
+    assert 'mostly misidentified as felt' in end.message and 'collect felt at more places, too' in end.message
 
 
 def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
@@ -196,7 +221,7 @@ def test_three_failures_in_a_row_end_it_and_two_do_not():
 )
 def test_who_stops_it_ends_it_at_once_and_the_slides_so_far_count(how, error, message):
     end, _ = run([PlaceAccuracy(3, 3, '', 1)], [DONE, DONE, DONE, how])
-    assert (end.error, end.message, end.slides, end.accuracy.right) == (error, message, 3, 3)
+    assert (end.error, end.message, end.slides, end.accuracy.correct) == (error, message, 3, 3)
 
 
 def test_bags_of_a_surface_are_counted():

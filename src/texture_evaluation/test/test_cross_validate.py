@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import argparse
 import json
+import socket
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -25,6 +26,7 @@ from texture_evaluation.cross_validation import (
     compare,
     compare_all,
     cross_validate,
+    dask_backend,
     interval,
     parse_split,
     slide_counts,
@@ -35,6 +37,25 @@ from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.tables import import_tables, load_mapping
+
+
+@pytest.fixture
+def silent_scheduler():
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        yield f'tcp://127.0.0.1:{server.getsockname()[1]}'
+
+
+def test_a_dask_scheduler_that_takes_connections_and_is_silent_is_named_in_time(silent_scheduler, monkeypatch):
+    monkeypatch.setattr('texture_evaluation.cross_validation.ANSWER_S', 0.5)
+    with pytest.raises(InvalidParameter, match='no Dask scheduler answers at'), dask_backend(silent_scheduler):
+        pass
+
+
+@pytest.mark.parametrize('address', ['foo://x', 'nonsense', 'http://127.0.0.1:8'])
+def test_an_address_that_is_none_of_a_dask_scheduler_is_named(address):
+    with pytest.raises(InvalidParameter, match=f"no Dask scheduler answers at '{address}'"), dask_backend(address):
+        pass
+
 
 RECIPE = Recipe.from_mapping(
     {
@@ -158,7 +179,7 @@ def test_impossible_splits_are_refused_with_a_sentence() -> None:
 
 def test_a_surface_that_is_tested_but_never_trained_is_refused() -> None:
     dataset = tones()
-    with pytest.raises(InvalidData, match=r"tested but never trained.*'cork'.*set `session`.*stratified"):
+    with pytest.raises(InvalidData, match=r'trained are .*; tested are cork; .*set `session`.*stratified'):
         cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=dataset.labels)
 
 
@@ -176,23 +197,23 @@ def test_a_surface_of_one_session_trains_but_is_not_tested() -> None:
 
 
 @pytest.mark.parametrize(
-    ('splitter', 'groups', 'border', 'clusters'),
+    ('splitter', 'groups', 'shift', 'clusters'),
     [
         (LeaveOneGroupOut(), 'speed', 'other speed', 12),  # four surfaces, three speeds
         (GroupShuffleSplit(4, test_size=0.5, random_state=0), 'slide', 'same track', None),
     ],
 )
 def test_slides_of_what_was_left_out_are_one_cluster_of_the_interval(
-    splitter: object, groups: str, border: str, clusters: int | None
+    splitter: object, groups: str, shift: str, clusters: int | None
 ) -> None:
     result = cross_validate(RECIPE, tones(), splitter, groups=groups)
     figures = result.as_json()
-    assert figures['border'] == border
+    assert figures['shift'] == shift
     distinct = len({name for fold in result.folds for name in fold.results})  # a slide that is tested twice is one
     assert distinct < figures['n_slides'] or clusters
     assert figures['n_clusters'] == (clusters or distinct)
     assert figures['slide_accuracy_interval'] == [pytest.approx(0.05 ** (1 / figures['n_clusters'])), 1.0]
-    assert f'border: {border}' in table(result, 'x')[0]
+    assert f'surfaces; {shift}' in table(result, 'x')[0]
 
 
 def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:

@@ -40,7 +40,7 @@ def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float,
 
 @pytest.mark.parametrize(
     ('decided_from', 'line'),
-    [(2, 'as soon as decided: 100.0 % right, after 0.70 s on average'), (99, 'as soon as decided: never decided')],
+    [(2, 'as soon as decided: accuracy 100.0 %, after 0.70 s on average'), (99, 'as soon as decided: never decided')],
 )
 def test_a_report_says_when_slides_were_decided_or_that_none_was(decided_from: int, line: str) -> None:
     report = EvaluationReport(('a', 'b'), [slide('a', 'bbaa', decided_from=decided_from)], [], np.ones(4))
@@ -96,7 +96,7 @@ def test_candidates_are_counted_at_the_end_where_there_are_any() -> None:
     assert metrics.candidates(results) == {'coverage': pytest.approx(2 / 3), 'mean_size': pytest.approx(4 / 3)}
 
 
-def test_wrong_and_known_is_counted_once_decided_and_at_the_end() -> None:
+def test_accepted_but_wrong_is_counted_once_decided_and_at_the_end() -> None:
     right = slide('a', 'aaaa', decided_from=1)
     soon_wrong = slide('a', 'bbaa', decided_from=1)  # decided for b, and right at its end
     late_wrong = slide('a', 'aaab', decided_from=0)  # decided for a, and wrong at its end
@@ -104,4 +104,20 @@ def test_wrong_and_known_is_counted_once_decided_and_at_the_end() -> None:
     strange = slide('a', 'bbbb', decided_from=0, known=False)
     results = [right, soon_wrong, late_wrong, never_decided, strange]
     assert metrics.accepted_wrong(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(2 / 5)}
-    assert metrics.unknown(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(1 / 5)}
+    assert metrics.rejected(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(1 / 5)}
+
+
+def test_rejections_are_counted_by_their_reason_on_screen_and_in_the_figures() -> None:
+    ends = [slide('a', 'a', known=False), slide('b', 'a', known=False), slide('b', 'b')]
+    outside = TextureEstimate(0, 'e', 'a', Rejection.OUTSIDE_TRAINING, 0.5, windows=1, evidence_s=0.5)
+    report = EvaluationReport(('a', 'b'), [*ends, SlideResult('a', ['a'], [outside])], [], np.ones(4))
+    assert report.as_json()['rejections'] == {'novel': 2, 'outside_training': 1}
+    assert 'slides rejected at the end: 2 novel, 1 outside training' in summary(report)
+
+
+def test_both_lists_of_labels_are_named_where_no_tested_surface_was_trained() -> None:
+    report = EvaluationReport(('a', 'b'), [], [slide('felt', 'a'), slide('cork', 'a', known=False)], np.ones(2))
+    lines = summary(report)
+    assert 'no tested surface was trained, so there is no accuracy: trained are a, b; tested are cork, felt' in lines
+    assert 'slides over other surfaces accepted: 50.0 %' in lines
+    assert (report.as_json()['tested'], report.as_json()['rejections_of_untrained']) == (['cork', 'felt'], {'novel': 1})

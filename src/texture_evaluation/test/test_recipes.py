@@ -26,13 +26,12 @@ OF_CHANGES = ('taxels-any-day',)
 # The friction of these surfaces is not simulated.
 OF_FRICTION = ('friction-svm',)
 # Variables were searched for each pair of the ten textures of its scene; other pairs share all of its features.
-OF_TEN_TEXTURES = ('ets-fine-svm-pairs',)
 # The simulated slides are of one finger and along one axis.
 OF_ONE_FINGER = [
     name
     for name in SHIPPED
     if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names))
-    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION, *OF_TEN_TEXTURES)
+    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION)
 ]
 
 

@@ -32,8 +32,8 @@ def test_the_slides_found_are_those_that_the_explorer_reported(bag, tmp_path):
     (reported, _), (found, _) = slides_of(bag), slides_of(path)
     assert count == len(found) == len(reported) == 3
     for true, measured in zip(reported, found, strict=True):
-        assert measured.stamp_ns == pytest.approx(true.stamp_ns, abs=40e6)
-        assert measured.steady_s == pytest.approx(1.0, abs=0.045)
+        assert measured.stamp_ns == pytest.approx(true.stamp_ns, abs=60e6)
+        assert measured.steady_s == pytest.approx(0.95, abs=0.1)
         assert (measured.surface, measured.speed_m_s) == (SURFACE, 0.1)
     assert [slide.number for slide in find_slides([path])] == [1, 2, 3]
 

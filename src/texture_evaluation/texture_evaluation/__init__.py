@@ -13,5 +13,5 @@ model = train_from_bags('default', bags, slides='1-30', out='models/biotac')
 print(evaluate(model, bags, slides='31-40').as_json()['accuracy_at_s'])
 ```
 
-Limits: a figure holds for the border that its split crosses ([borders](../../docs/borders.md)).
+Limits: a figure holds for the shift that its split crosses ([generalisation](../../docs/generalisation.md)).
 """

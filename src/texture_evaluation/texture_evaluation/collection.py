@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Collect slides of a surface at many places: where to touch next, how well left-out places are told, when to end."""
+"""Collect slides of a surface at many places: where to touch next, how left-out places are recognised, when to end."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import beta
@@ -15,7 +18,10 @@ from scipy.stats import beta
 from texture_core.config import param
 from texture_core.errors import CollectionError, ExplorationError, InvalidData, InvalidParameter, TextureError
 from texture_core.types import Array, ExplorationRequest, checked_label
-from texture_estimation.learners.discriminant import linear_discriminant
+from texture_estimation.learners.discriminant import Discriminant
+from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
+from texture_evaluation.cross_validation import predict_slides
 from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 # --------------------
@@ -177,58 +183,117 @@ def _between(low: float, high: float, fraction: float) -> float:
 
 
 # --------------------
-# How well places are told that were left out of a training on all others.
+# Accuracy and acceptance at places that were left out of a training on all others, by their distance from these.
 
-SHRINKAGE = 0.5  # few slides tell no correlations
+RECIPE, SHRINKAGE = 'fast', 0.5  # few slides show no correlations
 CONFIDENCE = 0.9
+# Within which other places of the surface are left out, too: neighbours show more than a new place will.
+GAPS_M = (0.01, 0.03, 0.06)
+BANDS_M = (0.02, 0.04, 0.08)  # largest distance of each band from the nearest trained place
+ENOUGH = 0.8  # accuracy of a band up to which tracks are near enough
+AT = re.compile(r'at (-?\d+),(-?\d+) mm')
+
+
+class Band(NamedTuple):
+    """Places at most so far from the nearest trained one, and how many of them were correct, and accepted and so."""
+
+    far_m: float
+    places: int
+    correct: int
+    accepted: int
 
 
 @dataclass(frozen=True)
 class PlaceAccuracy:
-    """What a quick classifier says of places that it was not trained at."""
+    """How a quick classifier recognises places that it was not trained at, each with its neighbours left out."""
 
     places: int
-    right: int
+    correct: int
     confused: str = ''
     others: int = 0
+    bands: tuple[Band, ...] = ()
 
     @property
     def bound(self) -> float:
-        """Lower 90 % bound of the fraction of new places right; 0 without other surfaces. Clopper & Pearson 1934."""
-        if not self.others or not self.right:
+        """Lower 90 % bound of the accuracy at new places; 0 without other surfaces. Clopper & Pearson 1934."""
+        if not self.others or not self.correct:
             return 0.0
-        return float(beta.ppf(1.0 - CONFIDENCE, self.right, self.places - self.right + 1))
+        return float(beta.ppf(1.0 - CONFIDENCE, self.correct, self.places - self.correct + 1))
+
+    @property
+    def spacing_m(self) -> float:
+        """How far apart tracks may be: the farthest point between two is half of it from either; 0 if unknown."""
+        near = list(takewhile(lambda band: band.correct >= ENOUGH * band.places, self.bands))
+        return 2.0 * near[-1].far_m if near else 0.0
 
     @property
     def sentence(self) -> str:
         """What is known so far."""
         if not self.others:
-            return f'{self.places} places; no other surface is in the folder yet to tell it from'
-        taken = f', mostly taken for {self.confused}' if self.confused else ''
-        return (
-            f'{self.right} of {self.places} left-out places right{taken}; at new places at least '
+            return f'{self.places} places; no other surface is in the folder yet to distinguish it from'
+        mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
+        found = (
+            f'{self.correct} of {self.places} left-out places correct{mistaken}; at new places at least '
             f'{100 * self.bound:.0f} % (90 % bound), against {self.others} other surfaces'
         )
+        if not self.bands:
+            return found
+        by_distance = ', '.join(
+            f'{100 * band.far_m:.0f} cm {band.correct} of {band.places} ({band.accepted} accepted)'
+            for band in self.bands
+        )
+        spacing = f'be {100 * self.spacing_m:.0f} cm apart' if self.spacing_m else 'not even be that near'
+        return f'{found}; at most so far from the nearest trained place: {by_distance}; tracks may {spacing}'
 
 
 def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
-    """Return how a discriminant tells the places of a surface, each left out in turn, from all other surfaces."""
-    own = features.labels == surface
+    """Return accuracy and acceptance at the places of a surface, each left out in turn with those near to it."""
     made = {name: features.conditions.get(name, SlideConditions()) for name in np.unique(features.groups).tolist()}
-    places = np.array([made[name].place or name for name in features.groups.tolist()])
-    names = np.unique(np.append(features.labels, surface))
-    codes = np.searchsorted(names, features.labels)
-    where = np.unique(places[own])
-    if len(names) < 2 or len(where) < 2:
-        return PlaceAccuracy(len(where), 0, others=len(names) - 1)
-    taken: Counter[str] = Counter()
-    for place in where:
-        left = own & (places == place)
-        weights, offsets = linear_discriminant(features.values[~left], codes[~left], len(names), SHRINKAGE)
-        scores = (features.values[left] @ weights + offsets).mean(axis=0)
-        taken[str(names[int(scores.argmax())])] += 1
-    right = taken.pop(surface, 0)
-    return PlaceAccuracy(len(where), right, taken.most_common(1)[0][0] if taken else '', len(names) - 1)
+    surfaces = dict(zip(features.groups.tolist(), features.labels.tolist(), strict=True))
+    at: dict[str, list[str]] = {}
+    for name in (name for name in made if surfaces[name] == surface):
+        at.setdefault(made[name].place or name, []).append(name)
+    others = {name for name in made if surfaces[name] != surface}
+    n_others = len({surfaces[name] for name in others})
+    if not n_others or len(at) < 2:
+        return PlaceAccuracy(len(at), 0, others=n_others)
+    recipe = load_recipe(RECIPE)
+    plain = replace(recipe.augmentation, copies=0)
+    recipe = replace(recipe, learner=Discriminant(shrinkage=SHRINKAGE), augmentation=plain)
+    labels: Counter[str] = Counter()
+    bands: dict[float, list[tuple[bool, bool]]] = {far_m: [] for far_m in BANDS_M}
+    for place, names in at.items():
+        before: frozenset[str] = frozenset()
+        for gap_m in GAPS_M:
+            distances_m = {other: _distance_m(place, other) for other in at if other != place}
+            kept = frozenset(other for other, distance_m in distances_m.items() if not distance_m < gap_m)
+            if not kept or kept == before:
+                continue
+            # Train without the place and its neighbours, and recognise the slides there.
+            trained = others | {name for other in kept for name in at[other]}
+            model = train(recipe, features.of_slides(trained))
+            ends = [one.end for one in predict_slides(model, features.of_slides(names)).values()]
+            label = Counter(end.label for end in ends).most_common(1)[0][0]
+            if not before:
+                labels[label] += 1
+            correct, nearest_m = label == surface, min(distances_m[other] for other in kept)
+            far_m = next((far_m for far_m in BANDS_M if nearest_m <= far_m), None)
+            if far_m:
+                bands[far_m].append((correct, correct and all(end.known for end in ends)))
+            before = kept
+    right = labels.pop(surface, 0)
+    counted = tuple(Band(far_m, len(x), *np.sum(x, axis=0).tolist()) for far_m, x in bands.items() if x)
+    tested = right + labels.total()
+    return PlaceAccuracy(tested, right, labels.most_common(1)[0][0] if labels else '', n_others, counted)
+
+
+def _distance_m(place: str, other: str) -> float:
+    """Return how far two places are from each other, as their names show; NaN where they show none."""
+    found = AT.match(place), AT.match(other)
+    if None in found:
+        return math.nan
+    one, two = ([float(number) for number in match.groups()] for match in found if match)
+    return 1e-3 * math.dist(one, two)
 
 
 # --------------------

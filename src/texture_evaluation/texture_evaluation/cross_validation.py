@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +19,7 @@ from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+from threadpoolctl import threadpool_limits
 
 from texture_core.config import library, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
@@ -25,7 +27,6 @@ from texture_core.types import AnyArray, Array
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
-from texture_estimation.search import single_blas_thread
 from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.charts import COLOURS, chart, line_styles
@@ -47,6 +48,11 @@ CLUSTER_ADVICE = (
 )
 
 
+def single_blas_thread() -> AbstractContextManager[Any]:
+    """Keep linear algebra from starting threads of its own within a `with` block: the cores are busy already."""
+    return threadpool_limits(limits=1, user_api='blas')
+
+
 @contextmanager
 def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
     """Have joblib use so many cores (-1: all) within a `with` block, or the cluster whose address is given.
@@ -65,8 +71,10 @@ def dask_backend(address: str) -> Iterator[None]:
     cluster_of = library('distributed', "Dask clusters ('--dask')", 'dask')
 
     try:
+        # A scheduler that takes connections and is silent would hold up the client for minutes.
+        asyncio.run(asyncio.wait_for(_reach(cluster_of.comm.connect, address), ANSWER_S))
         client: Any = cluster_of.Client(address, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+    except (OSError, ValueError, TimeoutError, RuntimeError, ImportError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
         raise InvalidParameter(
             f"no Dask scheduler answers at '{address}' ({reason}); {CLUSTER_ADVICE}, "
@@ -76,6 +84,10 @@ def dask_backend(address: str) -> Iterator[None]:
         _check_cluster(client, address)
         with client.as_current(), parallel_config(backend='dask'):
             yield
+
+
+async def _reach(connect: Any, address: str) -> None:
+    await (await connect(address, timeout=ANSWER_S)).close()
 
 
 def _check_cluster(client: Any, address: str) -> None:
@@ -102,7 +114,7 @@ RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
 
 def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are."""
+    """Return accuracy and acceptance of windows and slides with 95 % intervals, and rejections by their reason."""
     of_clusters = np.arange(len(results)).astype(str) if clusters is None else np.array(clusters, dtype=str)
     counts = {
         'window_accuracy': window_counts(results),
@@ -120,6 +132,7 @@ def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = Non
         n_at_s[key] = len(reached)
     shares = {name: _share_of(own, of_clusters) for name, own in counts.items()}
     return {
+        'rejections': metrics.rejections(results),
         'n_slides': len(results),
         'n_windows': sum(len(result.window_labels) for result in results),
         'n_clusters': len(set(of_clusters.tolist())),
@@ -233,8 +246,8 @@ class ChronologicalSplit:
 # The outcome of a cross-validation.
 
 SAME_TRACK, SAME_SESSION, OTHER_SESSION = 'same track', 'same session', 'other session'
-# Which border is crossed where this condition is on one side only; other splits test the same track.
-BORDERS: Mapping[str, str] = {
+# The shift between training and test where this condition is on one side only; other splits test the same track.
+SHIFTS: Mapping[str, str] = {
     'place': 'other place',
     'session': OTHER_SESSION,
     'sensor': 'other finger',
@@ -261,7 +274,7 @@ class CrossValidation:
     labels: tuple[str, ...]
     folds: tuple[FoldResult, ...]
     unusable: tuple[str, ...] = ()
-    border: str = SAME_TRACK
+    shift: str = SAME_TRACK
     clusters: Mapping[str, str] = field(default_factory=dict)
     untested: Mapping[str, int] = field(default_factory=dict)
 
@@ -284,7 +297,7 @@ class CrossValidation:
             'recipe': self.recipe,
             'feature_set': self.folds[0].model.feature_set,
             'version': version('texture_evaluation'),
-            'border': self.border,
+            'shift': self.shift,
             **self.figures(self.folds),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
@@ -585,8 +598,11 @@ def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -
     possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
     left = [(train, test) for train, test in possible if len(test)]
     if not left:
-        names = ', '.join(f"'{label}'" for label in np.unique(labels))
-        raise InvalidData(f'tested but never trained in the same fold: {names}; {SPLIT_ADVICE}')
+        trained, tested = (', '.join(np.unique(labels[rows]).tolist()) for rows in splits[0])
+        raise InvalidData(
+            f'no surface is tested where it is trained; in the first fold, trained are {trained}; tested are {tested}; '
+            f'{SPLIT_ADVICE}'
+        )
     return left
 
 
@@ -683,8 +699,8 @@ def cross_validate(
         for train, test, name in named
     )
     usable = set(tested.groups.tolist())
-    border = BORDERS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
-    of_slides = border == SAME_TRACK
+    shift = SHIFTS.get(groups, SAME_TRACK) if isinstance(groups, str) else 'other group'
+    of_slides = shift == SAME_TRACK
     clusters = [
         slide.whole_name if of_slides else f'{slide.surface} {group}'
         for slide, group in zip(dataset, columns.tolist(), strict=True)
@@ -694,7 +710,7 @@ def cross_validate(
         tuple(np.unique(dataset.labels).tolist()),
         tuple(folds),
         tuple(name for name in names.tolist() if name not in usable),
-        border,
+        shift,
         dict(zip(names.tolist(), clusters, strict=True)),
         dict(Counter(dataset.labels[sorted(untested)].tolist())),
     )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ class EvaluationReport:
     latency_us: Array
     unusable: tuple[str, ...] = ()
     tare_faults: tuple[str, ...] = ()
-    border: str = ''
+    shift: str = ''
     trained_on: tuple[str, ...] = ()
     clusters: Sequence[str] | None = None
 
@@ -51,12 +51,17 @@ class EvaluationReport:
         """How many windows of each surface (row) were taken for each label (column)."""
         return metrics.confusion(self.known, self.labels)
 
+    @property
+    def tested(self) -> list[str]:
+        """Labels of the slides, with training or without."""
+        return sorted({result.surface for result in (*self.known, *self.unknown)})
+
     def as_json(self) -> dict[str, Any]:
         """Return the figures; null where no slide tells."""
         nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
         return {
-            'border': self.border,
+            'shift': self.shift,
             'trained_on': list(self.trained_on),
             **figures(self.known, self.clusters),
             'early': metrics.early_decision(self.known) if self.known else nothing,
@@ -65,6 +70,7 @@ class EvaluationReport:
             'falsely_rejected': metrics.falsely_rejected(self.known),
             'unknown_accepted': metrics.unknown_accepted(self.unknown),
             'labels': list(self.labels),
+            'tested': self.tested,
             'confusion': self.confusion.tolist(),
             'latency_us': {'median': float(median), 'p99': float(p99)},
             'unclassified': {
@@ -72,7 +78,8 @@ class EvaluationReport:
                 'at_s': metrics.unclassified_at_times(self.known),
             },
             'accepted_wrong': metrics.accepted_wrong([*self.known, *self.unknown]),
-            'unknown': metrics.unknown([*self.known, *self.unknown]),
+            'rejected': metrics.rejected([*self.known, *self.unknown]),
+            'rejections_of_untrained': metrics.rejections(self.unknown),
         }
 
 
@@ -119,7 +126,7 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
         latency_us=np.concatenate([latency for _, latency in tested.values()]),
         unusable=tuple(slide.name for slide in tested if slide not in results),
         tare_faults=tuple(dataset.tare_faults(model.recipe.feature_set)),
-        border=crossed if sessions else '',
+        shift=crossed if sessions else '',
         trained_on=tuple(slide.name for slide in results if slide_digest(slide) in digests),
         clusters=[one.name if one.session in sessions else f'{one.surface} {one.session}' for one in known],
     )
@@ -204,10 +211,10 @@ def sentence(one: PairedComparison) -> str:
 
 
 COLUMNS = {
-    'windows right': 'window_accuracy',
-    'slides right': 'slide_accuracy',
-    'known and right': 'accepted_correct',
-    'known and wrong': 'accepted_wrong',
+    'window accuracy': 'window_accuracy',
+    'slide accuracy': 'slide_accuracy',
+    'accepted and correct': 'accepted_correct',
+    'accepted but wrong': 'accepted_wrong',
 }
 
 
@@ -217,11 +224,11 @@ def table(result: CrossValidation, split: str) -> list[str]:
     rows = [(fold['name'], fold) for fold in figures['folds']] + [('all', figures)]
     width = max(len('fold'), *(len(name) for name, _ in rows))
     lines = [
-        f"recipe '{result.recipe}', split {split}: {len(result.labels)} surfaces; border: {result.border}",
-        f'{"fold":<{width}}  {"slides":>6}' + ''.join(f'  {title:>15}' for title in COLUMNS),
+        f"recipe '{result.recipe}', split {split}: {len(result.labels)} surfaces; {result.shift}",
+        f'{"fold":<{width}}  {"slides":>6}' + ''.join(f'  {title:>20}' for title in COLUMNS),
     ]
     lines += [
-        f'{name:<{width}}  {row["n_slides"]:>6}' + ''.join(f'  {percent(row[key]):>15}' for key in COLUMNS.values())
+        f'{name:<{width}}  {row["n_slides"]:>6}' + ''.join(f'  {percent(row[key]):>20}' for key in COLUMNS.values())
         for name, row in rows
     ]
     intervals = (
@@ -229,14 +236,21 @@ def table(result: CrossValidation, split: str) -> list[str]:
         for title, key in COLUMNS.items()
         if figures[key] is not None
     )
-    whole = 'slides' if result.border == SAME_TRACK else 'clusters (surface × what was left out)'
+    whole = 'slides' if result.shift == SAME_TRACK else 'clusters (surface × what was left out)'
     lines.append(f'95 % intervals over {figures["n_clusters"]} {whole}: {"; ".join(intervals)}')
+    lines.append(by_reason(figures['rejections']))
     if result.untested:
         names = ', '.join(f"'{surface}' ({count} slides)" for surface, count in result.untested.items())
         lines.append(f'trained but not tested, as no other slide would train them: {names}')
     if result.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(result.unusable)}')
     return lines
+
+
+def by_reason(rejections: Mapping[str, int]) -> str:
+    """Return how many slides were rejected for each reason, in words."""
+    counts = ', '.join(f'{count} {reason.replace("_", " ")}' for reason, count in rejections.items())
+    return f'slides rejected at the end: {counts or "none"}'
 
 
 def summary(report: EvaluationReport) -> list[str]:
@@ -249,22 +263,33 @@ def summary(report: EvaluationReport) -> list[str]:
     ]
     early, latency = figures['early'], figures['latency_us']
     lines = [
-        f'slides: {len(report.known)} over surfaces the model knows, {len(report.unknown)} over others',
-        *([f'border, by the names of the bags: {report.border}'] if report.border else []),
-        f'single windows right: {percent(figures["window_accuracy"])}',
-        f'slides right: {", ".join(at) or "no slide is long enough to say"}',
-        f'as soon as decided: {percent(early["accuracy"])} right, after {early["mean_s"]:.2f} s on average'
+        f'slides: {len(report.known)} over trained surfaces, {len(report.unknown)} over others',
+        *([f'training and test, by the names of the bags: {report.shift}'] if report.shift else []),
+        *(
+            [
+                f'accuracy of single windows: {percent(figures["window_accuracy"])}',
+                f'accuracy of slides: {", ".join(at) or "no slide is long enough to say"}',
+            ]
+            if report.known
+            else [
+                'no tested surface was trained, so there is no accuracy: trained are '
+                f'{", ".join(report.labels)}; tested are {", ".join(report.tested)}'
+            ]
+        ),
+        f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
         if any(estimate.decided and estimate.known for result in report.known for estimate in result.estimates)
         else 'as soon as decided: never decided',
         f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
-    wrong, unknown = figures['accepted_wrong'], figures['unknown']
-    lines.append(
-        f'known and wrong: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
-        f'rejected: {percent(unknown["early"])}, {percent(unknown["final"])}'
-    )
+    wrong, rejected = figures['accepted_wrong'], figures['rejected']
+    lines += [
+        f'accepted but wrong: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
+        f'rejected: {percent(rejected["early"])}, {percent(rejected["final"])}',
+        by_reason(figures['rejections']),
+    ]
     if figures['unknown_accepted'] is not None:
-        lines.append(f'slides over other surfaces called known: {percent(figures["unknown_accepted"])}')
+        lines.append(f'slides over other surfaces accepted: {percent(figures["unknown_accepted"])}')
+        lines.append(f'of other surfaces, {by_reason(figures["rejections_of_untrained"])}')
     if report.trained_on:
         lines.append(
             f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures say too '

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -120,29 +121,35 @@ def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
 
 
 def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
-    """Return the share of slides over known surfaces that were taken for unknown at the end; None without any."""
+    """Return the fraction of slides over trained surfaces that were rejected at the end; None without any."""
     return _share([not result.end.known for result in results])
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
-    """Return the fraction of slides over unknown surfaces that were accepted as known; None without any."""
+    """Return the fraction of slides over surfaces without training that were accepted; None without any."""
     return _share([result.end.known for result in results])
 
 
 def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the share of slides that ended as known with the wrong label, over any surfaces; None without slides."""
+    """Return the fraction of slides that were accepted but wrong, over any surfaces; None without slides."""
     early = [e.known and e.decided and e.label != surface for surface, e in _early_ends(results)]
     final = [result.end.known and result.end.label != result.surface for result in results]
     return {'early': _share(early), 'final': _share(final)}
 
 
-def unknown(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the share of slides that ended as unknown, early ('early') or at their end ('final'); None without slides.
+def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return the fraction of slides that were rejected, early ('early') or at their end ('final'); None without slides.
 
     A slide that is never decided goes on to its end: there its last estimate counts as early, too.
     """
     early = [not estimate.known for _, estimate in _early_ends(results)]
     return {'early': _share(early), 'final': _share([not result.end.known for result in results])}
+
+
+def rejections(results: Sequence[SlideResult]) -> Mapping[str, int]:
+    """Return how many slides were rejected at their end for each reason, such as 'novel', the most frequent first."""
+    ends = [result.end for result in results if result.estimates]
+    return dict(Counter(end.rejection.name.lower() for end in ends if not end.known).most_common())
 
 
 def _early_ends(results: Sequence[SlideResult]) -> list[tuple[str, TextureEstimate]]:

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_exploration.arms.ros_controllers import ForceSample, PoseSample, RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 

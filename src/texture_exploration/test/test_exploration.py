@@ -130,19 +130,6 @@ def test_an_arm_that_is_lost_aborts(table):
     assert table.phases[-1] is Phase.ABORTED
 
 
-def test_a_bug_in_the_loop_leaves_no_arm_moving(table):
-    def bug():
-        raise ZeroDivisionError
-
-    table.when[Phase.SLIDE] = bug
-    with pytest.raises(ZeroDivisionError):
-        table.explore()
-    before = table.arm.state().position
-    table.pace()
-    assert table.arm.state().position == before
-    assert table.exploration.outcome.error is ExplorationError.INTERNAL
-
-
 def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(table):
     table.when[Phase.SLIDE] = lambda: table.exploration.finish('the texture is decided')
     outcome = table.explore()

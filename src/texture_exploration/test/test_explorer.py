@@ -56,7 +56,7 @@ def test_a_motion_that_would_begin_outside_the_workspace_is_refused(explorer, li
     explorer.limits = limits
     with pytest.raises(MotionRefused, match=r'lies outside the workspace: [xyz] is -?0\.0\d+ m, allowed is') as refused:
         explorer.begin('one', QUICK)
-    assert refused.value.error == ExplorationError.INVALID_REQUEST
+    assert refused.value.error == ExplorationError.OUTSIDE_WORKSPACE
     assert explorer.counts['refused'] == 1
 
 

@@ -3,6 +3,7 @@
 """Frames of surface and fingertip, as a listener on tf gets them."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from rclpy.clock import Clock
@@ -22,13 +23,16 @@ class Owner:
     """A node in the namespace 'left' that keeps what it publishes."""
 
     def __init__(self):
-        self.published = {}
+        self.published, self.logged = {}, []
 
     def get_namespace(self):
         return '/left'
 
     def get_clock(self):
         return Clock()
+
+    def get_logger(self):
+        return SimpleNamespace(info=self.logged.append)
 
     def create_publisher(self, _kind, topic, _qos):
         messages = self.published.setdefault(topic, [])
@@ -80,5 +84,6 @@ def test_without_tf2_messages_only_a_fingertip_that_is_asked_for_is_refused(monk
     frames.surface('base', POSE)
     frames.fingertip(state(x_m=0.0))
     assert (owner.published, frames.surface_frame_id) == ({}, 'left/surface')
+    assert owner.logged == ['no frame is published on tf, as tf2_msgs is not installed']
     with pytest.raises(InvalidParameter, match='needs tf2_msgs'):
         FrameBroadcaster(owner, FrameParams(broadcast_fingertip=True))

@@ -244,6 +244,14 @@ def test_a_motor_that_does_not_keep_what_bounds_its_force_is_refused(bus, hand, 
     assert torque_is_off(bus)
 
 
+@pytest.mark.parametrize('lever_m', [-1.0, 0.0, 0.5])
+def test_a_lever_longer_than_a_finger_is_refused(lever_m):
+    content = load_yaml(find_file('leap', 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')
+    thumb = {**content['fingers']['thumb'], 'press': {'id': 13, 'lever_m': lever_m}}
+    with pytest.raises(InvalidParameter, match=r'lever_m is .*; allowed are 0\.001 to 0\.3'):
+        read_profile({**content, 'fingers': {**content['fingers'], 'thumb': thumb}}, 'mine')
+
+
 @pytest.mark.parametrize('watchdog_s', [-1.0, 0.001, 3.0, math.nan])
 def test_a_watchdog_out_of_range_is_refused(watchdog_s):
     content = load_yaml(find_file('leap', 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')

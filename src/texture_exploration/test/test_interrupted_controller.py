@@ -8,7 +8,8 @@ import pytest
 
 from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import TouchParams
@@ -16,7 +17,9 @@ from texture_exploration.stages import TouchParams
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 # Patient with a busy machine, which is not what is tried.
-ARM = RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5, accept_no_timeout=True)
+ARM = RosControllersParams(
+    connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5, accept_no_timeout=True, accept_shared_group=True
+)
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from texture_core.errors import MotionRefused
+from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
@@ -141,10 +141,25 @@ def test_a_refusal_names_the_allowed_range():
     assert linear_refusal(force_n=-1.0) == 'linear_slide: force_n is -1; allowed is 0.1 to 6 N'
 
 
-def test_a_default_that_is_refused_is_called_one():
-    request, slow = ExplorationRequest('linear_slide'), SafetyLimits(max_speed_m_s=0.02)
-    with pytest.raises(MotionRefused, match=r'speed_m_s is 0\.05 \(the default of the motion\); allowed is 0\.002 to'):
-        linear_slide(request, (0.0, 0.0, 0.01), TouchParams(), slow)
+def test_a_default_beyond_a_limit_is_the_limit():
+    hard = SafetyLimits(min_force_n=3.0, max_force_n=8.0, max_speed_m_s=0.02)
+    request = hard.complete(ExplorationRequest('linear_slide'), {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1})
+    assert (request.speed_m_s, request.force_n, request.distance_m) == (0.02, 3.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ('numbers', 'error', 'field'),
+    [
+        ({'speed_m_s': 2.0}, ExplorationError.INVALID_REQUEST, 'speed_m_s'),
+        ({'direction_rad': 1e3}, ExplorationError.INVALID_REQUEST, 'direction_rad'),
+        ({'radius_m': 0.02}, ExplorationError.UNUSED_FIELD, 'radius_m'),
+        ({'distance_m': 0.9}, ExplorationError.OUTSIDE_WORKSPACE, 'distance_m'),
+    ],
+)
+def test_a_refusal_has_a_code_and_names_the_field(numbers, error, field):
+    with pytest.raises(MotionRefused) as refused:
+        linear_slide(ExplorationRequest('linear_slide', **numbers), (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+    assert (refused.value.error, refused.value.field) == (error, field)
 
 
 def test_a_distance_beyond_both_limits_is_refused_with_the_smaller_one_at_once():

@@ -13,15 +13,9 @@ import pytest
 from texture_core.errors import CommandRefused, DeviceError, ExplorationError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, Phase, quaternion_matrix, rotation_matrix
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.ros_controllers import (
-    GRAVITY_M_S2,
-    FollowWatch,
-    ForceSample,
-    PoseSample,
-    RosControllersArm,
-    ToolState,
-)
-from texture_exploration.arms.ros_controllers import RosControllersParams as Params
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import GRAVITY_M_S2, FollowWatch, ForceSample, PoseSample, ToolState
+from texture_exploration.arms.tool_state import RosControllersParams as Params
 from texture_exploration.explorer import Exploration, Explorer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
@@ -113,6 +107,11 @@ class Robot:
             self.pressed_n.append(float(np.linalg.norm(self.arm.force_n)))
             self.driven.step()
 
+    def connect(self):
+        """Connect, and come to rest, as every connection begins."""
+        self.driven.connect()
+        self.pass_time(0.25)
+
     @property
     def is_commanded_to_rest(self):
         return not any(self.sent[-1][1])
@@ -149,14 +148,14 @@ class Robot:
 @pytest.fixture
 def robot():
     robot = Robot()
-    robot.driven.connect()
+    robot.connect()
     return robot
 
 
 def test_the_velocity_is_commanded_in_the_base_frame_and_measured_in_that_of_the_surface():
     turned = {'surface_rx_rad': 0.0, 'surface_ry_rad': 0.3}
     robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, **turned), **turned)
-    robot.driven.connect()
+    robot.connect()
     robot.pass_time(0.5, ArmCommand(tangential_m_s=(0.02, -0.01)))
     expected = rotation_matrix((0.0, 0.3, 0.0)) @ [0.02, -0.01, 0.0]
     assert robot.sent[-1][1] == pytest.approx(expected)
@@ -166,7 +165,7 @@ def test_the_velocity_is_commanded_in_the_base_frame_and_measured_in_that_of_the
 
 def test_a_controller_in_the_frame_of_the_tool_is_commanded_in_that_frame():
     robot = Robot(twist_frame_id='tool0_controller')
-    robot.driven.connect()
+    robot.connect()
     robot.pass_time(0.02, ArmCommand(tangential_m_s=(0.02, 0.01), normal_m_s=0.03))
     assert robot.sent[-1][1] == pytest.approx((0.02, -0.01, -0.03))  # the tool looks down
 
@@ -181,7 +180,7 @@ def test_offset_and_weight_of_the_tool_are_removed_in_free_air_and_the_force_is_
 @pytest.mark.parametrize('friction', [0.15, 0.6])
 def test_the_tangential_force_is_friction_times_the_normal_force_and_unknown_at_rest(friction):
     robot = Robot(replace(NO_NOISE, friction=friction))
-    robot.driven.connect()
+    robot.connect()
     robot.zero_force()
     assert math.isnan(robot.driven.state().tangential_force_n)
     while robot.driven.state().position[2] > 0.001:
@@ -229,7 +228,7 @@ def test_the_sensor_is_not_zeroed_in_contact(robot):
 
 def test_a_command_with_a_force_rises_first_and_presses_once_the_sensor_is_zeroed():
     robot = Robot(TwistControllerParams(start_height_m=0.002))
-    robot.driven.connect()
+    robot.connect()
     robot.pass_time(0.1, ArmCommand(force_n=1.0))
     assert robot.sent[-1][1][2] > 0
     robot.pass_time(12.0, ArmCommand(force_n=1.0))
@@ -313,12 +312,128 @@ def test_a_controller_that_ends_is_named(robot):
     assert robot.driven.state().fault == ''
 
 
+class BrokenLink(Robot):
+    """A controller that holds the last velocity for ever, and a link to it that breaks."""
+
+    commands_arrive = True
+
+    def __init__(self):
+        super().__init__(replace(NO_NOISE, command_timeout_s=0.0))
+
+    def send_velocity(self, velocity_m_s):
+        self.sent.append((self.now_ns, velocity_m_s))
+        if self.commands_arrive:
+            self.arm.command(self.now_ns, np.array(velocity_m_s))
+
+    def break_link(self, time_s, measured=False):
+        self.commands_arrive, self.pose_comes, self.force_comes = False, measured, measured
+        self.pass_time(time_s)
+        self.commands_arrive = self.pose_comes = self.force_comes = True
+
+
+@pytest.mark.parametrize('measured', [False, True], ids=['link', 'controller'])
+@pytest.mark.parametrize('time_s', [0.1, 0.5, 0.7, 2.0, 5.0])
+def test_an_arm_whose_link_or_controller_was_away_rests_0_3_s_after_it_returns(time_s, measured):
+    """A controller that was paused shows poses all the while, but takes no command."""
+    robot = BrokenLink()
+    robot.connect()
+    robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    robot.break_link(time_s, measured)
+    assert np.linalg.norm(robot.arm.velocity) == pytest.approx(0.03)
+    robot.pass_time(0.3)
+    assert np.linalg.norm(robot.arm.velocity) == 0.0
+    robot.pass_time(1.0)
+    robot.driven.recover()
+    robot.pass_time(0.6, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    assert robot.driven.state().fault == ''
+    assert np.linalg.norm(robot.arm.velocity) == pytest.approx(0.03)
+
+
+def test_an_arm_that_moves_when_it_is_connected_rests_before_it_follows_a_command():
+    robot = BrokenLink()
+    robot.arm.command(robot.now_ns, np.array([0.0, 0.03, 0.0]))
+    robot.arm.advance(robot.now_ns + 100_000_000)
+    robot.now_ns += 100_000_000
+    robot.driven.connect()
+    robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert robot.arm.velocity == pytest.approx([0.02, 0.0, 0.0])
+    first = next(number for number, (_, velocity) in enumerate(robot.sent) if any(velocity))
+    assert (robot.sent[first][0] - robot.sent[0][0]) * 1e-9 >= 0.2
+    assert not any(any(velocity) for _, velocity in robot.sent[:first])
+
+
+def test_an_arm_that_somebody_else_moves_is_a_fault_and_zero_velocity_is_all_it_is_told():
+    robot = BrokenLink()
+    robot.commands_arrive = False
+    robot.arm.command(robot.now_ns, np.array([0.0, 0.03, 0.0]))
+    robot.driven.connect()
+    robot.pass_time(2.2, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert 'the arm moves although zero velocity is commanded' in robot.driven.state().fault
+    assert not any(any(velocity) for _, velocity in robot.sent)
+
+
+def test_a_controller_that_gets_no_computing_time_is_not_one_that_does_not_follow():
+    """It neither moves the arm nor shows a pose meanwhile."""
+    robot = Robot(deadman_s=1.0)
+    robot.connect()
+    robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    robot.pose_comes, robot.arm.advance = False, lambda _now_ns: None
+    robot.pass_time(0.6, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    robot.pose_comes = True
+    del robot.arm.advance
+    robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.03, 0.0)))
+    assert (robot.driven.state().unsafe, robot.driven.state().fault) == ('', '')
+
+
+BROKEN = {
+    'a force of NaN': ('newest_force', {'force_n': (0.0, math.nan, 0.0)}, 'a force on'),
+    'a force of infinity': ('newest_force', {'force_n': (0.0, 0.0, math.inf)}, 'a force on'),
+    'a force beyond any sensor': ('newest_force', {'force_n': (0.0, 1e308, 0.0)}, '1e+308'),
+    'a place of NaN': ('newest_pose', {'position_m': (math.nan, 0.0, 0.0)}, 'a pose on'),
+    'a quaternion of NaN': ('newest_pose', {'rotation': (math.nan, 0.0, 0.0, 1.0)}, 'a pose on'),
+    'a quaternion of zeros': ('newest_pose', {'rotation': (0.0, 0.0, 0.0, 0.0)}, 'a pose on'),
+}
+
+
+@pytest.mark.parametrize('phase', ['approach', 'contact', 'slide', 'lift'])
+@pytest.mark.parametrize('what', BROKEN)
+def test_one_sample_that_is_no_measurement_is_named_and_the_finger_lifted(what, phase):
+    robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
+    robot.connect()
+    look, values, named = BROKEN[what]
+    newest, seen = getattr(robot, look), []
+
+    def one_broken():
+        sample = newest()
+        if seen == [phase]:
+            seen.append('broken')
+            return sample._replace(**values)
+        return sample
+
+    setattr(robot, look, one_broken)
+    outcome, _ = robot.explore(SLIDE, TouchParams(), lambda now: seen.append(phase) if now == phase and not seen else 0)
+    assert seen == [phase, 'broken']
+    assert named in outcome.message or (phase == 'lift' and outcome.success)
+    assert len(outcome.message) < 400
+    assert outcome.lifted
+    assert robot.arm.finger().force_n == 0.0
+
+
+def test_stamps_from_the_future_are_named_as_clocks_that_do_not_agree(robot):
+    assert robot.driven.warning() == ''
+    robot.clock_ahead_s = -0.05
+    robot.pass_time(0.1)
+    assert re.search(r"the clock that stamps the force on '.*' is 50 ms ahead", robot.driven.warning())
+    assert robot.driven.state().fault == ''
+
+
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.05)
 
 
 def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger_lifted():
     robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
-    robot.driven.connect()
+    robot.connect()
     gone_ns = []
 
     def listeners():
@@ -337,7 +452,7 @@ def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger
 @pytest.mark.parametrize('why', ["'/other' commands the arm, too", 'the guard process has ended'])
 def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger_lifted(why):
     robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
-    robot.driven.connect()
+    robot.connect()
     outcome, _ = robot.explore(SLIDE, TouchParams(), on_slide=lambda: setattr(robot, 'unsafe_because', why))
     assert not outcome.success
     assert why in outcome.message
@@ -371,7 +486,7 @@ def test_a_process_that_was_told_to_end_waits_for_no_controller_and_commands_not
 
 def test_a_controller_that_listens_without_moving_the_arm_is_named_and_recovers():
     robot = Robot(TwistControllerParams(active=False))
-    robot.driven.connect()
+    robot.connect()
     robot.pass_time(0.5, ArmCommand(tangential_m_s=(0.02, 0.0)))
     assert 'mm commanded' in robot.driven.state().unsafe
     assert 'is not active' in robot.driven.state().unsafe
@@ -403,7 +518,7 @@ def test_an_arm_that_is_held_up_in_the_slide_lifts_the_finger_if_it_can(noisy, h
 
 def test_a_finger_that_stalls_in_mid_slide_aborts_within_half_a_second(monkeypatch):
     robot = Robot(TwistControllerParams(start_height_m=0.003, jitter_s=0.0))
-    robot.driven.connect()
+    robot.connect()
     follow, stalled_ns = robot.arm.command, []
 
     def follow_along_the_normal_only(now_ns, velocity_m_s):
@@ -424,7 +539,7 @@ def test_a_finger_that_stalls_in_mid_slide_aborts_within_half_a_second(monkeypat
 
 def test_a_late_arm_that_limits_its_speed_still_follows():
     robot = Robot(TwistControllerParams(lag_s=0.08, max_speed_m_s=0.1, max_acceleration_m_s2=1.0))
-    robot.driven.connect()
+    robot.connect()
     robot.pass_time(1.0, ArmCommand(tangential_m_s=(0.2, 0.0)))
     assert robot.driven.state().fault == ''
 
@@ -450,22 +565,21 @@ def test_a_frame_for_velocities_that_is_neither_base_nor_tool_is_refused():
         Params(twist_frame_id='world')
 
 
-@pytest.mark.parametrize('stiffness_n_m', [200.0, 2000.0, 20000.0])
-def test_the_lag_is_measured_coming_down_and_the_force_kept(stiffness_n_m):
+@pytest.mark.parametrize('stiffness_n_m', [600.0, 2000.0, 20000.0])
+def test_the_force_is_kept_from_a_thirtieth_of_the_declared_stiffness_on(stiffness_n_m):
     emulated = TwistControllerParams(lag_s=0.02, jitter_s=0.002, stiffness_n_m=stiffness_n_m, start_height_m=0.002)
     robot = Robot(emulated, max_stiffness_n_m=20000.0, max_impact_n=0.5)
-    robot.driven.connect()
+    robot.connect()
     request = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
     outcome, forces = robot.explore(request, TouchParams(approach_stiffness_n_m=20000.0))
     assert outcome.success, outcome.message
     assert max(forces['contact']) < 1.2
-    assert np.sqrt(np.mean((np.array(forces['slide']) - 1.0) ** 2)) < 0.05
-    assert 15 <= robot.driven.counts['lag_ms'] <= 40
+    assert np.sqrt(np.mean((np.array(forces['slide']) - 1.0) ** 2)) < 0.1  # the tolerance with which a slide begins
 
 
 def test_a_compliance_controller_presses_by_itself_and_is_let_go_at_the_end():
     robot = Robot(TwistControllerParams(jitter_s=0.0), target_wrench_topic='target_wrench')
-    robot.driven.connect()
+    robot.connect()
     robot.zero_force()
     robot.pass_time(6.0, ArmCommand(force_n=2.0))
     assert robot.forces[-1] == pytest.approx((0.0, 0.0, -2.0))
@@ -478,7 +592,7 @@ def test_a_compliance_controller_presses_by_itself_and_is_let_go_at_the_end():
 @pytest.mark.parametrize('motion', MOTIONS)
 def test_every_motion_succeeds_behind_a_late_controller(motion):
     robot = Robot(TwistControllerParams(start_height_m=0.003))
-    robot.driven.connect()
+    robot.connect()
     requests = {
         'circular': {'speed_m_s': 0.05, 'turns': 0.5},
         'in_hand_sliding': {'duration_s': 1.0},
@@ -493,14 +607,14 @@ def test_every_motion_succeeds_behind_a_late_controller(motion):
 )
 def test_a_contact_far_from_the_declared_surface_is_refused_with_both_places_and_the_finger_lifted(off_m, where):
     robot = Robot(TwistControllerParams(surface_z_m=0.1 + off_m))
-    robot.driven.connect()
+    robot.connect()
     outcome, _ = robot.explore(PRESS, TouchParams(), limits=replace(LIMITS, z_low_m=-0.05))
     assert (outcome.error, outcome.slid, outcome.lifted) == (ExplorationError.NO_SURFACE, False, True)
     assert where in outcome.message
     assert "the surface declared at (0.4, 0, 0.1) m, and 20 mm are allowed ('surface_tolerance_m')" in outcome.message
     assert max(robot.pressed_n) < PRESS.force_n
     assert robot.arm.finger().force_n == 0.0
-    robot.driven.connect()
+    robot.connect()
     outcome, _ = robot.explore(PRESS, TouchParams(), limits=replace(LIMITS, z_low_m=-0.05, surface_tolerance_m=0.08))
     assert outcome.success, outcome.message
 
@@ -508,6 +622,7 @@ def test_a_contact_far_from_the_declared_surface_is_refused_with_both_places_and
 def explorer_over(robot):
     explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
     explorer.connect()
+    robot.pass_time(0.25)
     robot.zero_force()
     return explorer
 
@@ -573,7 +688,7 @@ PRESS = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=3.0, distance
 @pytest.fixture
 def noisy():
     robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.02), touching_n=0.12)
-    robot.driven.connect()
+    robot.connect()
     return robot
 
 
@@ -601,20 +716,19 @@ def test_a_late_force_whose_stamps_are_new_is_told_by_the_first_touch(late_s, st
     emulated = TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, stiffness_n_m=stiffness_n_m)
     robot = Robot(emulated, touching_n=0.12)
     robot.stamps_are_honest = False
-    robot.driven.connect()
+    robot.connect()
     robot.hold_up_force(late_s)
     outcome, forces = robot.explore(replace(PRESS, force_n=5.0), TouchParams())
-    assert re.search(r'the force rose for \d+ ms or more after the finger stood still', outcome.message)
+    assert "later than 'loop_delay_s'" in outcome.message
     assert outcome.lifted
     assert max(map(max, forces.values())) < 5.0
 
 
-@pytest.mark.parametrize('stiffness_n_m', [2000.0, 5000.0])
 @pytest.mark.parametrize('late_s', [0.03, 0.05])
-def test_a_force_that_is_a_little_late_by_new_stamps_is_pressed_by_as_late_as_it_is(late_s, stiffness_n_m):
-    robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, stiffness_n_m=stiffness_n_m), touching_n=0.12)
+def test_a_force_that_is_a_little_later_than_declared_does_no_harm_on_a_softer_contact(late_s):
+    robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, stiffness_n_m=2000.0), touching_n=0.12)
     robot.stamps_are_honest = False
-    robot.driven.connect()
+    robot.connect()
     robot.hold_up_force(late_s)
     outcome, forces = robot.explore(replace(PRESS, force_n=5.0), TouchParams())
     assert outcome.success, outcome.message
@@ -658,13 +772,13 @@ class BusyRobot(Robot):
 @pytest.mark.parametrize('seed', [0, 1, 2])
 def test_a_late_force_whose_stamps_are_new_is_told_also_on_a_busy_machine(seed):
     emulated = TwistControllerParams(force_noise_n=0.002)
-    robot = BusyRobot(emulated, seed=seed, deadman_s=0.4, heartbeat_s=1.0)
+    robot = BusyRobot(emulated, seed=seed, deadman_s=0.4)
     robot.stamps_are_honest = False
-    robot.driven.connect()
+    robot.connect()
     robot.hold_up_force(0.5)
     patient = replace(LIMITS, state_timeout_s=1.0, approach_timeout_s=60.0)
     outcome, forces = robot.explore(PRESS, TouchParams(approach_stiffness_n_m=20000.0), limits=patient)
-    assert 'the force rose for' in outcome.message
+    assert "later than 'loop_delay_s'" in outcome.message
     assert outcome.lifted
     assert max(map(max, forces.values())) < 3.0
 
@@ -768,7 +882,7 @@ def test_controllers_are_switched_for_the_connection_and_back_once_the_arm_is_at
     robot = Robot(**MANAGED)
     robot.driven.check()
     assert robot.switched == []  # a check takes no control
-    robot.driven.connect()
+    robot.connect()
     assert robot.switched == [TAKEN]
     robot.driven.close()
     assert robot.switched == [TAKEN, GIVEN_BACK]
@@ -791,7 +905,7 @@ def test_a_refused_switch_ends_the_connection_and_one_that_was_done_is_undone():
 
 def test_controllers_that_cannot_be_switched_back_are_a_warning():
     robot = Robot(**MANAGED)
-    robot.driven.connect()
+    robot.connect()
     robot.refused_switches = (2,)
     robot.driven.close()
     assert robot.closed
@@ -833,10 +947,11 @@ LIES = {
 def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffness_n_m, record_property):
     emulated, given, most_n, message = LIES[lie]
     params = {key: value for key, value in given.items() if key.startswith('surface')}
+    params |= {'max_stiffness_n_m': 20000.0, 'max_impact_n': 0.5}
     robot = Robot(replace(NO_NOISE, force_noise_n=0.01, stiffness_n_m=stiffness_n_m, **emulated), **params)
     if given.get('travel'):
         robot.arm.position = robot.arm.position - [TRAVEL_M, 0.0, 0.0]
-    robot.driven.connect()
+    robot.connect()
     robot.pass_time(0.05)
     home = robot.driven.state().position
     if given.get('travel'):

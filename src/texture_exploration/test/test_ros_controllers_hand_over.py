@@ -4,15 +4,18 @@
 
 import json
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
@@ -22,12 +25,14 @@ from texture_core.errors import DeviceError
 from texture_core.ros import STATE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph, NodeProcess, killed_on_error
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.ros import controllers as controller_topics
+from texture_exploration.ros import guard as guard_process
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
-PATIENT = RosControllersParams(connect_timeout_s=30.0, accept_no_timeout=True)
+PATIENT = RosControllersParams(connect_timeout_s=30.0, accept_no_timeout=True, accept_shared_group=True)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
 DEADLINE_S = 60.0
 MANAGED = {
@@ -44,11 +49,13 @@ MANAGED = {
 MOVING = """
 import time
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import RosControllersParams
 
-arm = RosControllersArm(RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, accept_no_timeout=True))
+arm = RosControllersArm(
+    RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, accept_no_timeout=True, accept_shared_group=True)
+)
 arm.connect()
-print('moving', flush=True)
 while True:
     arm.command(ArmCommand(tangential_m_s=(0.01, 0.0)))
     time.sleep(0.01)
@@ -117,16 +124,82 @@ def test_an_invalid_lifecycle_request_is_refused_and_the_explorer_lives(graph, t
         assert 'Traceback' not in explorer.output
 
 
-def test_a_guard_commands_zero_force_as_well_once_nobody_speaks_for_the_arm(graph):
+TOPICS = ('/twist', 'base', '/pose', '/target', 'base')
+
+
+def test_a_guard_in_the_namespace_commands_zero_force_as_well_once_nobody_speaks_for_the_arm(graph):
     wrenches = graph.listen(WrenchStamped, 'target')
-    guard = controller_topics.TwistGuard(0.05, '/twist', 'base', '/target', 'base')
+    guard = guard_process.TwistGuard(0.05, '/left', TOPICS)
     try:
         graph.until(lambda: guard.beat(moving=True) or graph.peer.count_publishers('target'))
         graph.until(lambda: wrenches)
+        info = graph.peer.get_publishers_info_by_topic('target')[0]
+        graph.until(lambda: guard.fault() or guard.participant)
+        assert guard_process.sender(info) == guard.participant
+        graph.until(lambda: ('arm_guard', '/left') in graph.peer.get_node_names_and_namespaces())
     finally:
         guard.dismiss()
     force = wrenches[0].wrench.force
     assert (wrenches[0].header.frame_id, force.x, force.y, force.z) == ('base', 0.0, 0.0, 0.0)
+
+
+class Line:
+    """A guard without a process: what it answers is given."""
+
+    def __init__(self, monkeypatch, patient=False):
+        monkeypatch.setattr(guard_process.GuardProcess, '__init__', lambda _self, *_arguments, **_named: None)
+        monkeypatch.setattr(guard_process.time, 'monotonic', lambda: self.now_s)
+        self.now_s, self.answers = 100.0, []
+        self.guard = guard_process.TwistGuard(0.05, '/', TOPICS, patient=patient)
+        self.guard.line, self.guard._process = self, self
+
+    def recv(self, _size):
+        if not self.answers:
+            raise BlockingIOError
+        return self.answers.pop(0)
+
+    def poll(self):
+        return None
+
+
+def test_an_answer_of_the_guard_that_cannot_be_read_is_counted_and_no_sign_of_life(monkeypatch):
+    line = Line(monkeypatch)
+    line.answers += [b'1 abcdef', b'shared memory port 7413 is taken']
+    assert line.guard.fault() == ''
+    line.answers += [b'\xff\xfe', b'nothing']
+    line.now_s += 2.0
+    assert re.search(r'is silent for 2\.0 s; 3 of its answers could not be read', line.guard.fault())
+    assert (line.guard.reached, line.guard.participant, line.guard.garbled) == (1, 'abcdef', 3)
+
+
+@pytest.mark.parametrize(('patient', 'borne_s', 'fault_s'), [(False, 1.2, 1.6), (True, 2.7, 3.1)])
+def test_a_busy_machine_may_hold_up_the_guard_and_longer_where_the_controller_stops_by_itself(
+    monkeypatch, patient, borne_s, fault_s
+):
+    line = Line(monkeypatch, patient)
+    line.answers += [b'1 abcdef']
+    assert line.guard.fault() == ''
+    line.now_s += borne_s
+    assert line.guard.fault() == ''
+    line.now_s += fault_s - borne_s
+    assert 'is silent for' in line.guard.fault()
+
+
+@pytest.mark.parametrize('rests_after', [20, 60])
+def test_a_guard_whose_explorer_has_ended_commands_zero_until_the_pose_shows_rest(rests_after):
+    ours, line = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    zeros, poses = [], []
+
+    def take_pose(rest):
+        poses.append(0.001 * min(len(poses), rests_after))
+        rest.update(time.monotonic_ns(), (poses[-1], 0.0, 0.0))
+
+    with line:
+        ours.send(guard_process.MOVING)
+        ours.close()
+        guard_process.guarded(line, 0.05, lambda: zeros.append(len(poses)), take_pose, lambda: None)
+    assert len(zeros) >= rests_after
+    assert poses[-1] == pytest.approx(0.001 * rests_after)
 
 
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGSTOP])
@@ -152,59 +225,56 @@ def test_when_the_process_that_commands_is_killed_or_stopped_its_guard_brings_th
     assert x_m() - end_m < 0.005  # without a guard it never comes to rest
 
 
-CLAIMING = """
-import time
-
-import rclpy
-from geometry_msgs.msg import TwistStamped
-from texture_exploration.ros.controllers import claim
-
-rclpy.init()
-node = rclpy.create_node('other')
-file = claim(node)
-publisher = node.create_publisher(TwistStamped, 'twist', 1)
-time.sleep(600)
-"""
-
-
-@pytest.mark.parametrize('known', [True, False], ids=['of ours', 'of somebody else'])
-def test_a_publisher_of_a_killed_process_is_passed_over_if_that_process_was_ours(graph, tmp_path, known):
-    """ROS shows it for 20 s more; one whose file is elsewhere may be alive."""
-    environment = {**os.environ, **({} if known else {'TMPDIR': str(tmp_path)})}
-
-    def found():
-        return graph.peer.get_publishers_info_by_topic('twist')
-
-    with subprocess.Popen([sys.executable, '-c', CLAIMING], env=environment) as process, killed_on_error(process):
-        graph.until(found)
-        assert not controller_topics.has_ended(found()[0])
-        process.kill()
-    assert controller_topics.has_ended(found()[0]) is known
-
-
-@pytest.mark.parametrize(('offered', 'started_by'), [(True, controller_topics.SCOPE), (False, ())])
+@pytest.mark.parametrize(('offered', 'started_by'), [(True, guard_process.SCOPE), (False, ())])
 def test_the_guard_has_a_control_group_of_its_own_where_systemd_offers_one(tmp_path, monkeypatch, offered, started_by):
     """A stand-in for systemd-run: most containers have none."""
     stand_in = tmp_path / 'systemd-run'
     stand_in.write_text(f'#!/bin/sh\nexit {int(not offered)}\n')
     stand_in.chmod(0o755)
     monkeypatch.setenv('PATH', str(tmp_path))
-    controller_topics.scope.cache_clear()
+    guard_process.scope.cache_clear()
     try:
-        assert controller_topics.scope() == started_by
+        assert guard_process.scope() == started_by
     finally:
-        controller_topics.scope.cache_clear()
+        guard_process.scope.cache_clear()
 
 
-def test_a_controller_that_declares_no_timeout_is_refused_unless_that_is_accepted(graph):
-    with pytest.raises(DeviceError, match=r"'controller_timeout_s'.*'accept_no_timeout: true'"):
-        RosControllersArm(RosControllersParams()).connect()
+@pytest.mark.parametrize(
+    ('accepted', 'message'),
+    [
+        ({}, r"'controller_timeout_s'.*'accept_no_timeout: true'"),
+        ({'accept_no_timeout': True}, r"leaves the arm moving.*'controller_timeout_s'.*'accept_shared_group: true'"),
+    ],
+)
+def test_a_controller_that_would_go_on_for_ever_is_refused_unless_that_is_accepted(
+    graph, monkeypatch, accepted, message
+):
+    monkeypatch.setattr(controller_topics, 'scope', tuple)
+    with pytest.raises(DeviceError, match=message):
+        RosControllersArm(RosControllersParams(**accepted)).connect()
+
+
+@pytest.mark.parametrize(('range_', 'alone_s'), [('LOCALHOST', 1.0), ('SUBNET', 6.0)])
+def test_two_announcements_of_other_hosts_are_waited_for_before_anything_is_published(
+    graph, monkeypatch, range_, alone_s
+):
+    monkeypatch.setattr(controller_topics.Node, 'count_subscribers', lambda *_: 1)
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', range_)
+    monkeypatch.setattr(controller_topics.RosTopics, '_other_commander', lambda *_: '')
+    monkeypatch.setattr(controller_topics, 'TwistGuard', lambda *_, **__: pytest.fail('nobody was waited for'))
+    slept_s, begin_s = [], time.monotonic()
+    monkeypatch.setattr(controller_topics.time, 'sleep', slept_s.append)
+    monkeypatch.setattr(controller_topics.time, 'monotonic', lambda: begin_s + sum(slept_s))
+    with pytest.raises(pytest.fail.Exception):
+        controller_topics.RosTopics(PATIENT)
+    assert sum(slept_s) == pytest.approx(alone_s, abs=0.06)
 
 
 def test_a_hand_over_without_the_messages_of_the_controller_manager_is_refused(graph, monkeypatch):
     def missing(name):
         raise ImportError(name)
 
+    graph.peer.create_subscription(TwistStamped, 'twist_controller/twist', lambda _: None, 1)
     topics = controller_topics.RosTopics(replace(PATIENT, controller_manager='controller_manager'))
     try:
         with monkeypatch.context() as patch, pytest.raises(DeviceError, match='which needs controller_manager_msgs'):
@@ -224,8 +294,10 @@ def test_the_controller_manager_is_asked_over_ros_and_one_that_is_not_there_is_w
         return response
 
     graph.peer.create_service(Trigger, 'manager/switch_controller', answer)
+    for topic in ('twist_controller/twist', 'another/twist'):
+        graph.peer.create_subscription(TwistStamped, topic, lambda _: None, 1)
     topics = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=DEADLINE_S))
-    silent = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=0.2, twist_topic='another/twist'))
+    silent = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=5.0, twist_topic='another/twist'))
     try:
         with ThreadPoolExecutor() as pool:
             answered = pool.submit(topics._ask, Trigger, 'manager/switch_controller', Trigger.Request())

@@ -18,7 +18,8 @@ from rclpy.parameter import Parameter
 from texture_core.errors import DeviceError, MotionRefused
 from texture_core.ros_testing import LocalGraph, NodeProcess
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.ros_controllers import RosControllersArm, RosControllersParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import TouchParams
@@ -27,7 +28,12 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 # Patient with a busy machine where that is not what is tried.
 PATIENT = RosControllersParams(
-    connect_timeout_s=30.0, deadman_s=1.0, max_stiffness_n_m=2000.0, max_impact_n=1.0, accept_no_timeout=True
+    connect_timeout_s=30.0,
+    deadman_s=1.0,
+    max_stiffness_n_m=2000.0,
+    max_impact_n=1.0,
+    accept_no_timeout=True,
+    accept_shared_group=True,
 )
 TOUCH = TouchParams(peak_speed_fraction=3.4)  # it makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast
 # Each slide begins where the last one ended.
@@ -39,12 +45,8 @@ DEADLINE_S = 60.0
 
 
 @pytest.fixture(scope='module')
-def graph(tmp_path_factory):
-    """Return a graph whose claims of arms are its own: ids of processes come again."""
-    folder = str(tmp_path_factory.mktemp('claims'))
-    with pytest.MonkeyPatch.context() as patch, LocalGraph(94, deadline_s=DEADLINE_S) as graph:
-        patch.setenv('TMPDIR', folder)
-        patch.setattr('tempfile.tempdir', folder)
+def graph():
+    with LocalGraph(94, deadline_s=DEADLINE_S) as graph:
         yield graph
 
 

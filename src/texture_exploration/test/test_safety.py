@@ -31,11 +31,10 @@ def test_a_force_that_is_too_high_or_unknown_is_a_violation(force):
     assert 'above the limit' in SafetyLimits().force_violation(ArmState(0, REST, REST, force))
 
 
-def test_a_position_outside_or_unknown_is_a_violation():
+def test_a_position_outside_is_a_violation():
     assert SafetyLimits().workspace_violation(ArmState(0, (0.0, 0.3, 0.0), REST, 0.0)) == (
         'the finger left the workspace: y is 0.3000 m, allowed is -0.2 to 0.2 m'
     )
-    assert 'unknown' in SafetyLimits().force_violation(ArmState(0, (0.0, 0.0, math.nan), REST, 0.0))
 
 
 def test_the_room_is_the_way_to_the_nearest_wall():

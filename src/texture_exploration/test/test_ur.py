@@ -26,6 +26,7 @@ import pytest
 
 from texture_core.errors import DeviceError
 from texture_core.types import ExplorationRequest, FingerReceiver, Phase
+from texture_exploration.arms import ur
 from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ur import (
     PROTOCOL_VERSION,
@@ -345,14 +346,14 @@ def test_nobody_there_is_said_in_a_sentence():
 
 
 def test_a_controller_that_takes_connections_but_never_answers_blocks_nobody(record_property):
-    arm = UrArm(UrArmParams(ip='127.0.0.53', probe_timeout_s=0.5))
+    arm = UrArm(UrArmParams(ip='127.0.0.53'))
     with listener('127.0.0.53'), Ticker() as ticker:
         begin_s = time.monotonic()
-        with pytest.raises(DeviceError, match=r'does not answer as a UR controller within 0\.5 s'):
+        with pytest.raises(DeviceError, match=r'does not answer as a UR controller within 1\.5 s'):
             arm.connect()
         connect_s = time.monotonic() - begin_s
     record_property('connect_s', connect_s)
-    assert connect_s < 2.0
+    assert connect_s < 3.0
     assert ticker.worst_s < 1.0
 
 
@@ -560,7 +561,7 @@ def shared():
 def late():
     """Return a emulator whose controller acknowledges 300 ms late what the robot does, and an arm connected to it."""
     with bench_at('127.0.0.75') as emulator, connected(emulator.ip) as arm:
-        assert emulator.controller.ask('emulate slow 0.3') == 'Acknowledging late'
+        assert emulator.controller.ask('emulate slow 0.3') == 'set to 0.3 seconds'
         yield emulator, arm
 
 
@@ -671,9 +672,12 @@ def test_a_controller_that_only_estimates_forces_is_told_of_when_it_is_connected
         assert 'is a CB3, which estimates forces within about 10 N' in arm.warning()
 
 
-def test_polyscope_x_which_has_no_dashboard_reports_by_rtde_that_a_program_runs():
+def test_polyscope_x_which_has_no_dashboard_reports_by_rtde_that_a_program_runs(monkeypatch):
     # On a busy machine the watchdog would end the program that is to be seen.
     with bench_at('127.0.0.77', version='10.10') as emulator, connected(emulator.ip, watchdog_hz=1.0) as arm:
+        with pytest.raises(DeviceError, match='another process on this machine commands the arm'):
+            UrArm(UrArmParams(ip=emulator.ip)).connect()
+        monkeypatch.setattr(ur, 'claim', lambda *_: os.open(os.devnull, os.O_RDONLY))  # as on another machine
         with pytest.raises(DeviceError, match=r"another program is on the controller .*'runtime state 2'"):
             UrArm(UrArmParams(ip=emulator.ip)).connect()
         assert (arm.state().fault, arm.warning()) == ('', '')

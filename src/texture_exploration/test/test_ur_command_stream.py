@@ -172,7 +172,7 @@ def test_a_finger_that_turns_back_out_of_force_control_is_led_back_before_anythi
 # --------------------
 # The watchdog waits while a command is carried out, and guards the moving arm again after it.
 
-WATCHED = UrArmParams(watchdog_hz=10.0, acknowledge_s=1.0)
+WATCHED = UrArmParams(watchdog_hz=10.0)
 
 
 class TimedControl:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import threading
 import time
@@ -52,6 +53,7 @@ from texture_exploration.safety import (
     Listening,
     SafetyLimits,
     SurfacePatch,
+    sound,
 )
 from texture_exploration.stages import Motion, MotionStep, Rise, TouchParams
 
@@ -116,11 +118,13 @@ class ExplorationEstimates:
 # --------------------
 # One exploration: the loop that ties a motion to an arm and watches over both.
 
+LOGGER = logging.getLogger(__name__)
+MOST_CHARACTERS = 200  # of the message of an error, which may hold a whole array
 STATE_PERIOD_NS = 20_000_000
 # A tick that comes a little early must not wait for the next one.
 STATE_SLACK_NS = 5_000_000
 NO_SLIDE_OBSERVED = (
-    'the slide was shorter than the delay of the arm or than a pause of this machine, so no sample could be taken;  '
+    'the slide was shorter than the delay of the arm or than a pause of this machine, so no sample could be taken; '
     'slide longer or more slowly'
 )
 
@@ -213,6 +217,7 @@ class Exploration:
         self._force_watch = ForceWatch(limits, arm.force_reading, motion.force_n)
         self._guard = ForceGuard(limits)
         self._commanded = ArmCommand()
+        self._arm_state: ArmState | None = None  # the newest with numbers that can be meant
         self._stop: tuple[ExplorationError, str] | None = None
         self._finish_reason = ''
         self._abort: tuple[ExplorationError, str] | None = None  # the first reason counts
@@ -230,11 +235,49 @@ class Exploration:
                 pace()
         except DeviceError as error:
             self._give_up(ExplorationError.ARM_FAULT, f'{error}; the finger was not lifted')
+        except Exception as error:
+            self._escape(error, pace)
         finally:
-            # Also when a bug ends the loop: no arm is left moving.
             with contextlib.suppress(DeviceError):
                 self._arm.stop()
         return self.outcome
+
+    def _escape(self, error: Exception, pace: Callable[[], None]) -> None:
+        """Command zero and lift by a stage of its own, as what failed is not asked again; say so."""
+        LOGGER.exception('an exploration failed')
+        reason, lifted = f'internal error, {type(error).__name__}: {error}'[:MOST_CHARACTERS], False
+        try:
+            self._arm.stop()
+            lifted = self._lift_alone(pace)
+        except Exception as second:
+            reason += f'; then {type(second).__name__}: {second}'[:MOST_CHARACTERS]
+        how = 'see the log' if lifted else 'the finger was not lifted'
+        self.outcome = ExplorationOutcome(ExplorationError.INTERNAL, f'{reason}; {how}', self._slid, lifted)
+        with contextlib.suppress(Exception):  # whoever takes the states may be what failed
+            self._report(self._clock(), Phase.ABORTED, progress=self.state.progress)
+
+    def _lift_alone(self, pace: Callable[[], None]) -> bool:
+        """Lift without anything else of the exploration; return whether the finger is free."""
+        arm, lift = self._sound_state(), self._motion.lift_from(self._sound_state().position)
+        lift.begin(self._clock(), arm)
+        while not arm_fault(arm, self._clock(), self._limits):
+            command = lift.timed_step(self._clock(), arm)
+            if command is None:
+                return bool(lift.free)
+            self._arm.command(command)
+            pace()
+            arm = self._sound_state()
+        return False
+
+    def _sound_state(self) -> ArmState:
+        """Return the newest state of the arm; numbers that cannot be meant are replaced and make it unsafe."""
+        arm = self._arm.state()
+        if self._arm_state is None:
+            self._arm_state = arm
+            if bad := sound(replace(arm, unsafe=''), arm).unsafe:
+                raise DeviceError(bad)
+        self._arm_state = sound(arm, self._arm_state)
+        return self._arm_state
 
     def stop(self, reason: str, error: ExplorationError = ExplorationError.STOPPED) -> None:
         """Lift the finger and abort, from any phase; from any thread."""
@@ -246,13 +289,13 @@ class Exploration:
 
     def _tick(self) -> bool:
         """Do one step; return whether the exploration has ended."""
-        arm, now_ns = self._arm.state(), self._clock()
+        arm, now_ns = self._sound_state(), self._clock()
         self._detect_gap(now_ns)
         fault = arm_fault(arm, now_ns, self._limits, self._listening)
         if fault:
             self._give_up(ExplorationError.ARM_FAULT, f'{fault}; the finger was not lifted')
             return True
-        relative = self._guard.relative(arm, self._arm.zeroed, self._commanded)
+        relative = self._guard.relative(arm, self._arm.zeroed)
         trouble = self._stop or self._trouble(now_ns, arm, relative)
         if trouble:
             self._abort = self._abort or trouble
@@ -377,6 +420,8 @@ class Exploration:
         self.state = ExplorationState(
             stamp_ns, self.exploration_id, request.motion, phase, surface=request.surface, **numbers
         )
+        if phase in ENDED:
+            self.state = replace(self.state, error_code=int(self.outcome.error), lifted=self.outcome.lifted)
         self._on_state(self.state)
 
 
@@ -529,13 +574,15 @@ class Explorer:
         self.arm = arm
         # These may be replaced; a running exploration keeps its own.
         self.touch, self.limits, self.patch = touch, limits, SurfacePatch()
-        self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, late_steps=0)
+        self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, internal_errors=0, late_steps=0)
         self._on_state = on_state
         self._signal_fault = signal_fault
         self._clock = clock
         self._lock = threading.Lock()
         self._home: Vector | None = None
         self._lift_first = True  # nobody knows whether the finger presses
+        self._zero_n: Vector | None = None  # what the sensor showed before the first lift, until it is zeroed
+        self.lifted = False  # known to be free of the surface
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = self._released = False
@@ -552,7 +599,7 @@ class Explorer:
         DeviceError
             If it cannot be reached.
         """
-        self._lift_first = True
+        self._lift_first, self.lifted, self._zero_n = True, False, None
         self.arm.close()
         self.arm.connect()
         self._released = False
@@ -581,7 +628,8 @@ class Explorer:
         with self._lock:
             self._released = True
         self._end_motion('the explorer let go of the arm')
-        self._home = None
+        if not self.arm.keeps_start:
+            self._home = None
 
     def now_ns(self) -> int:
         """Return the time on the clock of the states."""
@@ -634,7 +682,7 @@ class Explorer:
                 raise MotionRefused(
                     f"planning '{request.motion}' failed with {told}; mend it there", ExplorationError.INVALID_REQUEST
                 ) from error
-            self._current = exploration
+            self._current, self.lifted = exploration, False
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
             self._thread.start()
             return exploration
@@ -695,7 +743,7 @@ class Explorer:
                 raise MotionRefused(f'the finger was not lifted: {trouble}') from trouble
             finally:
                 self.arm.stop()
-            height_m = self.arm.state().position[2]
+            height_m, self.lifted = self.arm.state().position[2], True
             x_m, y_m, z_m = self._home
             self._home = (x_m, y_m, max(z_m, height_m))  # a finger found pressed is no place to begin at
             return height_m - begin_m
@@ -828,9 +876,12 @@ class Explorer:
             try:
                 plan(request, start, self.touch, self.patch.within(self.limits))
             except MotionRefused as error:
-                raise MotionRefused(f'{error}; the workspace of a request with a start is the surface patch') from error
+                sentence = f'{error}; the workspace of a request with a start is the surface patch'
+                raise MotionRefused(sentence, error.error, error.field) from error
         if self._lift_first:
-            motion.lift_first(lambda: self.arm.zeroed)
+            if self._zero_n is None or self.arm.zeroed:
+                self._zero_n = self.arm.state().force_vector_n
+            motion.lift_first(lambda: self.arm.zeroed, self._zero_n)
         return Exploration(
             exploration_id,
             request,
@@ -848,7 +899,8 @@ class Explorer:
             self._home = None  # the next request begins where the finger is then, as it has to be moved
             raise MotionRefused(
                 f'the start of the motion lies outside the workspace: {outside}; bring the finger inside and take '
-                'control again, or correct the pose of the surface or the limits'
+                'control again, or correct the pose of the surface or the limits',
+                ExplorationError.OUTSIDE_WORKSPACE,
             )
 
     def _check_idle(self) -> None:
@@ -877,8 +929,9 @@ class Explorer:
         try:
             exploration.run(Pacer(PERIOD_S, self._clock))
         finally:
-            self._lift_first = not exploration.outcome.success
+            self._lift_first, self.lifted = not exploration.outcome.success, exploration.outcome.lifted
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
+            self.counts['internal_errors'] += exploration.outcome.error is ExplorationError.INTERNAL
             self.counts['late_steps'] += exploration.gaps
             exploration.ended.set()
 

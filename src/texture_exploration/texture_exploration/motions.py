@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from texture_core.errors import MotionRefused
+from texture_core.errors import ExplorationError, MotionRefused
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms.arm import ArmState, Vector
 from texture_exploration.safety import MAX_DISTANCE_M, SafetyLimits, stated
@@ -133,7 +133,8 @@ def _check_speed(request: ExplorationRequest, limits: SafetyLimits) -> None:
     if request.speed_m_s > fastest:
         raise MotionRefused(
             f'{request.motion}: speed_m_s is {request.speed_m_s:g}; on a circle of {request.radius_m:g} m allowed is '
-            f"at most {math.floor(fastest * 1000) / 1000:g} m/s; choose a larger one or raise 'max_turning_m_s2'"
+            f'at most {math.floor(fastest * 1000) / 1000:g} m/s; choose a larger one',
+            field='speed_m_s',
         )
 
 
@@ -142,7 +143,9 @@ def _check_free_distance(request: ExplorationRequest, home: Vector, limits: Safe
     if request.radius_m > room:
         raise MotionRefused(
             f'{request.motion}: radius_m is {request.radius_m:g}, which leaves the workspace; allowed from here is at '
-            f'most {math.floor(room * 1000) / 1000:g} m'
+            f'most {math.floor(room * 1000) / 1000:g} m',
+            ExplorationError.OUTSIDE_WORKSPACE,
+            'radius_m',
         )
 
 
@@ -329,7 +332,9 @@ def _check_stroke(request: ExplorationRequest, home: Vector, limits: SafetyLimit
         raise MotionRefused(
             f'{request.motion}: distance_m, the length of a stroke, is {request.distance_m:g}; allowed is '
             f'{math.ceil(least_m * 1e4) / 1e4:g} m, to turn at this speed, to {math.floor(room * 1e3) / 1e3:g} m, the '
-            'end of the workspace'
+            'end of the workspace',
+            ExplorationError.OUTSIDE_WORKSPACE if request.distance_m > room else ExplorationError.INVALID_REQUEST,
+            'distance_m',
         )
 
 
@@ -376,7 +381,9 @@ def _check_linear_free_distance(
         raise MotionRefused(
             f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m to gain and lose '
             f'speed leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m '
-            f'{limits.limits_ahead(home, request.direction_rad)}'
+            f'{limits.limits_ahead(home, request.direction_rad)}',
+            ExplorationError.OUTSIDE_WORKSPACE,
+            'distance_m',
         )
 
 
@@ -523,7 +530,9 @@ def _check_legs(request: ExplorationRequest, home: Vector, limits: SafetyLimits,
         f'{request.motion}: distance_m, the length of each of two legs, is {request.distance_m:g}, which with '
         f'{beside_m:.3f} m for the ramps and the corner leaves the workspace; allowed in this direction is at most '
         f'{math.floor(low * 1000) / 1000:g} m '
-        f'{limits.limits_ahead(home, request.direction_rad, request.direction_rad + QUARTER_RAD)}'
+        f'{limits.limits_ahead(home, request.direction_rad, request.direction_rad + QUARTER_RAD)}',
+        ExplorationError.OUTSIDE_WORKSPACE,
+        'distance_m',
     )
 
 

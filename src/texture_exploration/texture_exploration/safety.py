@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from texture_core.config import param
-from texture_core.errors import CommandRefused, InvalidParameter, MotionRefused
+from texture_core.errors import CommandRefused, ExplorationError, InvalidParameter, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading, Vector
 
@@ -38,11 +38,47 @@ class Listening:
     def silence_s(self, heard_ns: int, now_ns: int) -> float:
         """Return for how long nothing was heard, s, without the part of it that lies in the newest gap."""
         start_ns = max(heard_ns, self.since_ns)
-        slept_ns = max(0, self.gap_end_ns - max(self.gap_start_ns, start_ns))
-        return (now_ns - start_ns - slept_ns) * 1e-9
+        silent_ns = now_ns - start_ns
+        # Only the part of the gap after the last sign of life counts.
+        if self.gap_end_ns > start_ns:
+            silent_ns -= self.gap_end_ns - max(self.gap_start_ns, start_ns)
+        return silent_ns * 1e-9
 
 
 WITHOUT_GAPS = Listening()
+
+
+# --------------------
+# What no arm and no sensor can mean: a number that is none, or beyond every robot.
+
+MOST_FORCE_N = 1e4
+MOST_M = 100.0  # of a place, and of a speed in m/s
+
+
+def impossible(what: str, numbers: Iterable[float], most: float, unit: str) -> str:
+    """Return in a short sentence which number nobody can have measured, '' if all may be."""
+    for number in numbers:
+        if not math.isfinite(number):
+            return f'the arm reports a {what} that is no number ({number:g})'
+        if abs(number) > most:
+            return f'the arm reports a {what} of {number:.3g} {unit}, which no {"sensor" if unit == "N" else "arm"} has'
+    return ''
+
+
+def sound(arm: ArmState, before: ArmState) -> ArmState:
+    """Return the state; what nobody can have measured is replaced by what was `before` and makes it unsafe.
+
+    A place that stays unknown grows old, so that the arm counts as silent; a force that stays unknown does not keep a
+    finger from being lifted.
+    """
+    place = impossible('place', arm.position, MOST_M, 'm') or impossible('velocity', arm.velocity, MOST_M, 'm/s')
+    if place:
+        return replace(before, unsafe=arm.unsafe or place, fault=arm.fault)
+    along_n = () if all(map(math.isnan, arm.along_n)) else arm.along_n
+    force = impossible('force', (arm.force_n, *along_n), MOST_FORCE_N, 'N')
+    if force:
+        return replace(arm, force_n=before.force_n, along_n=before.along_n, unsafe=arm.unsafe or force)
+    return arm
 
 
 MAX_DISTANCE_M = 1.0
@@ -57,6 +93,11 @@ RANGES: Mapping[str, tuple[float | str, float | str, str]] = {
 }
 # Several turns are a direction, too; an angle beyond this one is a mistake, and loses its meaning by rounding.
 MAX_DIRECTION_RAD = 100.0
+
+
+def shown(force_n: float) -> str:
+    """Return a force in few characters, whatever it is."""
+    return f'{force_n:.2f}' if abs(force_n) <= MOST_FORCE_N else f'{force_n:.3g}'
 
 
 def stated(given: float, value: float) -> str:
@@ -106,28 +147,9 @@ class SafetyLimits:
         low=0.05,
         high=20.0,
     )
-    frozen_force_s: float = param(
-        0.06,
-        'How long a measured force may stay exactly the same, where it should change, before the '
-        'exploration is aborted.',
-        unit='s',
-        low=0.02,
-        high=5.0,
-    )
-    force_drift_fraction: float = param(
-        0.3,
-        'Largest change of the force in free air over an exploration, as a fraction of the wanted '
-        'force; more aborts it.',
-        low=0.01,
-        high=10.0,
-    )
-    max_turning_m_s2: float = param(
-        5.0,
-        'Highest centripetal acceleration on a circle; larger values allow faster and smaller circles.',
-        unit='m/s²',
-        low=0.05,
-        high=20.0,
-    )
+    frozen_force_s = 0.06  # of a reading that stays the same where it should change: six states at 100 Hz
+    force_drift_fraction = 0.3  # of the wanted force, that the force in free air may change over an exploration
+    max_turning_m_s2 = 5.0  # centripetal acceleration on a circle: half of what an arm of 1 kg turns by with 10 N
     x_low_m: float = param(
         -0.2,
         'Lowest x coordinate of the workspace in the surface frame; leaving it aborts.',
@@ -189,11 +211,9 @@ class SafetyLimits:
         10.0, 'How long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
     )
     contact_timeout_s: float = param(
-        3.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
+        10.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
     )
-    slide_overtime_s: float = param(
-        2.0, 'How much longer than planned a slide may take before the exploration is aborted.', unit='s', low=0.1
-    )
+    slide_overtime_s = 2.0  # longer than planned, that a slide may take
     lift_timeout_s: float = param(
         5.0, 'How long braking and lifting may take before the exploration is aborted.', unit='s', low=0.1
     )
@@ -225,6 +245,11 @@ class SafetyLimits:
         low, high = (getattr(self, limit) if isinstance(limit, str) else limit for limit in (low, high))
         return low, high, unit
 
+    def default(self, name: str, value: float) -> float:
+        """Return the default of a motion, or the nearest value that is allowed here."""
+        low, high, _ = self.range(name)
+        return min(max(value, low), high)
+
     def complete(self, request: ExplorationRequest, defaults: Mapping[str, float]) -> ExplorationRequest:
         """Return a request with the motion's defaults for those of its numbers that are 0.
 
@@ -233,17 +258,23 @@ class SafetyLimits:
         MotionRefused
             If a number is out of its range, or belongs to another motion.
         """
-        numbers: dict[str, Any] = {name: getattr(request, name) or value for name, value in defaults.items()}
+        numbers: dict[str, Any] = {
+            name: getattr(request, name) or self.default(name, value) for name, value in defaults.items()
+        }
         given, request = request, replace(request, **numbers)
         for name in defaults:
             value, (low, high, unit) = getattr(request, name), self.range(name)
             if not low <= value <= high:
                 shown = stated(getattr(given, name), value)
-                raise MotionRefused(f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}')
+                raise MotionRefused(
+                    f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}', field=name
+                )
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
             allowed = f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
-            raise MotionRefused(f'{request.motion}: direction_rad is {request.direction_rad:g}; {allowed}')
+            raise MotionRefused(
+                f'{request.motion}: direction_rad is {request.direction_rad:g}; {allowed}', field='direction_rad'
+            )
         return request
 
     @staticmethod
@@ -257,7 +288,11 @@ class SafetyLimits:
         """
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
-            raise MotionRefused(f'{request.motion} knows no {" and no ".join(given)}; leave it at 0')
+            raise MotionRefused(
+                f'{request.motion} knows no {" and no ".join(given)}; leave it at 0',
+                ExplorationError.UNUSED_FIELD,
+                given[0],
+            )
 
     def free_distance_m(self, start: Vector, direction_rad: float) -> float:
         """Return how far the finger can go from `start` along the surface before it leaves the workspace, m."""
@@ -281,20 +316,18 @@ class SafetyLimits:
         """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
         # Written so that NaN is too much too.
         if not arm.force_n <= self.force_limit_n:
-            return f'the force of {arm.force_n:.2f} N is above the limit of {self.force_limit_n:g} N'
+            return f'the force of {shown(arm.force_n)} N is above the limit of {self.force_limit_n:g} N'
         if arm.force_n < -self.force_limit_n:
             return (
-                f'the force of {arm.force_n:.2f} N pulls by more than the limit of {self.force_limit_n:g} N; if the '
+                f'the force of {shown(arm.force_n)} N pulls by more than the limit of {self.force_limit_n:g} N; if the '
                 'finger was pressing, its sign is wrong'
             )
         if not arm.force_size_n <= self.force_limit_n:
-            x, y, z = arm.force_vector_n
+            x, y, z = map(shown, arm.force_vector_n)
             return (
-                f'the force of {arm.force_size_n:.2f} N ({x:.2f} and {y:.2f} N along the surface, {z:.2f} N normal to '
-                f'it) is above the limit of {self.force_limit_n:g} N'
+                f'the force of {shown(arm.force_size_n)} N ({x} and {y} N along the surface, {z} N normal to it) is '
+                f'above the limit of {self.force_limit_n:g} N'
             )
-        if not all(map(math.isfinite, arm.position)):
-            return f'the place of the finger is unknown: the arm tells {arm.position}'
         return ''
 
     def friction_violation(self, arm: ArmState) -> str:
@@ -335,20 +368,8 @@ class CommandLimits:
     without the explorer, and for a motion with an error in its arithmetic.
     """
 
-    command_speed_m_s: float = param(
-        1.0,
-        'Highest tangential speed that one command may ask for; faster commands are refused.',
-        unit='m/s',
-        low=0.001,
-        high=2.0,
-    )
-    command_normal_m_s: float = param(
-        0.5,
-        'Highest normal speed that one command may ask for; faster commands are refused.',
-        unit='m/s',
-        low=0.001,
-        high=1.0,
-    )
+    command_speed_m_s = 1.0  # along the surface, of a single command; four times what an exploration may ask for
+    command_normal_m_s = 0.5  # along the normal, of a single command
     command_force_n: float = param(
         50.0,
         'Highest normal force that one command may ask for; larger forces are refused.',
@@ -419,7 +440,9 @@ class SurfacePatch:
         if not (self.patch_x_low_m < self.patch_x_high_m and self.patch_y_low_m < self.patch_y_high_m):
             raise MotionRefused(
                 f'{request.motion}: no surface is taught, so a start means nothing; touch the corners of the surface '
-                "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'"
+                "(touch_surface), or set 'patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m' and 'patch_y_high_m'",
+                ExplorationError.OUTSIDE_WORKSPACE,
+                'use_start',
             )
         for name, low, high in (
             ('start_x_m', max(limits.x_low_m, self.patch_x_low_m), min(limits.x_high_m, self.patch_x_high_m)),
@@ -428,7 +451,9 @@ class SurfacePatch:
             at = getattr(request, name)
             if not low <= at <= high:  # so NaN is off, too
                 raise MotionRefused(
-                    f'{request.motion}: {name} is {at:g}, off the surface patch; allowed is {low:g} to {high:g} m'
+                    f'{request.motion}: {name} is {at:g}, off the surface patch; allowed is {low:g} to {high:g} m',
+                    ExplorationError.OUTSIDE_WORKSPACE,
+                    name,
                 )
         return request.start_x_m, request.start_y_m, home[2]
 
@@ -462,7 +487,6 @@ WAY_S = 0.15  # of commands that count as the way into an obstacle: no arm is la
 BACK_S = 0.3  # no way back takes longer
 HELPS_S = 0.09  # after which the force has begun to fall, if it ever will
 BACK_SPEEDS_M_S = (0.02, 0.1)  # the way back was free a moment ago: it may be gone as fast as it was come
-REST_NS = 50_000_000  # an arm that was told to stand still does so after this
 
 
 class ForceWatch:
@@ -570,30 +594,26 @@ class ForceWatch:
 class ForceGuard:
     """Limit the whole force, and find the way back out of what the finger has met.
 
-    As long as the arm has not zeroed its force sensor, only the change counts: since the start, or since the arm last
-    stood still. The way back is that of the last commands: it needs neither the frame nor the sign of the force, nor
-    those of the pose.
+    As long as the arm has not zeroed its force sensor, only the change since the start counts. The way back
+    is that of the last commands: it needs neither the frame nor the sign of the force, nor those of the pose.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
         self.blocked = ''
         self._limits = limits
         self._zero: Vector | None = None  # what the sensor shows at the start, while it is not zeroed
-        self._moved_ns = 0
         self._way: deque[tuple[int, ArmCommand, float]] = deque()  # with the size of the force
         self._back: ArmCommand | None = None
         self._back_ns = 0
         self._came_back = False  # there is one way back
         self._largest_n = 0.0
 
-    def relative(self, arm: ArmState, zeroed: bool, command: ArmCommand) -> ArmState:
-        """Return the state with the force that counts; `command` is what the arm was doing."""
+    def relative(self, arm: ArmState, zeroed: bool) -> ArmState:
+        """Return the state with the force that counts."""
         if zeroed:
             self._zero = None
             return arm
-        if command != ArmCommand():
-            self._moved_ns = arm.time_ns
-        if self._zero is None or arm.time_ns - self._moved_ns > REST_NS:
+        if self._zero is None:
             self._zero = arm.force_vector_n
         x, y, z = (now_n - zero_n for now_n, zero_n in zip(arm.force_vector_n, self._zero, strict=True))
         return replace(arm, force_n=z, along_n=(x, y))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 import statistics
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -193,13 +194,7 @@ class TouchParams:
         low=0.001,
         high=0.5,
     )
-    unheard_force_fraction: float = param(
-        1.5,
-        'Highest force of the approach, as a fraction of the wanted one, on an arm that only its watchdog stops; '
-        'a smaller fraction lowers the approach speed.',
-        low=0.2,
-        high=10.0,
-    )
+    unheard_force_fraction = 1.5  # of the wanted force, that an arm may reach which only its watchdog stops
     contact_force_n: float = param(
         0.2,
         'Force above which the finger counts as in contact; a larger force needs a harder touch.',
@@ -233,26 +228,9 @@ class TouchParams:
         low=0.05,
         high=10.0,
     )
-    jerk_m_s3: float = param(
-        50.0,
-        'Highest tangential jerk; larger values shorten the ramps before and after a slide.',
-        unit='m/s³',
-        low=1.0,
-        high=1000.0,
-    )
-    arm_lag_s: float = param(
-        0.005,
-        'Time after which the arm follows a command; the direction on a curved path is led by it.',
-        unit='s',
-        low=0.0,
-        high=0.1,
-    )
-    lost_force_fraction: float = param(
-        0.25,
-        'Fraction of the wanted force below which contact counts as lost during a slide; a larger one aborts sooner.',
-        low=0.05,
-        high=0.9,
-    )
+    jerk_m_s3 = 50.0  # along the surface: ramps of 0.1 s up to 0.05 m/s
+    arm_lag_s = 0.005  # after which an arm follows a command: the direction on a curved path is led by it
+    lost_force_fraction = 0.25  # of the wanted force, below which contact counts as lost
     lost_contact_s: float = param(
         0.1,
         'How long contact may be lost before the slide ends; shorter gaps are bounces on a rough surface.',
@@ -260,13 +238,7 @@ class TouchParams:
         low=0.02,
         high=5.0,
     )
-    stall_speed_fraction: float = param(
-        0.25,
-        'Fraction of the commanded way below which a sliding finger counts as stalled; a larger fraction aborts '
-        'sooner.',
-        low=0.05,
-        high=0.9,
-    )
+    stall_speed_fraction = 0.25  # of the commanded way, below which a sliding finger counts as stalled
     stall_s: float = param(
         0.25,
         'Time over which the commanded way and that of the finger are compared during a slide; a longer time '
@@ -275,12 +247,7 @@ class TouchParams:
         low=0.05,
         high=5.0,
     )
-    mean_force_fraction: float = param(
-        0.3,
-        'Largest relative error of the mean measured force with which a slide succeeds.',
-        low=0.05,
-        high=1.0,
-    )
+    mean_force_fraction = 0.3  # error of the mean force with which a slide succeeds
     peak_force_fraction: float = param(
         0.5,
         'By which fraction of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
@@ -301,20 +268,8 @@ class TouchParams:
         low=0.05,
         high=20.0,
     )
-    mean_friction: float = param(
-        2.0,
-        'Largest mean force along the surface, as a multiple of the wanted force, with which a slide '
-        'succeeds; it counts where the arm measures that force.',
-        low=0.1,
-        high=50.0,
-    )
-    peak_friction: float = param(
-        3.0,
-        'Largest force along the surface for 50 ms, as a multiple of the wanted force, with which a slide '
-        'succeeds; states beyond it are not steady.',
-        low=0.1,
-        high=50.0,
-    )
+    mean_friction = 2.0  # mean force along the surface by wanted force, of a slide that succeeds
+    peak_friction = 3.0  # the same for 50 ms; states beyond it are not steady
     lift_speed_m_s: float = param(
         0.05,
         'Speed away from the surface; a higher speed leaves the surface sooner.',
@@ -322,9 +277,7 @@ class TouchParams:
         low=0.005,
         high=0.5,
     )
-    clearance_m: float = param(
-        0.005, 'Least height by which the finger is lifted after a contact.', unit='m', low=0.001, high=0.1
-    )
+    clearance_m = 0.005  # least rise after a contact
 
     def approach_m_s(self, force_n: float, watchdog_s: float = 0.0) -> float:
         """Return how fast the finger may come down to press with a force.
@@ -541,7 +494,7 @@ class SlideWatch:
         if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
             yield (
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
-                f"{asked_n:g} N that were asked for ('mean_force_fraction'); slide more slowly, or check the force "
+                f'{asked_n:g} N that were asked for; slide more slowly, or check the force '
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
@@ -555,18 +508,18 @@ class SlideWatch:
         if mean_n > touch.mean_friction * asked_n:
             yield (
                 f'the mean force along the surface was {mean_n:.2f} N, and {touch.mean_friction * asked_n:.2f} N are '
-                f"allowed with {asked_n:g} N asked for ('mean_friction'); see whether the finger catches on something"
+                f'allowed with {asked_n:g} N asked for; see whether the finger catches on something'
             )
         measured = (
             ('force', 'N', f'{asked_n:g} N', 'peak_force_fraction'),
             ('speed', 'm/s', f'{asked_m_s:g} m/s', 'peak_speed_fraction'),
-            ('force along the surface', 'N', f'a force of {asked_n:g} N', 'peak_friction'),
+            ('force along the surface', 'N', f'a force of {asked_n:g} N', ''),
         )
         for (what, unit, asked, parameter), peak, most in zip(measured, self._peaks, self._most, strict=True):
             if not peak <= most:
                 yield (
                     f'the {what} of the slide reached {peak:.3g} {unit}, and {most:.3g} {unit} are allowed with '
-                    f"{asked} asked for ('{parameter}')"
+                    f'{asked} asked for' + (f" ('{parameter}')" if parameter else '')
                 )
 
     def _add_way(self, arm: ArmState) -> None:
@@ -595,12 +548,23 @@ class SlideWatch:
 NEAR_M = 0.0005
 GROWTH_M = 0.002
 LEAST_LIFT_M_S = 0.005  # a lift that nothing has proven yet ends in time too
+OVERSHOOT = 0.2  # of the wanted force, that pressing may exceed it
 PRESSING_S = 0.1  # from contact to the wanted force: a step would swing on a stiff surface
 STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed and force; ending it early takes as long
 
 
 class Stage:
-    """One part of a motion."""
+    """One part of a motion.
+
+    `ahead`: it lifts before the motion begins. `free`: whether it found the finger free, None if it did not look.
+    """
+
+    ahead = False
+    free: bool | None = None
+    # One row of the state machine (docs/motion.md): kinds of what it commands, what ends it, where an error leads.
+    commands: tuple[str, ...] = ()
+    ends = ''
+    on_error = 'Lift'
 
     def __init__(self, phase: Phase, timeout_s: float, goal: str) -> None:
         self.phase = phase
@@ -621,6 +585,13 @@ class Stage:
         """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached."""
         raise NotImplementedError
 
+    def see(self, arm: ArmState) -> None:
+        """Take note of a state after the end."""
+
+    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
+        """Return which stages follow an error of this one, none if the finger stays where it is; None: the lift."""
+        return None
+
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return what to do now; MotionAborted also if the stage takes too long."""
         command = self.step(time_ns, arm)
@@ -631,6 +602,9 @@ class Stage:
 
 class GoHomeStage(Stage):
     """Rise to the height of the start, then go above the surface to where the motion begins."""
+
+    commands = ('rest', 'up', 'along')
+    ends = 'above the start of the motion'
 
     def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
@@ -667,6 +641,9 @@ class GoHomeStage(Stage):
 
 class ApproachStage(Stage):
     """Come down until the force shows contact."""
+
+    commands = ('down',)
+    ends = 'the force shows contact that pushes the finger up'
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
@@ -717,8 +694,32 @@ class ApproachStage(Stage):
         )
 
 
+class OvershootWatch:
+    """End what presses harder than was asked for, before the slide: the middle one of the newest forces counts."""
+
+    def __init__(self, force_n: float, touch: TouchParams) -> None:
+        self._force_n = force_n
+        self._most_n = (1.0 + max(OVERSHOOT, touch.force_tolerance)) * force_n
+        self._forces: deque[float] = deque(maxlen=FORCES)
+
+    def update(self, arm: ArmState) -> None:
+        """Take a state; MotionAborted if the force is too high."""
+        self._forces.append(arm.force_n)
+        reached_n = statistics.median(self._forces)
+        if len(self._forces) == FORCES and reached_n > self._most_n:
+            raise MotionAborted(
+                f'the force reached {reached_n:.2f} N of {self._force_n:g} N wanted before the slide; the contact is '
+                "stiffer than 'max_stiffness_n_m' or 'approach_stiffness_n_m', or arm or force later than "
+                "'loop_delay_s'",
+                ExplorationError.FORCE_LIMIT,
+            )
+
+
 class SettleForceStage(Stage):
     """Press gently harder, until the force has stayed within its tolerance for a while."""
+
+    commands = ('press',)
+    ends = 'the force stayed within its tolerance'
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.CONTACT, limits.contact_timeout_s, f'the force to settle at {force_n:g} N')
@@ -726,6 +727,7 @@ class SettleForceStage(Stage):
         self._touch = touch
         self._outside_ns = 0
         self._first_n = force_n
+        self._overshoot = OvershootWatch(force_n, touch)
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Nothing has settled yet."""
@@ -735,6 +737,7 @@ class SettleForceStage(Stage):
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Hold the force."""
+        self._overshoot.update(arm)
         if abs(arm.force_n - self._force_n) > self._touch.force_tolerance * self._force_n:
             self._outside_ns = time_ns
         if (time_ns - self._outside_ns) * 1e-9 >= self._touch.settle_s and time_ns > self._outside_ns:
@@ -762,13 +765,18 @@ class Along(NamedTuple):
 class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
 
+    commands = ('press',)
+    ends = 'speed and force are reached'
+
     def __init__(self, along: Along) -> None:
         goal = f'the finger to slide at {along.speed_m_s:g} m/s with {along.force_n:g} N'
         super().__init__(Phase.CONTACT, along.ramp_s + along.limits.contact_timeout_s, goal)
         self._along = along
+        self._overshoot = OvershootWatch(along.force_n, along.touch)
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp, then wait for the arm to follow."""
+        self._overshoot.update(arm)
         self._along.follower.update(time_ns, arm)
         self._along.contact.update(arm)
         elapsed_s = self.elapsed_s(time_ns)
@@ -789,6 +797,9 @@ class AccelerateStage(Stage):
 
 class SlideStage(Stage):
     """Keep speed and force for the length of the path."""
+
+    commands = ('press',)
+    ends = 'the end of the path, or an early end'
 
     def __init__(self, along: Along) -> None:
         planned_s = along.follower.length_m / along.speed_m_s
@@ -852,6 +863,9 @@ class BrakeStage(Stage):
     that was lost in the slide and does not come back aborts.
     """
 
+    commands = ('press', 'along', 'rest')
+    ends = 'at rest along the surface'
+
     def __init__(self, along: Along) -> None:
         super().__init__(Phase.LIFT, along.limits.lift_timeout_s, 'the finger to come to rest')
         self._along = along
@@ -891,6 +905,10 @@ class LiftStage(Stage):
     fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`. It goes no faster than it
     came down until the force has fallen: only that proves that up is up.
     """
+
+    commands = ('up',)
+    ends = 'at the height of the start and clear of the surface'
+    on_error = 'end, at rest'
 
     def __init__(self, home: Vector, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to be lifted')
@@ -955,7 +973,7 @@ PROBE_M_S = 0.002
 PROBE_TIMEOUT_S = 2.0
 STILL_M, STILL_S = 0.00005, 0.06  # an arm that moves less in this time stands still
 ASTRAY_M = 0.0002  # beside the commanded way: more than noise and play
-MET_GROWTH = 4.0  # times the change of before: a surface that is left lets the force change less and less
+MET_GROWTH = 2.0  # times the change in the first half of the way
 MOST_FORCE_SHARE = 0.65  # of the force limit: no finger that was pressed as asked is left pressed harder
 GO_BACK_S = 0.5
 UNKNOWN_STATE = ArmState(0, (math.inf,) * 3, (0.0,) * 3, math.nan)
@@ -984,22 +1002,47 @@ class Rise(Stage):
     rise. Then it rises no faster than the finger comes down, and slower where the force shows a stiffer contact.
     """
 
-    def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits, signed: bool = True) -> None:
+    commands = ('rest', 'up')
+    ends = 'the force stayed the same over the clearance'
+    on_error = 'GoBack, Rise again, or end at rest'
+    ahead = True
+
+    def __init__(
+        self,
+        force_n: float,
+        touch: TouchParams,
+        limits: SafetyLimits,
+        signed: bool = True,
+        zero_n: Vector | None = None,
+    ) -> None:
         speed_m_s = touch.approach_m_s(force_n)
         longest_m = max(touch.approach_travel_m, 2 * touch.clearance_m)
         phase = Phase.APPROACH if signed else Phase.LIFT
         super().__init__(phase, limits.lift_timeout_s + longest_m / speed_m_s, 'the finger to be free')
+        self._given = force_n, touch, limits
         self._touch = touch
         self._speed_m_s, self._longest_m = speed_m_s, longest_m
         self._first = UNKNOWN_STATE
         self._most_n = MOST_FORCE_SHARE * limits.force_limit_n
         self._impact_n = IMPACT * force_n
         self._signed = signed  # the sign of the force is not known to be wrong
+        self._zero_n = zero_n  # from which the force counts: that before the first of several rises
         self._air = FreeAir(touch.clearance_m, touch.contact_force_n)
         self._start_ns: int | None = None  # of the probe
         self._rest_ns = 0
-        self._seen: list[ArmState] = []  # one in each half of PROBE_M
+        self._heights_m: list[float] = []  # of the way so far, and the forces there
+        self._forces_n: list[Vector] = []
         self.free = False
+
+    def again(self) -> Rise:
+        """Return a rise that comes after this one, whatever the sign of the force; it counts from the same zero."""
+        return Rise(*self._given, signed=False, zero_n=self._zero_n)
+
+    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
+        """Go back what made it worse, rise on with a force of the wrong sign, or stay."""
+        if isinstance(error, WrongWay):
+            return (GoBack(error.before_n, self._touch),)
+        return (self.again(),) if isinstance(error, WrongSign) else ()
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Note height and force at the start."""
@@ -1021,7 +1064,7 @@ class Rise(Stage):
                 "raise 'contact_force_n' above the noise of the force sensor",
                 ExplorationError.FORCE_SENSOR,
             )
-        if abs(arm.force_n - self._first.force_n) > self._most_n:
+        if math.dist(arm.force_vector_n, self._zero_n or self._first.force_vector_n) > self._most_n:
             raise WrongWay(
                 f'the force changed by more than {self._most_n:g} N while the finger rose by {1e3 * risen_m:.2f} mm: '
                 'it is pressed harder than it may be, or something is above it; free it by hand',
@@ -1029,7 +1072,11 @@ class Rise(Stage):
             )
         if self._signed and risen_m >= PROBE_M / 2:
             self._check_sign(arm)
-        return ArmCommand(normal_m_s=PROBE_M_S if risen_m < PROBE_M else self._allowed_m_s(arm))
+        stiffness_n_m = self._watch_growth(arm)
+        if risen_m < PROBE_M:
+            return ArmCommand(normal_m_s=PROBE_M_S)
+        gentle_m_s = self._impact_n / (stiffness_n_m * REACTION_S) if stiffness_n_m else math.inf
+        return ArmCommand(normal_m_s=max(PROBE_M_S, min(self._speed_m_s, gentle_m_s)))
 
     def _rests(self, time_ns: int, arm: ArmState) -> bool:
         """Wait until the arm stands still, as it may not do yet after a fault; note place and force."""
@@ -1041,7 +1088,9 @@ class Rise(Stage):
             self._first, self._rest_ns = arm, time_ns
         if (time_ns - self._rest_ns) * 1e-9 < STILL_S:
             return False
-        self._first, self._seen, self._start_ns = arm, [arm], time_ns
+        self._first, self._start_ns = arm, time_ns
+        self._zero_n = self._zero_n or arm.force_vector_n
+        self._heights_m, self._forces_n = [arm.position[2]], [arm.force_vector_n]
         return True
 
     def _check_way(self, time_ns: int, arm: ArmState) -> None:
@@ -1065,33 +1114,47 @@ class Rise(Stage):
                 'wrong, the z axis of the surface does not point away from it, or it is not steady'
             )
 
-    def _allowed_m_s(self, arm: ArmState) -> float:
-        """Return how fast the finger may rise; WrongWay if its force changes much more than in the rise just before."""
-        if arm.position[2] - self._seen[-1].position[2] >= PROBE_M / 2:
-            self._seen = [*self._seen[-3:], arm]
-        middle = self._seen[max(0, len(self._seen) - 2)]
-        newly_n = math.dist(arm.force_vector_n, middle.force_vector_n)
-        before_n = math.dist(middle.force_vector_n, self._seen[0].force_vector_n)
-        noise_n = self._touch.contact_force_n
-        if len(self._seen) == 4 and newly_n > MET_GROWTH * max(before_n, 0.5 * noise_n):
+    def _watch_growth(self, arm: ArmState) -> float:
+        """Return the stiffness of what the finger leaves, N/m, 0 in the air; WrongWay if it meets something.
+
+        A surface that is left lets the force change less and less; what is met changes it more in the second half of
+        the way than in the first.
+        """
+        height_m, force_n = arm.position[2], arm.force_vector_n
+        if height_m > self._heights_m[-1]:
+            self._heights_m.append(height_m)
+            self._forces_n.append(force_n)
+        half = bisect_right(self._heights_m, 0.5 * (self._heights_m[0] + height_m)) - 1
+        middle_n, noise_n = self._forces_n[max(0, half)], self._touch.contact_force_n
+        newly_n, before_n = math.dist(force_n, middle_n), math.dist(middle_n, self._forces_n[0])
+        if height_m - self._heights_m[0] >= PROBE_M / 2 and newly_n > MET_GROWTH * before_n + noise_n:
             raise WrongWay(
                 f'the finger met something while it rose, the force changed by {newly_n:.2f} N; see what is above it, '
                 'and that the z axis of the surface points away from it',
-                middle.force_vector_n,
+                middle_n,
             )
-        if newly_n <= noise_n:
-            return self._speed_m_s
-        stiffness_n_m = newly_n / max(arm.position[2] - middle.position[2], 0.1 * PROBE_M)
-        return max(PROBE_M_S, min(self._speed_m_s, self._impact_n / (stiffness_n_m * REACTION_S)))
+        last = max(0, bisect_right(self._heights_m, height_m - PROBE_M) - 1)
+        changed_n = math.dist(force_n, self._forces_n[last])
+        rise_m = max(height_m - self._heights_m[last], 0.1 * PROBE_M)
+        return changed_n / rise_m if changed_n > noise_n else 0.0
 
 
 class GoBack(Stage):
     """Go back down, until the force is again what it was before the rise."""
 
+    commands = ('down',)
+    ends = 'the force is as before the rise'
+    on_error = 'end, at rest'
+    ahead = True
+
     def __init__(self, before_n: Vector, touch: TouchParams) -> None:
         super().__init__(Phase.LIFT, GO_BACK_S + 1.0, 'the finger to go back')
         self._before_n = before_n
         self._touch = touch
+
+    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
+        """Stay: no direction helps."""
+        return ()
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go down for a short time at most."""
@@ -1105,8 +1168,14 @@ class CalmDown(Stage):
     """Stand still, until the force sensor can be believed.
 
     An arm that proves free air by itself may have seen less of the lift than the explorer did, or its controller may
-    not have taken the command to zero. Standing still would prove nothing more, so that the finger rises again.
+    not have taken the command to zero. Standing still would prove nothing more, so that the finger rises again, as long
+    as the force stays what it was when it first stood.
     """
+
+    commands = ('rest', 'up')
+    ends = 'the force sensor is zeroed'
+    on_error = 'GoBack, Rise again, or Lift'
+    ahead = True
 
     def __init__(self, zeroed: Callable[[], bool], force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.lift_timeout_s, 'the arm to zero its force sensor')
@@ -1116,11 +1185,17 @@ class CalmDown(Stage):
         self._believed = False
         self._rest_ns = 0
         self._start_m = self._rest_m = 0.0
+        self._free_n = (0.0, 0.0, 0.0)
+
+    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
+        """Go back from what the finger met."""
+        return (GoBack(error.before_n, self._touch),) if isinstance(error, WrongWay) else None
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Note when and where the arm came to rest."""
         super().begin(time_ns, arm)
         self._rest_ns, self._start_m, self._rest_m = time_ns, arm.position[2], arm.position[2]
+        self._free_n = arm.force_vector_n
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
@@ -1133,13 +1208,17 @@ class CalmDown(Stage):
         height_m = arm.position[2]
         if rested_s < PATIENCE_S or height_m - self._start_m > self._touch.approach_travel_m:
             return ArmCommand()
+        met_n = math.dist(arm.force_vector_n, self._free_n)
+        if met_n > self._touch.contact_force_n and not self._zeroed():
+            raise WrongWay(
+                f'the finger met something while it rose for its force sensor to be zeroed, {met_n:.2f} N; see what is '
+                'above it, and that the z axis of the surface points away from it',
+                self._free_n,
+            )
         if height_m - self._rest_m < self._touch.clearance_m:
             return ArmCommand(normal_m_s=self._speed_m_s)
         self._rest_ns, self._rest_m = time_ns, height_m
         return ArmCommand()
-
-
-AHEAD = (Rise, CalmDown, GoBack)  # the stages of a motion that lifts first
 
 
 # --------------------
@@ -1174,19 +1253,23 @@ class Motion:
         self._finish_reason = ''
         self._zeroed: Callable[[], bool] | None = None  # while the stages ahead of the motion lift first
         self._ended_ahead = self._free_ahead = False  # it ends by them, and whether the finger was free in them
+        self._rise: Rise | None = None  # the first
         self.error = ExplorationError.NONE
 
-    def lift_first(self, zeroed: Callable[[], bool]) -> Motion:
+    def lift_first(self, zeroed: Callable[[], bool], zero_n: Vector | None = None) -> Motion:
         """Begin with a lift and a rest, and return itself.
 
         Parameters
         ----------
         zeroed
             Whether the force sensor of the arm can be believed once it stands still in free air.
+        zero_n
+            What it shows before the first lift since the arm was connected; None: before this one.
         """
         along = self._slide.along
         self._zeroed = zeroed
-        self._remaining_stages[:0] = [self._rise(), CalmDown(zeroed, along.force_n, along.touch, along.limits)]
+        self._rise = Rise(along.force_n, along.touch, along.limits, zero_n=zero_n)
+        self._remaining_stages[:0] = [self._rise, CalmDown(zeroed, along.force_n, along.touch, along.limits)]
         return self
 
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
@@ -1197,14 +1280,13 @@ class Motion:
         command = self._try_stage(time_ns, arm)
         while command is None and self._remaining_stages:
             self._stage = self._remaining_stages.pop(0)
-            if not isinstance(self._stage, AHEAD):
+            if not self._stage.ahead:
                 self._zeroed = None
             self._stage.begin(time_ns, arm)
             command = self._try_stage(time_ns, arm)
         if self._stage is None or command is None:
             self._stage, command = None, ArmCommand()
-            if isinstance(self._lift, LiftStage):
-                self._lift.see(arm)
+            self._lift.see(arm)
             self._phase = Phase.ABORTED if self._abort_reason else Phase.DONE
         else:
             self._phase = self._stage.phase
@@ -1224,8 +1306,8 @@ class Motion:
         if self._phase in (Phase.DONE, Phase.ABORTED):
             return
         if self._zeroed is not None and not self._zeroed():
-            if not self._abort_reason:
-                self._end_ahead(reason, self._rise(signed=False))
+            if not self._abort_reason and self._rise:
+                self._end_ahead(reason, self._rise.again())
             return
         self._abort_reason = self._abort_reason or reason
         if self._stage is not self._lift:
@@ -1237,6 +1319,11 @@ class Motion:
             self._finish_reason = reason
             self._slide.finish()
 
+    def lift_from(self, place: Vector) -> LiftStage:
+        """Return another lift from a place, for whoever cannot trust this motion any more."""
+        along, (x, y, z) = self._slide.along, place
+        return LiftStage((x, y, z + along.touch.clearance_m), along.force_n, along.touch, along.limits)
+
     @property
     def force_n(self) -> float:
         """The wanted force of the slide."""
@@ -1247,7 +1334,7 @@ class Motion:
         """Whether the finger was lifted at the end, and the measured force says so."""
         if self._ended_ahead:
             return self._free_ahead
-        return isinstance(self._lift, LiftStage) and self._lift.free
+        return bool(self._lift.free)
 
     @property
     def message(self) -> str:
@@ -1255,10 +1342,6 @@ class Motion:
         if self._ended_ahead and not self._free_ahead:
             return f'{self._abort_reason}; the finger was not lifted'
         return self._abort_reason or self._finish_reason or 'the motion ended as asked'
-
-    def _rise(self, signed: bool = True) -> Rise:
-        along = self._slide.along
-        return Rise(along.force_n, along.touch, along.limits, signed)
 
     def _try_stage(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command of the present stage; None if it is over, cannot go on, or there is none."""
@@ -1271,21 +1354,17 @@ class Motion:
             self._give_way(stage, error)
             return None
         finally:
-            if isinstance(stage, Rise):
+            if stage.ahead and stage.free is not None:
                 self._free_ahead = stage.free
 
     def _give_way(self, stage: Stage, error: MotionAborted) -> None:
-        """Go on in the way that is left: back, further up, by the lift, or stay where the finger is."""
+        """Go on in the way that the stage leaves: back, further up, by the lift, or stay where the finger is."""
         reason, self.error = str(error), self.error or error.error
         if stage is self._lift:
             before = f'{self._abort_reason}; ' if self._abort_reason else ''
             self._abort_reason = f'{before}the finger was not lifted: {reason}'
-        elif isinstance(error, WrongWay):
-            self._end_ahead(reason, GoBack(error.before_n, self._slide.along.touch))
-        elif isinstance(error, WrongSign):
-            self._end_ahead(reason, self._rise(signed=False))
-        elif isinstance(stage, (Rise, GoBack)):
-            self._end_ahead(reason)
+        elif (way := stage.way_out(error)) is not None:
+            self._end_ahead(reason, *way)
         else:
             self.abort(reason)
 
@@ -1300,3 +1379,70 @@ class Motion:
 # height it lifts, m, in the frame of the surface; how the finger touches; and what is allowed. MotionRefused if a
 # number is out of its range or does not belong to this motion, or the path leaves the workspace.
 Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
+
+
+# --------------------
+# The state machine and the limits, each once: docs/motion.md shows both tables.
+
+STATES: tuple[type[Stage], ...] = (
+    Rise,
+    CalmDown,
+    GoBack,
+    GoHomeStage,
+    ApproachStage,
+    SettleForceStage,
+    AccelerateStage,
+    SlideStage,
+    BrakeStage,
+    LiftStage,
+)
+
+
+class Limit(NamedTuple):
+    """What is limited, by which value, who checks it, how fast, and what follows."""
+
+    name: str
+    quantity: str
+    value: str
+    checks: str
+    soon: str
+    follows: str
+
+
+EVERY_STEP = 'each step, 10 ms'
+LIMITS: tuple[Limit, ...] = (
+    Limit(
+        'MOST_FORCE_N, MOST_M', 'number of a sample', 'finite, 10 kN, 100 m', 'arm and Exploration', 'at once', 'lift'
+    ),
+    Limit('force_limit_n', 'force in any direction', '10 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit('friction_limit', 'force along the surface', '2 × normal + 1 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit('x_low_m to z_high_m', 'place', '±0.2 m; −0.02 to 0.2 m', 'Exploration', EVERY_STEP, 'lift'),
+    Limit('surface_tolerance_m', 'height of the contact', '20 mm', 'Exploration', EVERY_STEP, 'lift'),
+    Limit('state_timeout_s', 'age of the state', '0.13 s', 'Exploration', EVERY_STEP, 'stop'),
+    Limit('signal_timeout_s', 'silence of the sensor', '0.5 s', 'SignalWatch', EVERY_STEP, 'lift'),
+    Limit('frozen_force_s', 'force that repeats', '0.06 s', 'ForceWatch', EVERY_STEP, 'lift'),
+    Limit('force_drift_fraction', 'drift in free air', '30 %', 'ForceWatch', 'after the lift', 'no success'),
+    Limit('OVERSHOOT', 'force before the slide', '20 % above the wanted', 'OvershootWatch', '3 steps', 'lift'),
+    Limit('HARD, LATE_S', 'force after the first touch', '2 impacts; 30 ms', 'ForceLoop', 'delay + 0.13 s', 'lift'),
+    Limit('peak_force_fraction', 'force in the slide', '50 % above the wanted', 'SlideWatch', '3 steps', 'no window'),
+    Limit('peak_speed_fraction', 'speed in the slide', '50 % above the wanted', 'SlideWatch', '50 ms', 'no window'),
+    Limit('lost_contact_s', 'time without contact', '0.1 s', 'ContactWatch', EVERY_STEP, 'lift'),
+    Limit('stall_s', 'way by commanded way', '25 % in 0.25 s', 'StallWatch', '0.25 s', 'lift'),
+    Limit('MOST_FORCE_SHARE', 'change of the force in a rise', '65 % of force_limit_n', 'Rise', EVERY_STEP, 'go back'),
+    Limit('approach_travel_m', 'way down in search', '50 mm', 'ApproachStage', EVERY_STEP, 'lift'),
+    Limit('approach_timeout_s, …', 'time of a stage', '10, 10, 2, 5 s', 'Stage', EVERY_STEP, 'lift'),
+    Limit('command_speed_m_s, …', 'a single command', '1 m/s, 0.5 m/s, 50 N', 'arm', 'at once', 'refused, stop'),
+)
+
+
+def state_table() -> str:
+    """Return the state machine as rows of a table."""
+    rows = (
+        f'| `{state.__name__}` | {", ".join(state.commands)} | {state.ends} | {state.on_error} |' for state in STATES
+    )
+    return '\n'.join(rows)
+
+
+def limit_table() -> str:
+    """Return the limits as rows of a table."""
+    return '\n'.join(f'| `{row.name}` | {" | ".join(row[1:])} |' for row in LIMITS)

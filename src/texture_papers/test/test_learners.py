@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from sklearn.mixture import GaussianMixture
-from sklearn.naive_bayes import CategoricalNB, GaussianNB
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
@@ -21,21 +20,18 @@ from texture_estimation.model import load_model
 from texture_estimation.recipe import LEARNERS, Recipe
 from texture_estimation.training import train
 from texture_papers.hu import SvmMaxWins, principal_components
-from texture_papers.jamali import NaiveBayes, bins_of
 from texture_papers.kaboli import (
     EmMixture,
     PassiveAggressive,
     SvmLinear,
-    move_each_plane,
     move_true_and_rival,
 )
-from texture_papers.roberge import AnnPairs, Network, SvmPairs, fit_network, pairs_won
+from texture_papers.roberge import Network, SvmPairs, fit_network, pairs_won
 
 # What the papers add: the shared checks hold for it, too.
 PAPERS = (
     *(f'texture_papers.roberge:{name}' for name in ('AnnPairs', 'SvmPairs', 'TunedPairs')),
     *(f'texture_papers.kaboli:{name}' for name in ('SvmLinear', 'PassiveAggressive', 'EmMixture')),
-    'texture_papers.jamali:NaiveBayes',
     'texture_papers.hu:SvmMaxWins',
 )
 # Less of what takes time only.
@@ -109,9 +105,9 @@ def test_features_that_report_nothing_new_do_no_harm(name, make_examples, more):
 
     model, fresh = learn(name, widened(make_examples())), widened(make_examples(seed=1))
     assert np.isfinite(model.predict_log_proba(fresh.values)).all()
-    assert accuracy(model, fresh) > (
-        0.5 if name == 'texture_papers.kaboli:EmMixture' else 0.85
-    )  # clusters are found without labels
+    # Clusters are found without labels; the components of Hu et al. take the features to be of one unit.
+    least = {'texture_papers.kaboli:EmMixture': 0.5, 'texture_papers.hu:SvmMaxWins': 0.2}
+    assert accuracy(model, fresh) > least.get(name, 0.85)
 
 
 @pytest.mark.parametrize(('slides', 'windows'), [(1, 1), (2, 1), (1, 2)])
@@ -152,31 +148,6 @@ def test_pairwise_machines_decide_as_scikit_learn_with_the_kernel_of_matlab(task
     np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(scaler.transform(fresh))[clear])
 
 
-def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
-    examples, codes, _, fresh = task
-    _, answers = evaluated(NaiveBayes(), *task)
-    scaler = StandardScaler().fit(examples.values)
-    expected = GaussianNB(var_smoothing=1e-9).fit(scaler.transform(examples.values), codes)
-    np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
-
-
-def test_counted_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
-    examples, codes, _, fresh = task
-    parameters = NaiveBayes(bins=4).fit(examples.values, codes, np.arange(len(codes))).parameters
-    known = [bins_of(values, parameters['edges']) for values in (examples.values, fresh)]
-    expected = CategoricalNB(min_categories=4).fit(known[0], codes)
-    np.testing.assert_allclose(NaiveBayes.predictor(parameters)(fresh), expected.predict_log_proba(known[1]), atol=1e-9)
-
-
-@pytest.mark.parametrize('learner', [SvmPairs(ties='nearest'), AnnPairs(ties='nearest', iterations=3)])
-def test_pairwise_learners_give_ties_to_the_clearer_label_if_asked_and_change_nothing_else(task, learner):
-    strict = evaluated(dataclasses.replace(learner, ties='unclassified'), *task)[1]
-    nearest = evaluated(learner, *task)[1]
-    clear = ~is_tied(strict)
-    np.testing.assert_array_equal(nearest.argmax(axis=1)[clear], strict.argmax(axis=1)[clear])
-    assert not is_tied(nearest).any()
-
-
 def test_linear_machines_decide_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
     learner = SvmLinear(least_c=0.5, most_c=0.5, candidates=1, repeats=1)
@@ -188,10 +159,10 @@ def test_linear_machines_decide_every_window_as_scikit_learn(task):
 
 def test_max_wins_on_principal_components_decides_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
-    learner = SvmMaxWins(variance=0.9, gamma=1.0, c=3.0)
+    learner = SvmMaxWins(variance=0.9, c=3.0)
     _, answers = evaluated(learner, *task)
     components = learner.fit(examples.values, codes, codes).parameters['components']
-    project = lambda values: (values - examples.values.mean(axis=0)) @ components  # noqa: E731
+    project = lambda values: values @ components  # noqa: E731
     svc = SVC(C=3.0, gamma='scale', break_ties=True).fit(project(examples.values), codes)
     np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(project(fresh)))
 
@@ -200,7 +171,7 @@ def test_the_mixture_finds_the_clusters_of_scikit_learn(task):
     examples, codes, _, fresh = task
     _, answers = evaluated(EmMixture(starts=1), *task)
     scaler = StandardScaler().fit(examples.values)
-    mixture = GaussianMixture(len(np.unique(codes)), reg_covar=1e-3, random_state=0).fit(
+    mixture = GaussianMixture(len(np.unique(codes)), covariance_type='diag', reg_covar=1e-3, random_state=0).fit(
         scaler.transform(examples.values)
     )
     found = np.exp(answers).argmax(axis=1)
@@ -247,14 +218,6 @@ def test_a_network_with_noise_stops_before_it_learns_the_noise():
     assert np.mean((network(values[~held]) > 0.5) == targets[~held]) < 0.9
 
 
-def test_an_example_that_is_far_enough_moves_no_plane_and_another_just_so_far_as_needed():
-    planes = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
-    move_each_plane(planes, np.array([2.0, 0.0]), 0, 1.0)
-    assert planes.tolist() == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
-    move_each_plane(planes, np.array([0.0, 1.0]), 0, 1.0)
-    np.testing.assert_allclose(planes @ [0.0, 1.0, 1.0], [1.0, -1.0])
-
-
 @pytest.mark.parametrize('c', [0.01, 1.0])
 def test_multi_class_planes_move_as_little_as_the_example_demands(c):
     # Crammer et al. 2006, section 8: least ||W - W'||² / 2 + c · slack, the true label ahead of its strongest rival.
@@ -295,7 +258,7 @@ def test_more_passes_go_on_where_the_last_one_ended_and_fit_the_examples_better(
     standard = (examples.values - one['mean']) / one['scale']
     order = np.argsort([np.sum(codes[:row] == codes[row]) for row in range(len(codes))], kind='stable')
     for row in [*order] * 10:
-        move_each_plane(planes, standard[row], int(codes[row]), 1.0)
+        move_true_and_rival(planes, standard[row], int(codes[row]), 1.0)
     np.testing.assert_allclose(ten['planes'], planes, atol=1e-9)
     right = [
         np.mean(PassiveAggressive.predictor(each)(examples.values).argmax(axis=1) == codes) for each in (one, fifty)
@@ -316,19 +279,23 @@ def test_principal_components_are_orthonormal_and_explain_what_they_should(shape
 def test_components_of_examples_less_their_own_means_are_those_of_eq_7():
     values = np.random.default_rng(0).normal(size=(40, 6)) + np.arange(6.0) + np.arange(40.0)[:, None]
     codes = np.repeat([0, 1], 20)
-    parameters = SvmMaxWins(variance=0.9, centre='examples').fit(values, codes, np.arange(40)).parameters
+    parameters = SvmMaxWins(variance=0.9).fit(values, codes, np.arange(40)).parameters
     centred = values - values.mean(axis=1, keepdims=True)  # eq. 7: the mean over k of x_i(k)
     variances, vectors = np.linalg.eigh(centred.T @ centred / 40)  # eq. 8
     shares = np.cumsum(variances[::-1]) / variances.sum()  # eq. 10
     count = int((shares < 0.9).sum()) + 1
     assert parameters['components'].shape == (6, count)
-    projected = (values - parameters['mean']) @ parameters['components']
+    projected = values @ parameters['components']
     np.testing.assert_allclose(np.abs(projected), np.abs(centred @ vectors[:, ::-1][:, :count]), atol=1e-9)
 
 
 def test_two_directions_have_components_of_their_own_and_odd_features_are_refused(examples):
     codes, groups = codes_of(examples)
     components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parameters['components']
+    assert SvmMaxWins(components=2, blocks=2).fit(examples.values, codes, groups).parameters['components'].shape == (
+        6,
+        4,
+    )
     assert not ((components[:3] != 0).any(axis=0) & (components[3:] != 0).any(axis=0)).any()
     with pytest.raises(InvalidParameter, match="'blocks' of svm_max_wins is 4"):
         SvmMaxWins(blocks=4).fit(examples.values, codes, groups)
@@ -336,7 +303,7 @@ def test_two_directions_have_components_of_their_own_and_odd_features_are_refuse
 
 def test_one_added_slide_moves_the_planes_themselves_and_is_taken_back(make_examples):
     examples = make_examples(labels=('cork', 'felt', 'slate'))
-    learner = {'texture_papers.kaboli:PassiveAggressive': {'multiclass': 'crammer_singer', 'passes': 20}}
+    learner = {'texture_papers.kaboli:PassiveAggressive': {'passes': 20}}
     model = train(
         Recipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner}, 'online'), examples
     )

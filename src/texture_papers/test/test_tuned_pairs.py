@@ -13,8 +13,8 @@ from texture_estimation.learners.learner import is_tied
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
-from texture_evaluation.optimise import joined_recipe
 from texture_papers.roberge import AnnPairs, SvmPairs, TunedPairs
+from texture_papers.search import joined_recipe
 
 LABELS = ('cork', 'felt', 'slate', 'wood')
 NAMES = ('signal#1/a', 'signal#1/b', 'signal#2/a', 'signal#2/b', 'signal#2/c', 'signal#3/a')
@@ -101,7 +101,6 @@ def test_a_model_of_pairs_is_stored_and_loads_with_all_its_variables(recipe, exa
     ('values', 'error', 'sentence'),
     [
         ({'pair': []}, InvalidParameter, "did you mean 'pairs'"),
-        ({'ties': 'random'}, InvalidParameter, "ties is 'random'; allowed is unclassified or nearest"),
         ({'learner': 'mlp'}, UnknownName, "no learner of pairs 'mlp'"),
         ({'pairs': [{'pair': ['cork']}]}, InvalidParameter, 'the labels of two textures are needed'),
         ({'pairs': [{'pair': ['a', 'b'], 'input': []}]}, InvalidParameter, "did you mean 'inputs'"),

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from texture_core.config import find
 from texture_core.errors import InvalidParameter
-from texture_estimation.search import space_for
 from texture_papers import hu_experiment, jamali_experiment, kaboli_experiment, rispal_experiment, roberge_experiment
 from texture_papers.protocol import Experiment, ExperimentResult, Run, over_seeds
 from texture_papers.report import charts_of, digests, run
@@ -35,13 +34,16 @@ EXPERIMENTS: Mapping[str, Run] = {
     'hu-components': hu_experiment.run_components,  # how many components one linen takes
     'roughness': rispal_experiment.run,  # Rispal et al.: grades of textures never touched
 }
-# Of each row of figures, by its name, as it is now: a stored row with another one is neither kept nor published.
+TUNED = tuple(name for name, one in PROTOCOLS.items() if any(m.search for task in one.tasks for m in task.methods))
+# Of each stored file the digests of its rows as they are now: rows with others are neither kept nor published.
 DIGESTS: Mapping[str, Callable[[], Mapping[str, str]]] = {
     **{name: partial(digests, protocol) for name, protocol in PROTOCOLS.items()},
+    **{f'{name}-tuned': partial(digests, PROTOCOLS[name], tuned=True) for name in TUNED},
     'friction': roberge_experiment.friction_digests,
     'kaboli-online': kaboli_experiment.online_digests,
     'hu-components': hu_experiment.component_digests,
     'roughness': rispal_experiment.digests,
+    'roughness-tuned': partial(rispal_experiment.digests, tuned=True),
 }
 
 __all__ = ['DIGESTS', 'EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment', 'run_over_seeds']
@@ -50,9 +52,7 @@ __all__ = ['DIGESTS', 'EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_expe
 def _run_of(name: str, experiment: Experiment) -> Run:
     """Return what runs an experiment; refused is a search where the paper has none."""
     found = find(EXPERIMENTS, name, 'experiment')
-    recipes = {method.recipe for task in PROTOCOLS[name].tasks for method in task.methods} if name in PROTOCOLS else ()
-    searches = name == 'roughness' or any(space_for('recipes', recipe) for recipe in recipes)
-    if experiment.tune and not searches:
+    if experiment.tune and name not in (*TUNED, 'roughness'):
         raise InvalidParameter(
             f"experiment '{name}' has nothing to tune: its paper searches for no parameters; leave --tune out"
         )
@@ -60,14 +60,15 @@ def _run_of(name: str, experiment: Experiment) -> Run:
 
 
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
-    """Run one experiment; return its result and the JSON file, beside which its charts lie."""
+    """Run one experiment; return its result and the JSON file, next to which its charts lie."""
     result = _run_of(name, experiment)(experiment)
     return result, result.write(experiment.out)
 
 
 def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
     """Run one experiment with so many seeds from its own on; return what `run_experiment` does."""
-    result = over_seeds(_run_of(name, experiment), name, experiment, count, DIGESTS[name]())
-    if name in PROTOCOLS:
+    run_of = _run_of(name, experiment)
+    result = over_seeds(run_of, name, experiment, count, DIGESTS[f'{name}{"-tuned" if experiment.tune else ""}']())
+    if name in PROTOCOLS and not experiment.tune:
         result = replace(result, charts=charts_of(PROTOCOLS[name], result.numbers, name, experiment.out))
     return result, result.write(experiment.out)

@@ -15,15 +15,13 @@ contact
     Here: Steady sliding alone, by the states of the exploration or found in the signal.
 peaks
     Paper: Algorithm 1: equal regions by energy, neighbours joined; their number is not told (IV.A).
-    Here: `RegionPeaks` with 32 regions: the frequency of the largest coefficient of each peak (IV.B); `…-heights`
-        has the coefficients, too.
+    Here: `RegionPeaks` with 32 regions: the frequency of the largest coefficient of each peak (IV.B).
 learner
     Paper: Naive Bayes of Weka (IV.B, VI).
-    Here: `NaiveBayes` with normal distributions; `…-heights` counts in bins that were tuned on recordings.
+    Here: scikit-learn's `GaussianNB`: normal distributions of standardised features.
 baseline
     Paper: "Average amplitude", "averaging the signals of each sensor" in the middle third (VI).
-    Here: `MeanAmplitude`, the mean of |s|, the reading nearest to the words and to 65.75 %; the experiment has the
-        others.
+    Here: `MeanAmplitude`, the mean of |s|, the reading nearest to the words and to 65.75 %.
 future work
     Paper: Short-term Fourier and wavelet transform, symbols (VII), without figures.
     Here: `jamali-stft`, `-wavelets`, `-symbols`; what of them is taken is ours.
@@ -31,28 +29,16 @@ future work
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, permutations
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.learner import (
-    UNCALIBRATED,
-    Codes,
-    Fitted,
-    Predictor,
-    assign_folds,
-    held_out_scores,
-    log_softmax,
-    standardisation,
-)
-from texture_estimation.learners.sklearn_learner import SklearnPredictor, packed
 from texture_features.features.spectral import amplitudes_of
 from texture_features.windows import WindowBatch
 
@@ -61,8 +47,8 @@ from texture_features.windows import WindowBatch
 class RegionPeaks:
     """Frequency (Hz) of the largest Fourier coefficient in each of the peaks that the regions of highest energy form.
 
-    The paper takes "the Fourier coefficients" in one place and "one frequency for each peak" in another: `heights`
-    gives the amplitudes of the coefficients, too.
+    The paper takes "the Fourier coefficients" in one place and "one frequency for each peak" in another; the latter is
+    meant here.
 
     Source: Jamali & Sammut 2010, Algorithm 1.
     """
@@ -76,23 +62,18 @@ class RegionPeaks:
         "How the peaks are ranked: 'intensity' as found, by their strongest region; by 'frequency', the lowest first.",
         choices=('intensity', 'frequency'),
     )
-    heights: bool = param(False, 'Returns the amplitude of each peak in addition to its frequency.')
     points: int = param(2048, 'FFT length in samples; a shorter window is zero-padded.', low=8, high=1 << 20)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Frequency of each peak in turn, with its amplitude if that is wanted; peaks are numbered from 1."""
-        reported = ('frequency_hz', 'amplitude') if self.heights else ('frequency_hz',)
-        return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in reported)
+        """Frequency of each peak in turn; peaks are numbered from 1."""
+        return tuple(f'{number + 1}/frequency_hz' for number in range(self.peaks))
 
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return the frequency of each peak, each followed by its amplitude if that is wanted."""
+        """Return the frequency of each peak."""
         amplitudes, step_hz = amplitudes_of(windows, self.points)
         bins = region_peaks(amplitudes, self.peaks, self.regions, by_frequency=self.order == 'frequency')
-        if not self.heights:
-            return bins * step_hz
-        heights = np.where(bins > 0, np.take_along_axis(amplitudes, bins.astype(np.intp), axis=-1), 0.0)
-        return np.stack((bins * step_hz, heights), axis=-1).reshape(*bins.shape[:-1], -1)
+        return bins * step_hz
 
 
 def region_peaks(spectrum: Array, count: int, regions: int, *, by_frequency: bool = False) -> Array:
@@ -144,19 +125,11 @@ def _first_step(peak: NDArray[np.intp], rank: NDArray[np.intp], count: int) -> A
     return np.stack(steps, axis=-1).astype(np.float64)
 
 
-AVERAGED: Mapping[str, Callable[[WindowBatch], Array]] = {
-    'deviation': lambda windows: np.abs(windows.centred_rows),
-    'magnitude': lambda windows: np.abs(windows.rows),
-    'signal': lambda windows: windows.rows,
-}
-
-
 @dataclass(frozen=True)
 class MeanAmplitude:
-    """Mean amplitude of each channel, in its unit: the plainest measure of how it vibrates.
+    """Mean of |s| of each channel, in its unit: the plainest measure of how it vibrates.
 
-    The source says "average amplitude of the signal over a fixed window" and "averaging the signals of each sensor",
-    which can be read as the mean of |s - mean(s)|, of |s| or of s itself.
+    The source says "average amplitude of the signal over a fixed window" and "averaging the signals of each sensor".
 
     Source: Jamali & Sammut 2010, section VI (the baseline there).
     """
@@ -164,24 +137,9 @@ class MeanAmplitude:
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    of: str = param(
-        'deviation',
-        "What is averaged: 'deviation' takes |s - mean(s)|, 'magnitude' takes |s|, 'signal' takes s itself.",
-        choices=tuple(AVERAGED),
-    )
-    logarithm: bool = param(False, 'Returns the logarithm of the absolute amplitude instead of the amplitude itself.')
-    floor: float = param(
-        1e-10,
-        'Amplitude added before the logarithm, so that silence gives a finite value, unit.',
-        low=1e-300,
-        high=1e300,
-    )
-
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return the mean, or the logarithm of its absolute value."""
-        rows = AVERAGED[self.of](windows)
-        amplitudes: Array = np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]
-        return np.log(np.abs(amplitudes) + self.floor) if self.logarithm else amplitudes
+        """Return the mean of the absolute signal."""
+        return np.add.reduce(np.abs(windows.rows), axis=-1, keepdims=True) / windows.rows.shape[-1]
 
 
 # Scaling filter of Daubechies' wavelet with four vanishing moments: Daubechies 1992, table 6.1, to double precision.
@@ -298,81 +256,3 @@ def _pattern_of_code(length: int) -> NDArray[np.intp]:
         pairs = enumerate(combinations(ranks, 2))
         table[sum((earlier > later) << bit for bit, (earlier, later) in pairs)] = number
     return table
-
-
-FOLDS = 5
-
-
-@dataclass(frozen=True)
-class NaiveBayes:
-    """Each feature is distributed for each label independently of the others.
-
-    Source: Jamali & Sammut 2010, section IV.B.
-    """
-
-    smoothing: float = param(
-        1e-9,
-        'Variance added to each class, as a fraction of the variance over all classes; a larger one smooths more.',
-        low=1e-12,
-        high=1.0,
-    )
-    bins: int = param(
-        0,
-        'Number of equally filled histogram bins per feature; 0 takes normal distributions.',
-        low=0,
-        high=1000,
-    )
-
-    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
-        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
-        n_labels = int(y.max()) + 1
-        split = assign_folds(y, groups, FOLDS)
-        parameters = self._fit(X, y, n_labels)
-        if split is None:
-            return Fitted(parameters, None, UNCALIBRATED)
-        held_out = held_out_scores(
-            lambda held: self.predictor(self._fit(X[~held], y[~held], n_labels)), X, split[0], n_labels
-        )
-        return Fitted(parameters, held_out, f'not calibrated; growth from {split[1]}')
-
-    @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> Predictor:
-        """Return the predictor made from the stored parameters."""
-        if 'edges' not in parameters:
-            return SklearnPredictor.of_packed(**parameters)
-        edges, log_shares, log_priors = (parameters[name] for name in ('edges', 'log_shares', 'log_priors'))
-
-        def predict(X: Array) -> Array:
-            shares = log_shares[np.arange(len(edges)), bins_of(X, edges)]
-            return log_softmax(np.add.reduce(shares, axis=-2) + log_priors)
-
-        return predict
-
-    def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
-        return self._counted(X, y, n_labels) if self.bins else self._normal(X, y, n_labels)
-
-    def _counted(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
-        edges = np.quantile(X, np.arange(1, self.bins) / self.bins, axis=0).T
-        places = bins_of(X, edges)
-        counts = np.ones((X.shape[1], self.bins, n_labels))  # none is impossible because it never occurred
-        np.add.at(counts, (np.arange(X.shape[1]), places, y[:, None]), 1.0)
-        log_priors = np.log(np.bincount(y, minlength=n_labels) / len(y))
-        return {
-            'edges': edges,
-            'log_shares': np.log(counts / counts.sum(axis=1, keepdims=True)),
-            'log_priors': log_priors,
-        }
-
-    def _normal(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
-        from sklearn.naive_bayes import GaussianNB  # noqa: PLC0415  # scikit-learn takes a second to import
-
-        mean, scale = standardisation(X)
-        bayes = GaussianNB(var_smoothing=0.0).fit((X - mean) / scale, y)
-        bayes.var_ += self.smoothing  # of variance 1; of constant features, too, where scikit-learn would add nothing
-        stored = packed(bayes, 'GaussianNB')
-        return {'packed': stored, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'floor': 0.0}
-
-
-def bins_of(values: Array, edges: Array) -> Codes:
-    """Return how many edges, (n_features, n_edges), each value lies above, (..., n_features)."""
-    return np.count_nonzero(values[..., None] > edges, axis=-1)

@@ -32,8 +32,8 @@ online learning
         live.
 clusters
     Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not told.
-    Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, by the recipe of the
-        training slides.
+    Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, whose labels name the
+        clusters; by the recipe of the training slides.
 objects
     Paper: Ten balls and ten of various shapes; "regardless of object shape" (VI).
     Here: Scene `kaboli`: flat, one skin; scene `kaboli_shapes`: curved, fingers that differ. Sizes are guesses.
@@ -45,12 +45,11 @@ random movements
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
@@ -58,7 +57,7 @@ from texture_estimation.learners.learner import Codes, Fitted, Predictor, log_so
 from texture_estimation.learners.sklearn_learner import packed, unpacked
 from texture_features.features.temporal import Hjorth
 from texture_features.windows import WindowBatch, centred, power
-from texture_papers.roberge import PairsPredictor
+from texture_papers.roberge import PairsPredictor, pairs_of_machine
 
 
 @dataclass(frozen=True)
@@ -179,20 +178,10 @@ ITERATIONS = 100_000  # of libsvm: a pair that cannot be separated need not be f
 class SvmLinear:
     """Linear machines for all pairs; most pairs won, ties broken by the clearer decisions.
 
-    The penalty C with the best mean accuracy over `repeats` random splits into `folds` parts is taken, the smallest
-    of those that tie. No slide is on both sides of a split.
+    A pipeline of scikit-learn with the penalty C that is best by repeated stratified cross-validation, the smallest of
+    those that tie. A label with fewer slides than there are folds is not held out: then C is the middle one.
 
     Source: Kaboli et al. 2015, section V.A: 5 folds, 10 repeats, 20 values.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = SvmLinear(repeats=1).fit(values, codes, groups)
-    >>> predictor = SvmLinear.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     folds: int = param(5, 'Number of cross-validation folds; more folds take longer to train.', low=2, high=50)
@@ -207,85 +196,38 @@ class SvmLinear:
     )
     least_c: float = param(1e-3, 'Smallest value of C that is tried.', low=1e-9, high=1e9)
     most_c: float = param(1e3, 'Largest value of C that is tried.', low=1e-9, high=1e9)
-    examples: int = param(200, 'Largest number of examples with which C is chosen; more are subsampled evenly.', low=10)
-    seed: int = param(0, 'Seed of the random folds; equal seeds give equal models.', low=0)
+    ties: ClassVar[str] = 'nearest'
+
+    def machine(self, X: Array, y: Codes, groups: Codes) -> Any:
+        """Return the fitted pipeline."""
+        from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415  # scikit-learn takes a second to import
+        from sklearn.model_selection import GridSearchCV, StratifiedGroupKFold  # noqa: PLC0415
+        from sklearn.pipeline import make_pipeline  # noqa: PLC0415
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        svc = SVC(kernel='linear', max_iter=ITERATIONS, decision_function_shape='ovo')
+        machines = make_pipeline(StandardScaler(), svc)
+        tried = np.geomspace(self.least_c, self.most_c, self.candidates)
+        slides = min(len(np.unique(groups[y == code])) for code in np.unique(y))
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore', ConvergenceWarning)  # the limit of iterations is meant
+            if slides < self.folds:
+                return machines.set_params(svc__C=tried[len(tried) // 2]).fit(X, y)
+            divided = [StratifiedGroupKFold(self.folds, shuffle=True, random_state=n) for n in range(self.repeats)]
+            splits = [split for one in divided for split in one.split(X, y, groups)]
+            return GridSearchCV(machines, {'svc__C': tried}, cv=splits).fit(X, y).best_estimator_
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
-        mean, scale = standardisation(X)
-        standard = (X - mean) / scale
-        c = self._choose(standard, y, groups)
-        weights, intercepts = _planes(_svc(standard, y, c))
-        parameters = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
-        note = f'not calibrated: pairs won; C = {c:.3g} by {self.repeats} times {self.folds}-fold cross-validation'
-        return Fitted(parameters, None, note)
+        machine = self.machine(X, y, groups)
+        note = f'not calibrated: pairs won; C = {machine.get_params()["svc__C"]:.3g}'
+        return Fitted({'packed': packed(machine, 'SVC'), 'ties': self.ties}, None, note)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
-        mean, intercepts = parameters['mean'], parameters['intercepts']
-        weights = (parameters['weights'] / parameters['scale']).T.copy()
-        return PairsPredictor(lambda X: (X - mean) @ weights + intercepts, 'nearest')
-
-    def _choose(self, standard: Array, y: Codes, groups: Codes) -> float:
-        """Return the penalty that does best on what is held out; the middle one if nothing can be."""
-        tried = np.geomspace(self.least_c, self.most_c, self.candidates)
-        rows = _evenly(y, self.examples)
-        rng = np.random.default_rng(self.seed)
-        assignments = [_divide(y[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
-        splits = [split for folds_of in assignments for split in _splits(rows, folds_of, y)]
-        if not splits:
-            return float(tried[len(tried) // 2])
-        right = [
-            sum(int((_svc(standard[a], y[a], c).predict(standard[b]) == y[b]).sum()) for a, b in splits) for c in tried
-        ]
-        return float(tried[int(np.argmax(right))])
-
-
-def _svc(standard: Array, y: Codes, c: float) -> Any:
-    from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415  # scikit-learn takes a second to import
-    from sklearn.svm import SVC  # noqa: PLC0415
-
-    with warnings.catch_warnings():
-        warnings.simplefilter('ignore', ConvergenceWarning)  # the limit of iterations is meant
-        return SVC(C=c, kernel='linear', max_iter=ITERATIONS).fit(standard, y)
-
-
-def _planes(svc: Any) -> tuple[Array, Array]:
-    """Return weights and intercept of each pair; scikit-learn turns the sign round for two labels."""
-    sign = -1.0 if len(svc.n_support_) == 2 else 1.0
-    return sign * np.asarray(svc.coef_), sign * np.asarray(svc.intercept_)
-
-
-def _evenly(y: Codes, count: int) -> NDArray[np.intp]:
-    """Return at most `count` rows, as many of each label, spread over all of its examples; two of each at least."""
-    labels = np.unique(y)
-    each = max(2, count // len(labels))
-    chosen = []
-    for label in labels:
-        rows = np.flatnonzero(y == label)
-        chosen.append(rows[np.unique(np.linspace(0, len(rows) - 1, min(each, len(rows))).astype(np.intp))])
-    return np.sort(np.concatenate(chosen))
-
-
-def _splits(rows: Codes, folds_of: Codes, y: Codes) -> Iterator[tuple[Codes, Codes]]:
-    """Yield the rows for training and those held out of each fold that leaves two labels for the training."""
-    for part in np.unique(folds_of):
-        training, held = rows[folds_of != part], rows[folds_of == part]
-        if len(np.unique(y[training])) > 1:
-            yield training, held
-
-
-def _divide(y: Codes, groups: Codes, folds: int, rng: np.random.Generator) -> Codes:
-    """Return the part of each example at random: the slides of each label are assigned in turn."""
-    folds_of = np.zeros(len(y), dtype=np.intp)
-    for code in np.unique(y):
-        rows = np.flatnonzero(y == code)
-        slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
-        if slides.max() == 0:  # a single slide: its windows are assigned
-            slides = np.arange(len(rows))
-        folds_of[rows] = rng.permutation(slides.max() + 1)[slides] % folds
-    return folds_of
+        return pairs_of_machine(parameters)
 
 
 @dataclass(frozen=True)
@@ -295,17 +237,10 @@ class PassiveAggressive:
     The examples are taken in rounds: the first of each label, then the second of each, and so on. Their order matters.
     One pass is online learning: each example is seen once.
 
-    Source: Crammer et al. 2006, PA-I: section 4 (one label against the others), section 8 (all labels together);
-    Kaboli et al. 2015, section V.B.
+    Source: Crammer et al. 2006, PA-I, section 8 (all labels together); Kaboli et al. 2015, section V.B.
     """
 
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
-    multiclass: str = param(
-        'one_vs_rest',
-        "How planes of several labels learn: 'one_vs_rest' moves the plane of each label by itself, "
-        "'crammer_singer' moves those of the true label and of its strongest rival alone.",
-        choices=('one_vs_rest', 'crammer_singer'),
-    )
     rounds: int = param(0, 'Number of examples of each label to train on; 0 takes all.', low=0)
     passes: int = param(
         1,
@@ -321,7 +256,7 @@ class PassiveAggressive:
         mean, scale = standardisation(X[order])
         planes = np.zeros((int(y.max()) + 1, X.shape[1] + 1))
         for row in np.tile(order, self.passes):
-            self._update(planes, (X[row] - mean) / scale, int(y[row]))
+            move_true_and_rival(planes, (X[row] - mean) / scale, int(y[row]), self.c)
         parameters = {'mean': mean, 'scale': scale, 'planes': planes}
         return Fitted(parameters, None, 'not calibrated: distances from the planes')
 
@@ -330,7 +265,7 @@ class PassiveAggressive:
         known = np.asarray(parameters['planes'])
         planes = np.vstack((known, np.zeros((max(0, code + 1 - len(known)), known.shape[1]))))
         for standard in (X - parameters['mean']) / parameters['scale']:
-            self._update(planes, standard, code)
+            move_true_and_rival(planes, standard, code, self.c)
         return {**parameters, 'planes': planes}
 
     @staticmethod
@@ -340,55 +275,14 @@ class PassiveAggressive:
         weights, bias = (planes[:, :-1] / parameters['scale']).T.copy(), planes[:, -1].copy()
         return lambda X: log_softmax((X - mean) @ weights + bias)
 
-    def _update(self, planes: Array, standard: Array, code: int) -> None:
-        UPDATES[self.multiclass](planes, standard, code, self.c)
-
-
-def move_each_plane(planes: Array, standard: Array, code: int, c: float) -> None:
-    """Move the plane of each label by itself as far as one example demands.
-
-    Parameters
-    ----------
-    planes : (n_labels, n_features + 1)
-        Weights, and the bias last; changed in place.
-    standard : (n_features,)
-        Standardised features of the example.
-    code
-        Number of its label.
-    c
-        How far one example may move a plane.
-
-    Source: Crammer et al. 2006, section 4.
-
-    Examples
-    --------
-    >>> planes = np.zeros((2, 2))
-    >>> move_each_plane(planes, np.array([1.0]), code=0, c=1.0)
-    >>> planes.tolist()  # both planes are now at a distance of 1 from it
-    [[0.5, 0.5], [-0.5, -0.5]]
-    """
-    extended = np.append(standard, 1.0)
-    side = np.full(len(planes), -1.0)
-    side[code] = 1.0
-    loss = np.maximum(0.0, 1.0 - side * (planes @ extended))
-    step = np.minimum(c, loss / (extended @ extended))
-    planes += (step * side)[:, None] * extended
-
 
 def move_true_and_rival(planes: Array, standard: Array, code: int, c: float) -> None:
     """Move the planes of the true label and of its strongest rival until the true one scores higher by 1.
 
     Of all planes for which that holds the nearest are taken: tau = min(c, loss / (2 |x|²)) is added to the one and
-    subtracted from the other, times x. The parameters are those of `move_each_plane`.
+    subtracted from the other, times x. `planes` are (n_labels, n_features + 1), the bias last, and change in place.
 
     Source: Crammer et al. 2006, section 8.
-
-    Examples
-    --------
-    >>> planes = np.zeros((2, 2))
-    >>> move_true_and_rival(planes, np.array([1.0]), code=0, c=1.0)
-    >>> (planes @ [1.0, 1.0]).tolist()  # the true label scores higher by 1
-    [0.5, -0.5]
     """
     if len(planes) < 2:
         return
@@ -401,12 +295,6 @@ def move_true_and_rival(planes: Array, standard: Array, code: int, c: float) -> 
     step = min(c, loss / (2.0 * float(extended @ extended))) * extended
     planes[code] += step
     planes[rival] -= step
-
-
-UPDATES: Mapping[str, Callable[[Array, Array, int, float], None]] = {
-    'one_vs_rest': move_each_plane,
-    'crammer_singer': move_true_and_rival,
-}
 
 
 def _in_rounds(y: Codes, rounds: int) -> Codes:
@@ -427,7 +315,8 @@ LEAST = 1e-6
 class EmMixture:
     """A mixture of normal distributions fitted by expectation and maximisation; classes to clusters by majority.
 
-    A label that no cluster is named after is never recognised.
+    A pipeline of scikit-learn; the features of a cluster are independent, as in Weka. A label that no cluster is named
+    after is never recognised.
 
     Source: Kaboli et al. 2015, section V.C.
     """
@@ -435,58 +324,39 @@ class EmMixture:
     clusters_per_label: int = param(
         1, 'Number of clusters per label; more clusters fit more diverse slides of one label.', low=1, high=50
     )
-    covariance: str = param(
-        'full',
-        "Covariance of a cluster: 'full', or 'diag' if features are taken as independent.",
-        choices=('full', 'diag'),
-    )
     regularisation: float = param(
         1e-3,
         'Variance added to the standardised features, which keeps clusters from collapsing; a larger one smooths more.',
         low=1e-9,
     )
     starts: int = param(
-        3, 'Number of random initialisations; the result with the highest likelihood is kept.', low=1, high=1000
+        5, 'Number of random initialisations; the result with the highest likelihood is kept.', low=1, high=1000
     )
     seed: int = param(0, 'Seed of the random initialisations; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         from sklearn.mixture import GaussianMixture  # noqa: PLC0415  # scikit-learn takes a second to import
+        from sklearn.pipeline import make_pipeline  # noqa: PLC0415
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
 
-        mean, scale = standardisation(X)
-        standard = (X - mean) / scale
         n_labels = int(y.max()) + 1
-        distinct = len(np.unique(standard, axis=0))
-        mixture = GaussianMixture(
-            min(self.clusters_per_label * n_labels, distinct),
-            covariance_type=self.covariance,
-            reg_covar=self.regularisation,
-            n_init=self.starts,
-            random_state=self.seed,
-        ).fit(standard)
-        found = mixture.predict(standard)
-        n_clusters = len(mixture.weights_)
-        counts = np.zeros((n_clusters, n_labels))
-        np.add.at(counts, (found, y), 1.0)
-        parameters = {
-            'packed': packed(mixture, 'GaussianMixture'),
-            'mean': mean,
-            'scale': scale,
-            'names': np.eye(n_labels)[counts.argmax(axis=1)],
-        }
-        return Fitted(parameters, None, 'not calibrated: probabilities of clusters found without labels')
+        count = min(self.clusters_per_label * n_labels, len(np.unique(X, axis=0)))
+        settings = {'covariance_type': 'diag', 'reg_covar': self.regularisation, 'n_init': self.starts}
+        clusters = make_pipeline(StandardScaler(), GaussianMixture(count, random_state=self.seed, **settings)).fit(X)
+        named = np.zeros((count, n_labels))
+        np.add.at(named, (clusters.predict(X), y), 1.0)
+        names = np.eye(n_labels)[named.argmax(axis=1)]
+        note = 'not calibrated: probabilities of clusters found without labels'
+        return Fitted({'packed': packed(clusters, 'GaussianMixture'), 'names': names}, None, note)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
-        mixture, mean, scale, names = (
-            unpacked(parameters['packed']),
-            *(parameters[name] for name in ('mean', 'scale', 'names')),
-        )
+        clusters, names = unpacked(parameters['packed']), parameters['names']
 
         def predict(X: Array) -> Array:
-            shares = mixture.predict_proba(np.atleast_2d((X - mean) / scale))
+            shares = clusters.predict_proba(X.reshape(-1, X.shape[-1]))
             return log_softmax(np.log(shares @ names + LEAST)).reshape(*X.shape[:-1], -1)
 
         return predict

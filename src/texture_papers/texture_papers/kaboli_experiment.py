@@ -14,30 +14,24 @@ from texture_core.types import Array
 from texture_estimation.learners.learner import Codes
 from texture_papers.protocol import (
     ON_ALL,
-    Anchor,
     Experiment,
     ExperimentResult,
     Figures,
     Finding,
     Interval,
-    Mask,
     Method,
     MethodResult,
     MethodResults,
     PaperProtocol,
     RecognitionTask,
-    Table,
-    View,
-    Visits,
-    digest_of_row,
-    gather,
     mean,
     recipe_of,
     reduced,
     share,
     training_in,
 )
-from texture_papers.report import at_least, built_in, higher, kept_in, most_errors, right_of
+from texture_papers.report import at_least, built_in, digests, higher, kept_in, most_errors, right_of
+from texture_papers.slides import Mask, View, Visits, gather
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 
@@ -66,9 +60,7 @@ SAME, DIFFERENT, ALL = TASKS = ('same shape', 'various shapes', 'all 20 objects'
 SURFACES = (ROUND, VARIOUS, ROUND + VARIOUS)
 PAPER_SVM, PAPER_EM = (0.97, 0.975, 0.96), (0.8223, 0.835, 0.8058)
 PAPER_PA = 0.87  # t = 10, the average of the three sets
-SVM, PA, OVR, EM = 'kaboli-svm', 'kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em'
-# Not of the paper, whose means are those of the electrodes: temperatures and pressure of the BioTac, too.
-ALL_SLOW = {'texture_papers.kaboli:MeanHjorth': {'omit': ''}, 'texture_papers.kaboli:Correlation': {'omit': ''}}
+SVM, PA, EM = 'kaboli-svm', 'kaboli-pa', 'kaboli-em'
 ROUNDS = tuple(range(1, 11))  # section V.B: after each slide of each object
 PASSES = (5, 20, 50, 200)  # the paper names no number; online learning sees each slide once
 SETS = dict(zip(TASKS, SURFACES, strict=True))
@@ -84,7 +76,6 @@ def findings(outcomes: MethodResults) -> list[Finding]:
         _on_average('PA recognises 87 % after ten slides of each object, one pass', last),
         _on_average(f'PA recognises 87 % after ten slides of each object, {PASSES[-1]} passes', often),
         higher('the SVM is better than PA, one pass', svm, last),
-        higher('not of the paper: planes that learn together know more than each by itself', last, outcomes[ALL, OVR]),
         *(at_least(f'clusters named by majority recognise {task}, EM ({100 * value:g} %)', em[task], value)
           for task, value in zip(TASKS, PAPER_EM, strict=True)),
         *built_in('which objects are alike was chosen', most_errors(
@@ -102,39 +93,6 @@ def _on_average(claim: str, outcome: MethodResult) -> Finding:
     return Finding(claim, f'{100 * centre:.1f} % ({named})', over)
 
 
-def _table(surfaces: tuple[str, ...], errors: Mapping[tuple[str, str], int]) -> Table:
-    """Return a table of 20 test slides an object, given how many of an object were taken for another."""
-    counts = 20 * np.eye(len(surfaces))
-    for (true, said), count in errors.items():
-        row = surfaces.index(true)
-        counts[row, row] -= count
-        counts[row, surfaces.index(said)] += count
-    return [tuple(row) for row in counts.tolist()]
-
-
-FIGURE_4 = _table(
-    ROUND,
-    {
-        ('yellow_ball', 'red_ball'): 1,
-        ('yellow_ball', 'colorful_ball'): 1,
-        ('rough_ball', 'sponge_ball'): 2,
-        ('sponge_ball', 'rough_ball'): 1,
-        ('mirror_ball', 'red_ball'): 1,
-    },
-)
-FIGURE_5 = _table(
-    VARIOUS,
-    {
-        ('toothbrush', 'rough_star'): 1,
-        ('rough_star', 'toothbrush'): 1,
-        ('coffee_capsule', 'spray'): 1,
-        ('spray', 'coffee_capsule'): 1,
-        ('baby_feeder', 'cream_tube'): 1,
-    },
-)
-TABLES = (FIGURE_4, FIGURE_5, None)  # that of all 20 is a picture without numbers
-
-
 def pa(rounds: int) -> str:
     """Return the name of online learning after so many slides of each object."""
     return f'{PA}, t = {rounds}'
@@ -150,18 +108,15 @@ ONLINE = (
     *(Method(PA, Figures(test=PAPER_PA if n == ROUNDS[-1] else None), learner={'rounds': n}, label=pa(n), sets=SETS)
       for n in ROUNDS),
     *(Method(PA, learner={'passes': n}, label=passes(n), sets=SETS) for n in PASSES),
-    Method(OVR),
 )  # fmt: skip
 
 
-def _methods(svm: float, em: float, table: Table | None) -> tuple[Method, ...]:
+def _methods(svm: float, em: float) -> tuple[Method, ...]:
     """Return the machines and, of all slides ("the entire unsupervised data set"), the clusters."""
     return (
-        Method(SVM, Figures(test=svm), confusion=table),
+        Method(SVM, Figures(test=svm)),
         Method(EM, Figures(test=em), training=ON_ALL),
-        Method(EM, training=ON_ALL, learner={'clusters_per_label': 2}, label=f'{EM}, two clusters an object'),
         Method(EM, label=f'{EM}, clusters of the training slides'),
-        Method(EM, features=ALL_SLOW, training=ON_ALL, label=f'{EM}, all slow channels'),
     )
 
 
@@ -170,18 +125,12 @@ PROTOCOL = PaperProtocol(
     scene='kaboli',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section V',
     tasks=tuple(
-        RecognitionTask(name, VISITS, (*_methods(svm, em, table), *(ONLINE if name == ALL else ())), surfaces)
-        for name, svm, em, table, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, TABLES, SURFACES, strict=True)
+        RecognitionTask(name, VISITS, (*_methods(svm, em), *(ONLINE if name == ALL else ())), surfaces)
+        for name, svm, em, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, SURFACES, strict=True)
     ),
     divide=training_in(TRAINED),
     split='training: 10 slides with index and middle finger; test: 20 with thumb and index finger',
-    anchor=Anchor(
-        ALL,
-        SVM,
-        0.96,
-        'section V.A',
-        parts={SAME: PAPER_SVM[0], DIFFERENT: PAPER_SVM[1]},
-    ),
+    anchor=None,
     findings=findings,
     quick_count=8,
 )
@@ -241,14 +190,7 @@ SHAPES = PaperProtocol(
     ),
     divide=training_in(SHAPE_TRAINED),
     split='training: 10 slides with index and middle finger; test: 5 under each condition',
-    anchor=Anchor(
-        ALL,
-        SVM,
-        PAPER_SVM[-1],
-        'section V.A',
-        setting='noise of the fast channels, twice that of the experiment kaboli',
-        experiment='kaboli',
-    ),
+    anchor=None,
     findings=shape_findings,
     quick_count=12,
     by_condition=True,
@@ -261,7 +203,8 @@ OLD, NEW = 15, 5  # objects that are trained, and those added later
 def run_online(experiment: Experiment) -> ExperimentResult:
     """Train on 15 objects, add one slide of each of five others in turn, and test all: forgetting and cost."""
     task = RecognitionTask(ALL, VISITS, (), ROUND + VARIOUS)
-    slides = gather(load_scene('kaboli'), reduced(task, 40) if experiment.quick else task, experiment.seed, slow=True)
+    visits = (reduced(task, 40) if experiment.quick else task).visits
+    slides = gather(load_scene('kaboli'), task.surfaces, visits, experiment.seed, slow=True)
     recipe = recipe_of(Method(PA, learner={'passes': PASSES[-1]}))
     learner: Any = recipe.learner
     X, owner = slides.extract(recipe.feature_set)
@@ -309,6 +252,5 @@ def _right(learner: Any, parameters: Mapping[str, Any], X: Array, y: Codes, test
 
 
 def online_digests() -> dict[str, str]:
-    """Return the digest of the experiment as it is now."""
-    recipe, task = recipe_of(Method(PA, learner={'passes': PASSES[-1]})), RecognitionTask(ALL, VISITS, ())
-    return {'online': digest_of_row(recipe, load_scene('kaboli'), task, OLD, NEW)}
+    """Return the digests of the experiment as they are now."""
+    return digests(PROTOCOL)

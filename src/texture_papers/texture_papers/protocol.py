@@ -10,49 +10,32 @@ import math
 import os
 import platform
 import re
+import shutil
 import tempfile
 import time
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cached_property
+from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from scipy.stats import t
 from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold, ShuffleSplit, StratifiedShuffleSplit
 
-from texture_core.config import find, writing
-from texture_core.errors import InvalidData, InvalidParameter, UnknownName
-from texture_core.types import AnyArray, Array, Samples
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.types import AnyArray, Array
 from texture_estimation.learners.learner import Codes, of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_recipe
-from texture_estimation.search import (
-    UNDECIDED,
-    ClassificationTask,
-    LabelledWindows,
-    RecipeSpace,
-    RoughnessTask,
-    SearchParams,
-    SearchResult,
-    SearchSlides,
-    decided_by_slide,
-    optimise,
-    space_for,
-)
-from texture_evaluation.cross_validation import workers
-from texture_features.feature_set import FeatureSet, InputFeatures
-from texture_features.features.temporal import Stretched
-from texture_features.windows import SEPARATOR, WindowBatch, WindowParams, axis_along
-from texture_simulation.offline import simulate_slide_streams
+from texture_features.feature_set import InputFeatures
+from texture_papers.roberge import UNDECIDED, decided_by_slide, fitted_predictor
+from texture_papers.search import SearchParams, Tuned, tune, variables_of
+from texture_papers.slides import Mask, Slides, Visits, gather, kinds_of
 from texture_simulation.path import SimulatedSlide
-from texture_simulation.scene import Scene
-from texture_simulation.sensor_models import SENSORS
-from texture_simulation.surfaces import Curved
+from texture_simulation.scene import Scene, load_scene
 
 NORMAL_95 = 1.959964
 
@@ -118,7 +101,6 @@ class MethodResult:
     decided: NDArray[np.intp]
     trained_on: NDArray[np.bool_]
     train_s: float
-    note: str = ''
 
     @property
     def learning(self) -> float | None:
@@ -181,42 +163,20 @@ class MethodResult:
         return (events & ~self.trained_on).sum(axis=0)[chosen] / times
 
 
-Mask = NDArray[np.bool_]
 # (surface and condition of each slide, randomness, whether to hurry) -> which slides are used for training, by split
 Splitter = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
-Table = Sequence[Sequence[float]]
-
-
-@dataclass(frozen=True)
-class View:
-    """One of the ways in which a trial measures a surface; the features of all views of a trial are joined."""
-
-    finger: int = 0
-    turned_rad: float = 0.0
-
-
-@dataclass(frozen=True)
-class Visits:
-    """Trials that are alike, over each surface."""
-
-    condition: str
-    count: int
-    sliding: SimulatedSlide
-    views: tuple[View, ...] = (View(),)
-    radius_m: float = 0.0
-    random: float = 0.0
 
 
 @dataclass(frozen=True)
 class Figures:
-    """What a paper tells of a method, as shares; None if it does not."""
+    """What a paper reports of a method, as shares; None if it does not."""
 
     learning: float | None = None
     test: float | None = None
     unclassified: float | None = None  # of the test slides
 
 
-BY_SPLIT, BY_WINDOW, ON_ALL = 'slides of the split', 'half of the windows', 'all slides'
+BY_SPLIT, ON_ALL = 'slides of the split', 'all slides'
 
 
 @dataclass(frozen=True)
@@ -231,8 +191,8 @@ class Method:
     views: tuple[int, ...] = ()
     training: str = BY_SPLIT
     sets: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    splits: int = 0
-    confusion: Table | None = None
+    search: SearchParams | None = None  # the paper's, or smaller; None: not searched for
+    of_whole: str = ''  # the recipe of whole scans, whose variables the parts of a vote have
 
     @property
     def name(self) -> str:
@@ -240,12 +200,9 @@ class Method:
         return self.label or self.recipe
 
 
-FEW = 2  # splits: enough for a variation that is shown next to the paper's method, where it takes long
-
-
 @dataclass(frozen=True)
 class RecognitionTask:
-    """Surfaces to tell apart, how they are touched, and what tries to."""
+    """Surfaces to recognise, how they are touched, and what tries to."""
 
     name: str
     visits: tuple[Visits, ...]
@@ -274,21 +231,15 @@ MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what
 
 @dataclass(frozen=True)
 class Anchor:
-    """The one stated figure by which the difficulty of a scene is set: so many test slides are right by this method."""
+    """The one reported figure by which the difficulty of a scene is set: the share of test slides that are right."""
 
     task: str
     method: str
     test: float
     source: str
     setting: str = 'noise of the fast channels'
-    experiment: str = ''
+    experiment: str = ''  # whose figure it is, if not this one's
     shortfall: str = ''
-    parts: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def figures(self) -> Mapping[str, float]:
-        """All figures that are set, by task."""
-        return {self.task: self.test, **self.parts}
 
 
 @dataclass(frozen=True)
@@ -301,7 +252,7 @@ class PaperProtocol:
     tasks: tuple[RecognitionTask, ...]
     divide: Splitter
     split: str
-    anchor: Anchor
+    anchor: Anchor | None  # of a scene whose difficulty was set
     findings: Callable[[MethodResults], Sequence[Finding]]
     quick_count: int = 8
     by_condition: bool = False
@@ -358,7 +309,6 @@ class Experiment:
     seed: int = 0
     quick: bool = False
     tune: bool = False
-    splits: int = 0
     search: SearchParams | None = None
 
 
@@ -381,16 +331,16 @@ class ExperimentResult:
             for method, figures in methods.items():
                 value, low, high = (100 * part for part in figures.get('over_seeds', figures['test']))
                 paper = figures.get('paper', {}).get('test')
-                told = '' if paper is None else f'; paper {100 * paper:.1f} %'
-                yield f'  {task}, {method}: {value:.1f} % ({low:.1f} to {high:.1f}){told}'
+                shown = '' if paper is None else f'; paper {100 * paper:.1f} %'
+                yield f'  {task}, {method}: {value:.1f} % ({low:.1f} to {high:.1f}){shown}'
         for name, parts in self.numbers.get('regressors', {}).items():
             for part, figures in parts.items():
                 paper = self.numbers.get('paper', {}).get(name, {}).get(part)
-                told = '' if paper is None else f'; paper {paper:.2f}'
+                shown = '' if paper is None else f'; paper {paper:.2f}'
                 error = figures.get('over_seeds', [figures['error'] or math.nan])[0]
-                yield f'  {name}, {part} textures: error {error:.2f} grades{told}'
+                yield f'  {name}, {part} textures: error {error:.2f} grades{shown}'
         for name, facts in self.numbers.get('tuning', {}).items():
-            yield f'  searched {name}: {facts["individuals_tried"]} individuals, {facts["seconds"]:.0f} s'
+            yield f'  searched {name}: {facts["size"]}, {facts["seconds"]:.0f} s'
         for finding in self.numbers['findings']:
             value, low, high = finding.get('over_seeds', finding['interval'])
             yield f'  {finding["verdict"]:14} {finding["claim"]}: {value:+.3f} ({low:+.3f} to {high:+.3f})'
@@ -435,44 +385,61 @@ def digest_of(recipe: str) -> str:
     except UnknownName:
         definition = load_roughness_recipe(recipe).as_mapping()
     text = OWN_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
-    return _letters(json.loads(text))
+    return hash_of(json.loads(text))
 
 
-def digest_of_row(recipe: Any, scene: Scene, task: RecognitionTask, *settings: Any) -> str:
+def hash_of(content: Any) -> str:
+    """Return eight letters of plain values."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:8]
+
+
+# Libraries that decide a figure, each with as many parts of its version as a change of it may move one.
+LIBRARIES = {'numpy': 1, 'scipy': 2, 'scikit-learn': 2}
+
+
+def versions() -> str:
+    """Return the versions of the libraries that decide a figure."""
+    return ', '.join(f'{name} {".".join(version(name).split(".")[:parts])}' for name, parts in LIBRARIES.items())
+
+
+def digest_of_row(protocol: PaperProtocol, task: RecognitionTask, method: Method) -> str:
     """Return eight letters of all that decides a row of figures, but for the seed.
 
-    The recipe as it is run, the motions and their number, the settings, and what the simulator makes of one slide of
-    each kind over each surface: this changes with the scene, with the sensor's model and with the simulation.
+    The recipe as it is run, the motions, the slides of each split of seed 0; and of a few slides of each kind the
+    strength of the signals, the features, and what the learner, trained on half of them, takes each for: so they change
+    with the code of simulation, features, learner and evidence.
     """
-    definition = _decisive(recipe.as_mapping())
-    visits = [{**asdict(visits), 'sliding': _set(visits.sliding)} for visits in task.visits]
-    return _letters([definition, visits, _probed(scene, task), settings])
+    recipe = recipe_of(method)
+    surfaces = task.surfaces or tuple(load_scene(protocol.scene).surfaces)
+    trained_on = protocol.divide(*kinds_of(surfaces, task.visits, 0), np.random.default_rng(0), False)
+    few, levels = probe(protocol.scene, surfaces, task.visits, slow=SLOW in recipe.feature_set.topics)
+    half = np.array([np.count_nonzero(few.codes[:place] == code) % 2 == 0 for place, code in enumerate(few.codes)])
+    outcome = evaluate_method(recipe, few, half[None], method.views, training=method.training)
+    values, _ = few.extract(recipe.feature_set, method.views)
+    definition = {key: value for key, value in _decisive(recipe.as_mapping()).items() if key != 'training'}
+    settings = [method.training, method.views, sorted(method.sets), recipe.training.hop_s, str(method.search)]
+    visits = [{**asdict(one), 'sliding': _set(one.sliding)} for one in task.visits]
+    return hash_of([definition, visits, settings, hashlib.sha256(trained_on.tobytes()).hexdigest(), levels,
+                     strength(values), outcome.decided.tolist()])  # fmt: skip
+
+
+@lru_cache(maxsize=4)
+def probe(scene: str, surfaces: tuple[str, ...], visits: tuple[Visits, ...], *, slow: bool) -> tuple[Slides, list[str]]:
+    """Return two slides of each kind over each surface, and the strength and roughness of their signals."""
+    few = gather(load_scene(scene), surfaces, [replace(one, count=2) for one in visits], 0, slow=slow)
+    streams = [stream.samples for view in few.views for stream in view.streams.values()]
+    return few, [text for one in streams for part in (one, np.diff(one, axis=1)) for text in strength(part)]
+
+
+def strength(values: AnyArray) -> list[str]:
+    """Return the strength of each column to four digits: rounding on another machine changes none of them."""
+    return [f'{level:.4g}' for level in np.sqrt(np.square(values).mean(axis=tuple(range(values.ndim - 1))))]
 
 
 def _set(sliding: SimulatedSlide) -> dict[str, Any]:
     """Return what of a motion is not as by default: a field that is new changes no digest."""
     values = {one.name: (getattr(sliding, one.name), one.default) for one in fields(sliding)}
     return {name: value for name, (value, default) in values.items() if value is not default and value != default}
-
-
-def _letters(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:8]
-
-
-PROBES: dict[Any, list[str]] = {}
-
-
-def _probed(scene: Scene, task: RecognitionTask) -> list[str]:
-    """Return strength and roughness of the signals of one slide of each kind over each surface, to three digits."""
-    key = repr((scene, task.visits, task.surfaces))
-    if key not in PROBES:
-        few = replace(task, visits=tuple(replace(visits, count=1) for visits in task.visits))
-        streams = [stream for view in gather(scene, few, 0, slow=False).views for stream in view.streams.values()]
-        levels = [
-            level for one in streams for level in (one.samples.std(axis=1), np.diff(one.samples, axis=1).std(axis=1))
-        ]
-        PROBES[key] = [f'{value:.3g}' for level in levels for value in np.ravel(level.mean(axis=-1))]
-    return PROBES[key]
 
 
 def _short_name(found: re.Match[str]) -> str:
@@ -501,255 +468,19 @@ def _decisive(definition: Mapping[str, Any]) -> dict[str, Any]:
     return decisive
 
 
-FULL = SearchParams()  # 20 individuals, 30 generations, 20 halves: the paper's
-QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)
-
-
-@dataclass(frozen=True, eq=False)
-class TunedRecipe:
-    """A recipe that was searched for, and what it took."""
-
-    found: SearchResult
-    seconds: float
-    cpu_seconds: float
-    scans: int
-
-    @property
-    def recipe(self) -> Any:
-        """The best."""
-        return self.found.best.recipe
-
-    def figures(self) -> dict[str, Any]:
-        """Return what the search took and how good it thinks the best is."""
-        learning, test = np.mean(self.found.best.scores, axis=0).tolist()
-        history = self.found.history
-        return {
-            'seconds': round(self.seconds, 1),
-            'cpu_seconds': round(self.cpu_seconds, 1),  # of all cores: what a busy machine would have needed alone
-            'scans': self.scans,
-            'generations': len(history),
-            'individuals_tried': history[-1].tried,
-            'learning': learning,
-            'test': test,
-        }
-
-    def write(self, path: Path) -> Path:
-        """Write the recipe as a file that training reads; return its path."""
-        text = yaml.safe_dump(self.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
-        with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding='utf-8')
-        return path
-
-
-def tune(
-    space: RecipeSpace, scans: SlideArrays, task: ClassificationTask | RoughnessTask, params: SearchParams
-) -> TunedRecipe:
-    """Return the best recipe of a space on these scans, and what it took to find it."""
-    began, cpu_began = time.perf_counter(), time.process_time()
-    with workers():
-        found = optimise(space, SearchSlides(scans, params.halves, params.seed), params, task)
-    return TunedRecipe(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))
-
-
-ROUNDING = 1e-6  # of a sample: lengths in seconds are seldom exact
-
-
-@dataclass(frozen=True, eq=False)
-class ArrayStream:
-    """Scans of one input: samples (n_scans, n_samples, n_channels) at a rate, and names of the channels."""
-
-    samples: Samples
-    rate_hz: float
-    channels: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class SlideArrays:
-    """Equally long scans of known surfaces, such as simulated ones; called with window parameters it cuts them."""
-
-    streams: Mapping[str, ArrayStream]
-    labels: NDArray[np.str_]
-    speed_m_s: Array
-    force_n: Array
-    _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
-
-    def of(self, chosen: Mask) -> SlideArrays:
-        """Return some of the scans; `chosen` is (n_scans,)."""
-        streams = {topic: replace(stream, samples=stream.samples[chosen]) for topic, stream in self.streams.items()}
-        return SlideArrays(streams, self.labels[chosen], self.speed_m_s[chosen], self.force_n[chosen])
-
-    def __call__(self, windows: WindowParams) -> LabelledWindows:
-        """Return the windows, scan by scan."""
-        if windows not in self._known:
-            self._known[windows] = self._cut(windows)
-        return self._known[windows]
-
-    def _cut(self, windows: WindowParams) -> LabelledWindows:
-        duration_s = min(stream.samples.shape[1] / stream.rate_hz for stream in self.streams.values())
-        if duration_s - windows.skip_s < windows.length_s - ROUNDING:
-            raise InvalidData(
-                f'scans of {duration_s:g} s have no window of {windows.length_s:g} s after {windows.skip_s:g} s; '
-                'use shorter windows or longer scans'
-            )
-        count = int((duration_s - windows.skip_s - windows.length_s) / windows.hop_s + ROUNDING) + 1
-        speed, force = np.repeat(self.speed_m_s, count), np.repeat(self.force_n, count)
-        inputs = {}
-        for topic, stream in self.streams.items():
-            length = round(windows.length_s * stream.rate_hz)
-            starts = [round((windows.skip_s + n * windows.hop_s) * stream.rate_hz) for n in range(count)]
-            samples = np.stack([stream.samples[:, start : start + length] for start in starts], axis=1)
-            samples = samples.reshape(-1, *samples.shape[2:])
-            inputs[topic] = WindowBatch(samples, stream.rate_hz, speed, force, channels=stream.channels)
-        groups = np.array([f'{number:06d}' for number in range(len(self.labels))])
-        return LabelledWindows(inputs, np.repeat(self.labels, count), np.repeat(groups, count))
-
-
-@dataclass(frozen=True, eq=False)
-class Slides:
-    """Trials over known surfaces, in a random order.
-
-    Parameters
-    ----------
-    surfaces
-        Names.
-    codes : (n_slides,)
-        Number of the surface of each.
-    conditions : (n_slides,) of text
-        How it was touched.
-    views
-        What each consists of.
-    axes
-        Axis along which the slides of each view go: 'x', 'y', or '' for neither.
-    """
-
-    surfaces: tuple[str, ...]
-    codes: Codes
-    conditions: NDArray[np.str_]
-    views: tuple[SlideArrays, ...]
-    axes: tuple[str, ...] = ()
-
-    @cached_property
-    def _along_axes(self) -> SlideArrays:
-        """Inputs with an axis, 'signal@x': the streams of the view along it."""
-        streams = {
-            f'{topic}{SEPARATOR}{axis}': stream
-            for axis, view in zip(self.axes, self.views, strict=True)
-            for topic, stream in view.streams.items()
-        }
-        return replace(self.views[0], streams=streams, _known={})
-
-    def extract(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[Array, Codes]:
-        """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,).
-
-        A feature set whose inputs have an axis joins the views itself.
-
-        Parameters
-        ----------
-        feature_set
-            Windows and features.
-        views
-            Numbers of the views; () for all.
-
-        Returns
-        -------
-        (n, n_features)
-            Features of windows.
-        (n,)
-            Number of the slide of each.
-        """
-        joins = feature_set.window_names != feature_set.topics
-        chosen = [self._along_axes] if joins else [self.views[n] for n in views or range(len(self.views))]
-        values = np.concatenate([view(feature_set.windows).values(feature_set) for view in chosen], axis=1)
-        return values, self.views[0](feature_set.windows).slides
-
-    def names(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[str, ...]:
-        """Return the names of what `extract` returns, (n_features,)."""
-        joins = feature_set.window_names != feature_set.topics
-        streams = (self._along_axes if joins else self.views[0]).streams
-        layout = tuple((streams[name].rate_hz, streams[name].channels) for name in feature_set.window_names)
-        return feature_set.names(layout) * (1 if joins else len(views or self.views))
-
-
-def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Slides:
-    """Return the slides of a task.
-
-    A slide is the same in all tasks that hold it: its randomness follows from seed, surface and condition.
-    """
-    surfaces = task.surfaces or tuple(scene.surfaces)
-    kinds = [(surface, visits) for surface in surfaces for visits in task.visits]
-    counts = [visits.count for _, visits in kinds]
-    order = np.random.default_rng(seed).permutation(sum(counts))
-    codes = np.repeat([surfaces.index(surface) for surface, _ in kinds], counts)[order]
-    conditions = np.repeat([visits.condition for _, visits in kinds], counts)[order]
-    speed = np.repeat([float(visits.sliding.speed_m_s) for _, visits in kinds], counts)[order]
-    force = np.repeat([float(visits.sliding.force_n) for _, visits in kinds], counts)[order]
-    kind = find(SENSORS, scene.sensor, 'sensor model')
-    measured = {stream.topic: stream for stream in kind.streams}
-    views = []
-    for number in range(len(task.visits[0].views)):
-        parts = [_measured(scene, surface, visits, number, seed, slow=slow) for surface, visits in kinds]
-        streams = {
-            topic: ArrayStream(
-                np.concatenate([part[topic] for part in parts])[order],
-                measured[topic].rate_hz,
-                measured[topic].channels,
-            )
-            for topic in parts[0]
-        }
-        views.append(SlideArrays(streams, np.asarray(surfaces)[codes], speed, force))
-    axes = tuple(axis_along(float(task.visits[0].sliding.direction_rad) + v.turned_rad) for v in task.visits[0].views)
-    return Slides(surfaces, codes, conditions, tuple(views), axes)
-
-
-def _measured(
-    scene: Scene, surface: str, visits: Visits, number: int, seed: int, *, slow: bool
-) -> Mapping[str, Samples]:
-    view: View = visits.views[number]
-    kind = find(SENSORS, scene.sensor, 'sensor model')
-    # A window is cut where every stream has samples: the slowest decides, and a slide ends with one of its samples.
-    slowest_hz = min(stream.rate_hz for stream in kind.streams[: None if slow else 1])
-    duration_s = math.ceil(visits.sliding.duration_s * slowest_hz - ROUNDING) / slowest_hz
-    own = [seed, list(scene.surfaces).index(surface), zlib.crc32(visits.condition.encode())]
-    rng = np.random.default_rng([*own, number])
-    sliding = replace(_sliding(visits, np.random.default_rng(own)), duration_s=duration_s)
-    sliding = replace(sliding, direction_rad=sliding.direction_rad + view.turned_rad)
-    touched = _shaped(scene, surface, visits.radius_m)
-    return simulate_slide_streams(touched, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)
-
-
-def _sliding(visits: Visits, rng: np.random.Generator) -> SimulatedSlide:
-    """Return how the fingers of each trial go: all views of a trial alike."""
-    if not visits.random:
-        return visits.sliding
-    speed, force = (1.0 + visits.random * rng.uniform(-1.0, 1.0, (2, visits.count))) * np.array(
-        [[visits.sliding.speed_m_s], [visits.sliding.force_n]]
-    )
-    heading = rng.uniform(0.0, 2.0 * math.pi, visits.count)
-    return replace(visits.sliding, speed_m_s=speed, force_n=force, direction_rad=heading)
-
-
-def _shaped(scene: Scene, surface: str, radius_m: float) -> Scene:
-    """Return the scene with one object curved in another way; as it is for a radius of 0."""
-    if not radius_m:
-        return scene
-    curved = replace(scene.surface(surface), shape=Curved(radius_m))
-    return replace(scene, surfaces={**scene.surfaces, surface: curved})
-
-
 SLOW = 'signal_static'
-TunedRecipes = Mapping[tuple[str, str], TunedRecipe]  # by task and recipe
+TunedRecipes = Mapping[tuple[str, str], Tuned]  # by task and method
 NONE: TunedRecipes = {}
 
 
 def outcomes(
-    protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE, splits: int = 0
+    protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE
 ) -> MethodResults:
     """Return what comes out of each method in each task."""
     return {
         (task.name, method): outcome
         for task in protocol.tasks
-        for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned, splits=splits)
+        for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned)
     }
 
 
@@ -761,35 +492,45 @@ def of_task(
     *,
     quick: bool,
     tuned: TunedRecipes = NONE,
-    splits: int = 0,
 ) -> Iterator[tuple[str, MethodResult]]:
     """Yield what comes out of each method in one task.
 
-    One with a recipe that was searched for is tried on the first split alone: in the others it would be tested on
-    slides that the search has seen.
+    One that was searched for is tried on the first split alone: in the others it would be tested on slides that the
+    search has seen.
     """
     slides, trained_on = _gathered(protocol, task, scene, seed, quick=quick)
     for method in task.methods:
-        found = tuned.get((task.name, method.recipe))
-        recipe = found.recipe if found else recipe_of(method)
-        most = 1 if found else min(filter(None, (method.splits, splits)), default=len(trained_on))
-        yield method.name, evaluate_method(recipe, slides, trained_on[:most], method.views, training=method.training)
+        found = tuned.get((task.name, method.name))
+        if tuned and not found:
+            continue
+        recipe, splits = (found.recipe, trained_on[:1]) if found else (recipe_of(method), trained_on)
+        yield method.name, evaluate_method(recipe, slides, splits, method.views, training=method.training)
 
 
-def searched(protocol: PaperProtocol, scene: Scene, params: SearchParams, *, quick: bool) -> TunedRecipes:
-    """Return the recipes for which the paper has a genetic search, found on what the first split is trained on."""
-    methods = {
-        (task.name, method.recipe): (task, method)
-        for task in protocol.tasks
-        for method in reversed(task.methods)  # of several with one recipe, the first
-        if space_for('recipes', method.recipe)
-    }
-    found = {}
-    for key, (task, method) in methods.items():
-        slides, trained_on = _gathered(protocol, task, scene, params.seed, quick=quick)
-        space = RecipeSpace.load(str(space_for('recipes', method.recipe)), recipe_of(method))
-        found[key] = tune(space, slides.views[0].of(trained_on[0]), ClassificationTask(), params)
+def searched(protocol: PaperProtocol, scene: Scene, experiment: Experiment) -> TunedRecipes:
+    """Return recipes with variables for each pair, found on what the first split is trained on."""
+    found: dict[tuple[str, str], Tuned] = {}
+    for task in protocol.tasks:
+        slides, trained_on = _gathered(protocol, task, scene, experiment.seed, quick=experiment.quick)
+        scans = slides.views[0].of(trained_on[0])
+        for method in task.methods:
+            if not (method.search and variables_of(method.recipe)):
+                continue
+            if method.of_whole:
+                whole = found[task.name, method.of_whole]
+                recipe = in_parts(whole.recipe, recipe_of(method))
+                found[task.name, method.name] = replace(whole, recipe=recipe, seconds=0.0)
+                continue
+            params = replace(experiment.search or method.search, seed=experiment.seed)
+            found[task.name, method.name] = tune(recipe_of(method), scans, params)
     return found
+
+
+def in_parts(whole: Recipe, parts: Recipe) -> Recipe:
+    """Return the recipe of parts that vote with the variables that were found for whole scans."""
+    content = parts.as_mapping()
+    shared = {key: content[key] for key in ('windows', 'evidence', 'training')}
+    return Recipe.from_mapping({**whole.as_mapping(), **shared}, f'{parts.name}-pairs')
 
 
 def _gathered(
@@ -798,7 +539,7 @@ def _gathered(
     """Return the slides of a task, and which of them each split is trained on."""
     task = reduced(task, protocol.quick_count) if quick else task
     slow = any(SLOW in recipe_of(method).feature_set.topics for method in task.methods)
-    slides = gather(scene, task, seed, slow=slow)
+    slides = gather(scene, task.surfaces, task.visits, seed, slow=slow)
     return slides, protocol.divide(slides.codes, slides.conditions, np.random.default_rng(seed), quick)
 
 
@@ -816,14 +557,7 @@ def recipe_of(method: Method) -> Recipe:
 
 def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
     features: list[tuple[str, Any]] = list(item.features)
-    changed = tuple((name, _with_parameters(feature, parameters.get(name, {}))) for name, feature in features)
-    return replace(item, features=changed)
-
-
-def _with_parameters(feature: Any, parameters: Mapping[str, Any]) -> Any:
-    if isinstance(feature, Stretched):
-        return replace(feature, feature=_with_parameters(feature.feature, parameters))
-    return replace(feature, **parameters)
+    return replace(item, features=tuple((name, replace(one, **parameters.get(name, {}))) for name, one in features))
 
 
 def evaluate_method(
@@ -833,35 +567,27 @@ def evaluate_method(
     views: Sequence[int] = (),
     *,
     training: str = BY_SPLIT,
-    beside: Array | None = None,
+    more: Array | None = None,
 ) -> MethodResult:
-    """Learn from the slides of each split and evaluate all."""
+    """Learn from the slides of each split and evaluate all; `more` are features of each slide, (n_slides, n)."""
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     trained, owner = slides.extract(to_learn, views)
     asked, slide = slides.extract(recipe.feature_set, views)
-    if beside is not None:
-        trained, asked = np.hstack((trained, beside[owner])), np.hstack((asked, beside[slide]))
+    if more is not None:
+        trained, asked = np.hstack((trained, more[owner])), np.hstack((asked, more[slide]))
     learner = of_examples(recipe.learner, slides.names(to_learn, views), slides.surfaces)
     windows = recipe.feature_set.windows
-    rows_of = trained_on[:, owner]
-    if training == BY_WINDOW:
-        rows_of = _halves_of_windows(owner, len(trained_on))
-    elif training == ON_ALL:
-        rows_of = np.ones((1, len(owner)), dtype=bool)
+    rows_of = trained_on[:, owner] if training == BY_SPLIT else np.ones((1, len(owner)), dtype=bool)
     decided = np.empty((len(rows_of), len(slides.codes)), dtype=np.intp)
     began = time.perf_counter()
     for number, rows in enumerate(rows_of):
-        fitted = learner.fit(trained[rows], slides.codes[owner[rows]], owner[rows])
-        scores = learner.predictor(fitted.parameters)(asked)
-        decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
+        predictor = fitted_predictor(learner, trained[rows], slides.codes[owner[rows]], owner[rows])
+        decided[number] = decided_by_slide(
+            predictor(asked), len(slides.codes), recipe.evidence, windows.hop_s / windows.length_s
+        )
     taken_s = (time.perf_counter() - began) / len(rows_of)
     known = trained_on if training == BY_SPLIT else np.zeros(decided.shape, dtype=bool)
-    return MethodResult(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
-
-
-def _halves_of_windows(owner: Codes, count: int) -> Mask:
-    rng = np.random.default_rng(count)
-    return np.stack([rng.permutation(len(owner)) < len(owner) // 2 for _ in range(count)])
+    return MethodResult(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s)
 
 
 def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
@@ -873,50 +599,37 @@ def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
 
 LEVEL = 0.95
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
-SEED_SPLITS = 2  # of a further seed: what differs between seeds are the slides
 
 
 def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests: Mapping[str, str]) -> ExperimentResult:
-    """Run an experiment with so many seeds, and add means and intervals over them to the result of the first.
+    """Run an experiment with so many seeds, each alike, and add means and intervals over them to the first's result.
 
-    The first seed is run as the experiment asks, and written. Each further one is run on at most two splits and kept
-    in the folder `seeds`. What is there already, with the digests of now, is not run again.
+    Each seed is kept in the folder `seeds`; what is there already, with the digests of now, is not run again.
     """
     if count < 2:
         raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')
-    first = _first(run, name, experiment, digests)
-    further = replace(experiment, splits=SEED_SPLITS)
-    others = [_kept(run, name, replace(further, seed=experiment.seed + number), digests) for number in range(1, count)]
-    return replace(first, numbers=with_seeds(first.numbers, others))
+    seeds = [replace(experiment, seed=experiment.seed + number) for number in range(count)]
+    first, *others = [_kept(run, name, one, digests) for one in seeds]
+    return replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))
 
 
-def _first(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> ExperimentResult:
-    """Return the result of the first seed, as it was written if it was."""
-    path = experiment.out / f'{name}.json'
-    if path.is_file() and not experiment.quick and not experiment.tune:
-        content = json.loads(path.read_text(encoding='utf-8'))
-        numbers = content['numbers']
-        if numbers.get('seed') == experiment.seed and numbers.get('digests') == digests:
-            texts = {key: content[key] for key in ('name', 'measured', 'data', 'split')}
-            return ExperimentResult(**texts, numbers=numbers, charts=tuple(map(Path, content['charts'])))
-    result = run(experiment)
-    result.write(experiment.out)
-    return result
-
-
-def _kept(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> Mapping[str, Any]:
-    """Return the numbers of one further seed, from the folder if they are there."""
+def _kept(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str]) -> ExperimentResult:
+    """Return the result of one seed, from the folder if it is there with these digests and this size of a search."""
     kind = f'{"-tuned" if experiment.tune else ""}-{experiment.seed}{"-reduced" if experiment.quick else ""}'
     path = experiment.out / 'seeds' / f'{name}{kind}.json'
     if path.is_file():
-        numbers: Mapping[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        if numbers.get('digests') == digests:
-            return numbers
-    with tempfile.TemporaryDirectory() as folder:
-        numbers = run(replace(experiment, out=Path(folder))).numbers
+        content = json.loads(path.read_text(encoding='utf-8'))
+        if (content['numbers'].get('digests'), content.get('search')) == (dict(digests), str(experiment.search)):
+            texts = {key: content[key] for key in ('name', 'measured', 'data', 'split', 'numbers')}
+            return ExperimentResult(**texts)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(numbers, ensure_ascii=False) + '\n', encoding='utf-8')
-    return numbers
+    with tempfile.TemporaryDirectory() as folder:
+        result = run(replace(experiment, out=Path(folder)))
+        for recipe in Path(folder).glob('*.yaml'):
+            shutil.copy(recipe, path.with_name(f'{recipe.stem}-{experiment.seed}.yaml'))
+    content = {**asdict(replace(result, charts=())), 'search': str(experiment.search)}
+    path.write_text(json.dumps(content, ensure_ascii=False) + '\n', encoding='utf-8')
+    return result
 
 
 def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -926,23 +639,20 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
     numbers['seeds'] = [run['seed'] for run in runs]
     for task, methods in numbers.get('tasks', {}).items():
         for method, figures in methods.items():
-            found = [run['tasks'][task][method]['test'][0] for run in runs if method in run['tasks'][task]]
-            _add(figures, found, share=True)
+            same = [run['tasks'][task][method] for run in runs]
+            _add(figures, [one['test'][0] for one in same], share=True)
+            figures['means'] = {
+                key: mean_over_seeds([one[key] for one in same]).as_json()
+                for key in ('learning', 'unclassified')
+                if figures.get(key) is not None and len(same) > 1
+            }
             for kind in ('conditions', 'sets'):
                 for name, part in figures.get(kind, {}).items():
-                    same = [run['tasks'][task].get(method, {}).get(kind, {}).get(name) for run in runs]
-                    _add(part, [one['test'][0] for one in same if one], share=True)
+                    _add(part, [one[kind][name]['test'][0] for one in same], share=True)
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
-            same = [run['regressors'][regressor][part] for run in runs if part in run['regressors'].get(regressor, {})]
-            _add(figures, [one['error'] for one in same])
-            if len(same) > 1:
-                figures['means'] = {
-                    key: mean_over_seeds([one[key] for one in same]).as_json() for key in ('error_none_as_0', 'std')
-                }
-            errors = [float(np.mean([one['by_texture'][name] for one in same if name in one['by_texture']]))
-                      for name in figures['by_texture']]  # fmt: skip
-            figures['over_textures'] = mean_over_seeds(errors).as_json()
+            of_seeds = [run['regressors'][regressor] for run in runs]
+            _regressor_over_seeds(figures, [one[part] for one in of_seeds if part in one])
     for finding in numbers['findings']:
         same = [one for run in runs for one in run['findings'] if one['claim'] == finding['claim']]
         _add(finding, [one['interval'][0] for one in same])
@@ -953,6 +663,21 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
         if 'over_seeds' in finding:
             finding['verdict'] = VERDICTS[Interval(*finding['over_seeds']).positive()]
     return numbers
+
+
+def _regressor_over_seeds(figures: dict[str, Any], same: Sequence[Mapping[str, Any]]) -> None:
+    """Add mean and interval of the error of a regressor over seeds, and of its other figures, and over textures."""
+    _add(figures, [one['error'] for one in same])
+    if len(same) > 1:
+        keys = ('error_none_as_0', 'std', 'without_grade')
+        figures['means'] = {key: mean_over_seeds([one[key] for one in same]).as_json() for key in keys}
+    errors = [
+        float(np.mean([one['by_texture'][name] for one in same if name in one['by_texture']]))
+        for name in figures['by_texture']
+    ]
+    figures['over_textures'] = mean_over_seeds(errors).as_json()
+    worst = int(np.argmax(errors))
+    figures['worst'] = [list(figures['by_texture'])[worst], round(errors[worst], 2)]
 
 
 def mean_over_seeds(values: Sequence[float]) -> Interval:

@@ -11,13 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.types import AnyArray, Array
-from texture_estimation.search import SearchParams
+from texture_core.types import Array
 from texture_evaluation.charts import COLOURS, chart
 from texture_papers.protocol import (
-    FULL,
     NONE,
-    QUICK,
     VERDICTS,
     Experiment,
     ExperimentResult,
@@ -27,15 +24,15 @@ from texture_papers.protocol import (
     MethodResult,
     MethodResults,
     PaperProtocol,
-    Table,
     apart,
     digest_of_row,
     mean,
     outcomes,
-    recipe_of,
     searched,
     share,
+    versions,
 )
+from texture_papers.search import QUICK
 from texture_simulation.scene import load_scene
 
 Pair = tuple[str, str]
@@ -141,22 +138,7 @@ def accuracy_chart(
             _bars(axes, methods, drawn)
             axes.set_title(task)
         rows[-1].set_xlabel('test slides recognised (%)')
-        rows[0].legend(loc='lower left', bbox_to_anchor=(0.5, 1.0), ncols=2)
-    return Path(path)
-
-
-def confusions_chart(
-    tables: Mapping[str, tuple[Sequence[str], AnyArray, AnyArray]], title: str, path: str | Path
-) -> Path:
-    """Draw tables of confusion: the paper's on the left, the simulated on the right, in % of each row."""
-    side = 2.2 + 0.3 * max(len(surfaces) for surfaces, _, _ in tables.values())
-    with chart(path, (2.0 * side + 1.5, side * len(tables)), title) as figure:
-        rows = figure.subplots(len(tables), 2, squeeze=False)
-        for (left, right), (name, (surfaces, theirs, ours)) in zip(rows, tables.items(), strict=True):
-            _table(left, surfaces, theirs)
-            _table(right, surfaces, ours)
-            left.set_title(f'{name}: paper')
-            right.set_title(f'{name}: simulated')
+        rows[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0))
     return Path(path)
 
 
@@ -174,51 +156,34 @@ def _bars(axes: Any, methods: Mapping[str, tuple[float | None, Interval]], drawn
     axes.set(ylim=(len(methods) - 0.4, -0.6))
 
 
-def _table(axes: Any, surfaces: Sequence[str], table: AnyArray) -> None:
-    percent = 100 * np.asarray(table)
-    axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)
-    axes.grid(visible=False)
-    axes.set_xticks(range(percent.shape[1]), [*surfaces, 'unclassified'], rotation=90)
-    axes.set_yticks(range(len(surfaces)), surfaces)
-    axes.set(xlabel='taken for', ylabel='surface')
-    for row, column in np.argwhere(percent >= 0.5):
-        value = percent[row, column]
-        axes.text(column, row, f'{value:.0f}', ha='center', va='center', fontsize=7,
-                  color='white' if value > 60 else 'black')  # fmt: skip
-
-
 TUNED = '-tuned'
-SEARCHED = '; recipes that were searched for: the first alone, whose slides for training the search was given'
+SEARCHED = '; the first alone, whose slides for training the search was given'
 
 
 def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
-    """Rebuild a paper's experiment on simulated surfaces."""
+    """Rebuild a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
     scene = load_scene(protocol.scene)
-    tuned = searched(protocol, scene, _size(experiment), quick=experiment.quick) if experiment.tune else NONE
-    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned, splits=experiment.splits)
+    size = experiment.search or (QUICK if experiment.quick else None)
+    tuned = searched(protocol, scene, replace(experiment, search=size)) if experiment.tune else NONE
+    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
     name = f'{protocol.name}{TUNED if tuned else ""}'
-    checked = protocol.findings(found)
-    slides = {task.name: _slides(found[task.name, task.methods[0].name]) for task in protocol.tasks}
+    methods = {task.name: [m for m in task.methods if (task.name, m.name) in found] for task in protocol.tasks}
+    slides = {task: _slides(found[task, some[0].name]) for task, some in methods.items()}
+    checked = protocol.findings(found) if not tuned else ()
     numbers = {
         'seed': experiment.seed,
-        'digests': digests(protocol),
-        'difficulty': _difficulty(protocol, found),
+        'digests': digests(protocol, tuned=experiment.tune),
+        **({'reduced': True} if experiment.quick else {}),
+        'difficulty': _difficulty(protocol, found, tuned=experiment.tune),
         'tasks': {
-            task.name: {
-                m.name: figures_of(m, found[task.name, m.name], by_condition=protocol.by_condition)
-                for m in task.methods
-            }
-            for task in protocol.tasks
+            task: {m.name: figures_of(m, found[task, m.name], by_condition=protocol.by_condition) for m in some}
+            for task, some in methods.items()
         },
         'findings': [finding_as_json(finding) for finding in checked],
-        'tuning': {
-            f'{recipe}, {task}': {
-                **one.figures(),
-                'recipe': one.write(experiment.out / f'{recipe}{TUNED}-{task.replace(" ", "-")}.yaml').name,
-            }
-            for (task, recipe), one in tuned.items()
-        },
+        'tuning': {f'{task}, {method}': one.as_json() for (task, method), one in tuned.items()},
     }
+    for (task, method), one in tuned.items():
+        one.write(experiment.out / f'{method}{TUNED}-{task.replace(" ", "-")}.yaml')
     return ExperimentResult(
         name=name,
         measured=f'slides recognised, as in {protocol.paper}; intervals of 95 % over slides',
@@ -228,43 +193,37 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
         ),
         split=f'{protocol.split}{SEARCHED if tuned else ""}',
         numbers=numbers,
-        charts=charts_of(protocol, numbers, name, experiment.out),
+        charts=() if tuned else charts_of(protocol, numbers, name, experiment.out),
     )
 
 
-def _size(experiment: Experiment) -> SearchParams:
-    return replace(experiment.search or (QUICK if experiment.quick else FULL), seed=experiment.seed)
-
-
-def digests(protocol: PaperProtocol) -> dict[str, str]:
-    """Return the digest of each row of figures, by task and method, as it is now."""
-    scene = load_scene(protocol.scene)
-    return {
-        f'{task.name}, {m.name}': digest_of_row(
-            recipe_of(m), scene, task, protocol.split, m.training, m.views, m.splits, sorted(m.sets)
-        )
+def digests(protocol: PaperProtocol, *, tuned: bool = False) -> dict[str, str]:
+    """Return the digest of each row of figures, by task and method, as it is now, and the versions of the libraries."""
+    rows = {
+        f'{task.name}, {m.name}': digest_of_row(protocol, task, m)
         for task in protocol.tasks
         for m in task.methods
+        if m.search or not tuned
     }
+    return {**rows, 'versions': versions()}
 
 
 def _slides(outcome: MethodResult) -> int:
     return len(outcome.codes) // len(outcome.surfaces)
 
 
-def _difficulty(protocol: PaperProtocol, found: MethodResults) -> dict[str, Any]:
+def _difficulty(protocol: PaperProtocol, found: MethodResults, *, tuned: bool) -> dict[str, Any]:
     anchor = protocol.anchor
-    outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
-    parts = {
-        task: {'paper': test, 'here': found[task, anchor.method].test.as_json()} for task, test in anchor.parts.items()
-    }
+    if anchor is None:
+        return {}
+    outcome = found.get((anchor.task, anchor.method))
+    where = anchor.experiment or protocol.name
     return {
-        'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
+        'set_by': f'{where}: {anchor.method}, {anchor.task}: {anchor.source}',
         'paper': anchor.test,
-        'here': outcome and outcome.test.as_json(),
+        'here': outcome.test.as_json() if outcome and where == f'{protocol.name}{TUNED if tuned else ""}' else None,
         'setting': anchor.setting,
         'shortfall': anchor.shortfall,
-        'parts': parts,
     }
 
 
@@ -278,7 +237,6 @@ def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = Fa
         'unclassified': round(outcome.unclassified, 4),
         **(_by_condition(outcome) if by_condition else {}),
         **(_by_set(method, outcome) if method.sets else {}),
-        'note': outcome.note,
         'train_s': round(outcome.train_s, 3),
         'surfaces': list(outcome.surfaces),
         'confusion_last_unclassified': np.round(outcome.confusion, 3).tolist(),
@@ -330,33 +288,8 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
             for part, own in figures.get('sets', {}).items():
                 panels[task.name][f'{method.name}: {part}'] = (None, _interval(own))
-    charts = [accuracy_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png', drawn)]
-    several = len(protocol.tasks) > 1
-    tables = {
-        f'{method.name}, {task.name}' if several else method.name: (
-            figures['surfaces'],
-            shares_of(method.confusion),
-            np.array(figures['confusion_last_unclassified']),
-        )
-        for task in protocol.tasks
-        for method in task.methods
-        for figures in [numbers['tasks'][task.name][method.name]]
-        if method.confusion is not None
-    }
-    if tables:
-        path = out / f'{stem}_confusion.png'
-        title = f'{name}: confusion matrices, % of each surface, seed {numbers["seed"]}'
-        charts.append(confusions_chart(tables, title, path))
-    return tuple(charts)
+    return (accuracy_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png', drawn),)
 
 
 def _interval(figures: Mapping[str, Any]) -> Interval:
     return Interval(*figures.get('over_seeds', figures['test']))
-
-
-def shares_of(table: Table | None) -> AnyArray:
-    """Return a paper's table as shares of each row, with a last column for what is unclassified."""
-    counts = np.asarray(table, dtype=np.float64)
-    if counts.shape[1] == counts.shape[0]:
-        counts = np.column_stack((counts, np.zeros(len(counts))))
-    return counts / counts.sum(axis=1, keepdims=True)

@@ -12,7 +12,7 @@ features
     Here: The same.
 hidden layer
     Paper: "The transfer function in the hidden layer is linear" (IV.C).
-    Here: The same: `transfer: linear`; `…-sigmoid` are of no paper.
+    Here: The same.
 ANN 1
     Paper: One output, a number from 1 to 5 (IV.C).
     Here: The output, cut off at 1 and 5.
@@ -30,6 +30,7 @@ search
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -40,10 +41,11 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_estimation.learners.learner import Codes, standardisation
+from texture_estimation.learners.sklearn_learner import packed, unpacked
 from texture_estimation.roughness import REGRESSOR_GRADES as GRADES
 from texture_estimation.roughness import ROUGH, SMOOTH
 from texture_papers.roberge import (
-    TRANSFERS,
+    LINEAR,
     Network,
     Networks,
     fit_network,
@@ -79,7 +81,7 @@ HELD_OUT = 7
 
 
 def fit_networks(
-    values: Array, targets: Sequence[Array], groups: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
+    values: Array, targets: Sequence[Array], groups: Codes, *, hidden: int, iterations: int, seed: int
 ) -> Mapping[str, Any]:
     """Return the fields of `Networks`, one network for each target, (n,), of values (n, n_features)."""
     mean, scale = standardisation(values)
@@ -87,7 +89,7 @@ def fit_networks(
     rng = np.random.default_rng(seed)
     held = _held_out(groups)
     fitted = [
-        fit_network(Network.random(hidden, values.shape[1], rng, transfer), standard, target, held, iterations)
+        fit_network(Network.random(hidden, values.shape[1], rng, LINEAR), standard, target, held, iterations)
         for target in targets
     ]
     return asdict(Networks.joined(fitted, mean, scale))
@@ -105,8 +107,7 @@ def _held_out(textures: Codes) -> Any:
 class Ann1:
     """A network with a hidden layer and one linear output, the grade.
 
-    The paper's text says that the hidden layer is linear, which leaves a linear model whatever its number of neurons;
-    `transfer` gives either.
+    The paper's text says that the hidden layer is linear, which leaves a linear model whatever its number of neurons.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
@@ -119,11 +120,6 @@ class Ann1:
     )
     iterations: int = param(50, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
     seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
-    transfer: str = param(
-        'sigmoid',
-        "Transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
-        choices=tuple(TRANSFERS),
-    )
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
         """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""
@@ -160,9 +156,6 @@ class Ann5(Ann1):
         return lambda X: _without_std(mean_of_votes(networks(X) >= VOTE_THRESHOLD))
 
 
-STORED = ('mean', 'scale', 'vectors', 'weights', 'offsets', 'gamma')  # of `Svm5`: the support vectors of all grades
-
-
 @dataclass(frozen=True)
 class Svm5:
     """An RBF machine for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
@@ -185,33 +178,24 @@ class Svm5:
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
         """Learn from features `X` (n, n_features) and grades `y` (n,)."""
-        from sklearn.svm import SVC  # noqa: PLC0415  # takes a second, and a node that only grades has no need of it
+        from sklearn.multiclass import OneVsRestClassifier  # noqa: PLC0415  # takes a second to import
+        from sklearn.pipeline import make_pipeline  # noqa: PLC0415
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
 
-        mean, scale = standardisation(X)
-        standard = (X - mean) / scale
-        weights = np.zeros((len(X), len(GRADES)))
-        # A grade that no texture has never fires.
-        offsets = np.full(len(GRADES), -1.0)
-        for number, member in enumerate(grade_membership(y).T):
-            if member.all():
-                offsets[number] = 1.0
-            elif member.any():
-                svc = SVC(C=self.c, kernel='rbf', gamma=self.kernel_scale**-2.0).fit(standard, member)
-                weights[svc.support_, number] = svc.dual_coef_[0]
-                offsets[number] = svc.intercept_[0]
-        used = weights.any(axis=1)
-        stored = mean, scale, standard[used], weights[used], offsets, self.kernel_scale**-2.0
-        return dict(zip(STORED, stored, strict=True))
+        machines = OneVsRestClassifier(SVC(C=self.c, gamma=self.kernel_scale**-2.0))
+        with warnings.catch_warnings():
+            warnings.filterwarnings('ignore', 'Label .* is present in')  # a grade that no texture has never fires
+            fitted = make_pipeline(StandardScaler(), machines).fit(X, grade_membership(y).astype(np.intp))
+        return {'packed': packed(fitted, 'SVC')}
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Grader:
         """Return the predictor made from the stored parameters."""
-        mean, scale, vectors, weights, offsets, gamma = (parameters[name] for name in STORED)
+        machines = unpacked(parameters['packed'])
 
         def grade(X: Array) -> tuple[Array, Array]:
-            standard = (X - mean) / scale
-            squares = (standard**2).sum(axis=-1)[..., None] + (vectors**2).sum(axis=1)
-            distances = squares - 2.0 * standard @ vectors.T
-            return _without_std(mean_of_votes(np.exp(-gamma * distances) @ weights + offsets > 0.0))
+            votes = machines.predict(X.reshape(-1, X.shape[-1])).astype(bool)
+            return _without_std(mean_of_votes(votes.reshape(*X.shape[:-1], -1)))
 
         return grade

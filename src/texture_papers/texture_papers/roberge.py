@@ -34,12 +34,15 @@ parts of a circle
 search
     Paper: 20 individuals, 30 generations, the mean of learning and test over 20 halves (IV); from there 10 and 10
         for the vote, 13 and 10 for ten textures. Test slides are part of the fitness.
-    Here: `texture optimise`, `--tune`: 4 of the halves in the search, 20 for the best three. Test slides are never
-        part.
+    Here: `texture experiment NAME --tune`: a search for each pair on the training half alone, of the size in the file;
+        4 of the halves in the search, all for the best three. Test slides are never part.
 variables
     Paper: A set for each pair (III.C), not printed.
-    Here: `…-pairs`: searched once on simulated slides of another seed, in the size that the file names. The other
-        recipes have one set, by which the scenes were made.
+    Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
+        recipes have one set for all pairs.
+standardisation
+    Paper: Not told.
+    Here: Features have zero mean and unit variance.
 friction
     Paper: The next question (VI).
     Here: `texture experiment friction`, simulated. Live, the recipe `friction-svm` needs the arm `ur` or
@@ -50,9 +53,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from itertools import combinations
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,8 +63,9 @@ from numpy.typing import NDArray
 from texture_core.config import param, safe_repr
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.types import Array
-from texture_estimation.learners.learner import Codes, Fitted, Learner, log_softmax, standardisation
-from texture_estimation.learners.svm import RbfMachines
+from texture_estimation.evidence_rules import EvidenceRule, followed
+from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, log_softmax, standardisation
+from texture_estimation.learners.sklearn_learner import packed, unpacked
 from texture_estimation.recipe import check_keys
 from texture_features.feature_set import choose, entry_of
 from texture_features.features.spectral import amplitudes_of
@@ -379,25 +383,48 @@ class Networks:
 
 
 NOTE = 'not calibrated: the pairs won are counted'
+UNDECIDED = -1
+
+
+def fitted_predictor(learner: Any, X: Array, y: Codes, groups: Codes) -> Predictor:
+    """Return what a learner has learnt, without the form in which a model file stores it, which takes time."""
+    if hasattr(learner, 'machine'):
+        return PairsPredictor(partial(decisions_of, learner.machine(X, y, groups)), learner.ties)
+    return cast(Predictor, learner.predictor(learner.fit(X, y, groups).parameters))
+
+
+def decided_by_slide(scores: Array, n_slides: int, rule: EvidenceRule, hop_share: float) -> Codes:
+    """Return what each slide is taken for by all its windows, (n_slides,) of (n_slides · n_windows, n_labels)."""
+    n_labels = scores.shape[1]
+    evidence = rule.window_evidence(log_softmax(scores)).reshape(n_slides, -1, n_labels).swapaxes(0, 1)
+    means, counts = followed(rule, evidence.reshape(len(evidence), -1), min(hop_share, 1.0))
+    posterior = rule.log_posterior(means[-1].reshape(n_slides, n_labels), counts[-1], 1.0)
+    decided: Codes = posterior.argmax(axis=1)
+    decided[(posterior == posterior.max(axis=1, keepdims=True)).sum(axis=1) > 1] = UNDECIDED
+    return decided
+
+
+def decisions_of(machine: Any, X: Array) -> Array:
+    """Return the decisions of scikit-learn's machine for all pairs, (..., n_pairs), positive for the first label."""
+    decisions = np.asarray(machine.decision_function(X.reshape(-1, X.shape[-1])), dtype=np.float64)
+    if decisions.ndim == 1:  # of two labels, where scikit-learn turns the sign round
+        decisions = -decisions[:, None]
+    return decisions.reshape(*X.shape[:-1], -1)
+
+
+def pairs_of_machine(parameters: Mapping[str, Any]) -> PairsPredictor:
+    """Return the predictor of a stored machine for all pairs."""
+    return PairsPredictor(partial(decisions_of, unpacked(parameters['packed'])), str(parameters['ties']))
 
 
 @dataclass(frozen=True)
 class SvmPairs:
     """RBF machines for all pairs with one box constraint and kernel scale; most pairs won.
 
-    The kernel is exp(-|x - s|² / kernel_scale²), MATLAB's sense of the scale: gamma = 1 / kernel_scale².
+    A pipeline of scikit-learn: `StandardScaler`, which is ours, and `SVC` with exp(-|x - s|² / kernel_scale²), MATLAB's
+    sense of the scale: gamma = 1 / kernel_scale².
 
     Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = SvmPairs().fit(values, codes, groups)
-    >>> predictor = SvmPairs.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     box_constraint: float = param(
@@ -412,24 +439,25 @@ class SvmPairs:
         low=1e-9,
         high=1e9,
     )
-    standardise: bool = param(True, 'Whether the features are standardised to zero mean and unit variance first.')
-    ties: str = param(
-        'unclassified',
-        "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",
-        choices=TIES,
-    )
+    ties: ClassVar[str] = TIES[0]
+
+    def machine(self, X: Array, y: Codes, groups: Codes) -> Any:
+        """Return the fitted pipeline."""
+        from sklearn.pipeline import make_pipeline  # noqa: PLC0415  # scikit-learn takes a second to import
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        svc = SVC(C=self.box_constraint, gamma=self.kernel_scale**-2, decision_function_shape='ovo')
+        return make_pipeline(StandardScaler(), svc).fit(X, y)
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
-        none = np.zeros(X.shape[1]), np.ones(X.shape[1])
-        mean, scale = standardisation(X) if self.standardise else none
-        machines = RbfMachines.fit(X, y, mean, scale, c=self.box_constraint, gamma=self.kernel_scale**-2)
-        return Fitted({'machines': asdict(machines), 'ties': self.ties}, None, NOTE)
+        return Fitted({'packed': packed(self.machine(X, y, groups), 'SVC'), 'ties': self.ties}, None, NOTE)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
-        return PairsPredictor(RbfMachines(**parameters['machines']), str(parameters['ties']))
+        return pairs_of_machine(parameters)
 
 
 ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair
@@ -444,16 +472,6 @@ class AnnPairs:
     Trained by the Levenberg-Marquardt method with early stopping on every seventh slide, as MATLAB does by default.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
-    >>> fitted = AnnPairs().fit(values, codes, groups)
-    >>> predictor = AnnPairs.predictor(fitted.parameters)
-    >>> bool((predictor(values).argmax(axis=1) == codes).all())
-    True
     """
 
     hidden: int = param(
@@ -464,11 +482,6 @@ class AnnPairs:
     )
     iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
     seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
-    ties: str = param(
-        'unclassified',
-        "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",
-        choices=TIES,
-    )
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
@@ -483,13 +496,13 @@ class AnnPairs:
             start = Network.random(self.hidden, X.shape[1], rng)
             targets = (y[rows] == first).astype(np.float64)
             networks.append(fit_network(start, standard[rows], targets, held[rows], self.iterations))
-        return Fitted({'networks': asdict(Networks.joined(networks, mean, scale)), 'ties': self.ties}, None, NOTE)
+        return Fitted({'networks': asdict(Networks.joined(networks, mean, scale))}, None, NOTE)
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> PairsPredictor:
         """Return the predictor made from the stored parameters."""
         networks = Networks(**parameters['networks'])
-        return PairsPredictor(lambda X: networks(X) - ROUNDED_UP, str(parameters['ties']))
+        return PairsPredictor(lambda X: networks(X) - ROUNDED_UP, TIES[0])
 
 
 def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
@@ -504,7 +517,7 @@ def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
 
 
 TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have variables of their own'
-KEYS = ('learner', 'pairs', 'ties')
+KEYS = ('learner', 'pairs')
 PAIR_KEYS = ('pair', 'inputs', 'learner')
 # What decides a pair.
 OF_PAIRS: Mapping[str, type[SvmPairs] | type[AnnPairs]] = {
@@ -554,13 +567,10 @@ class TunedPairs:
     learner_name: str = 'texture_papers.roberge:SvmPairs'
     learner: Learner = field(default_factory=SvmPairs)
     pairs: tuple[TunedPair, ...] = ()
-    ties: str = TIES[0]
     names: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.ties not in TIES:
-            raise InvalidParameter(f"ties is '{self.ties}'; allowed is {' or '.join(TIES)}")
         listed = [frozenset(pair.labels) for pair in self.pairs]
         for labels in listed:
             if listed.count(labels) > 1:
@@ -576,7 +586,7 @@ class TunedPairs:
         entries = enumerate(values.get('pairs') or [], 1)
         pairs = tuple(TunedPair.from_recipe(entry, f'{where}, pair {number}') for number, entry in entries)
         try:
-            return cls(*learner, pairs, str(values.get('ties', TIES[0])))
+            return cls(*learner, pairs)
         except InvalidParameter as error:
             raise InvalidParameter(f'{where}: {error}') from error
 
@@ -585,7 +595,6 @@ class TunedPairs:
         return {
             'learner': {self.learner_name: entry_of(self.learner)},
             'pairs': [pair.as_recipe() for pair in self.pairs],
-            'ties': self.ties,
         }
 
     def of_examples(self, names: Sequence[str], labels: Sequence[str]) -> TunedPairs:
@@ -616,7 +625,7 @@ class TunedPairs:
             fitted = settings.learner.fit(X[np.ix_(rows, columns)], codes, groups[rows])
             member = {'number': number, 'columns': columns, 'learner': settings.learner_name}
             members.append({**member, 'parameters': fitted.parameters})
-        parameters = {'n_pairs': len(pairs), 'ties': self.ties, 'members': members}
+        parameters = {'n_pairs': len(pairs), 'members': members}
         return Fitted(parameters, None, TUNED_NOTE.format(n_tuned, len(pairs)))
 
     @staticmethod
@@ -634,7 +643,7 @@ class TunedPairs:
         def decisions(X: Array) -> Array:
             return np.stack([predictor.decisions(X[..., columns])[..., 0] for columns, predictor in fitted], axis=-1)
 
-        return PairsPredictor(decisions, str(parameters['ties']))
+        return PairsPredictor(decisions, TIES[0])
 
     def _columns(self, pair: TunedPair) -> Codes:
         """Return the numbers of the features that a pair sees."""

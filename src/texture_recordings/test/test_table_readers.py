@@ -14,7 +14,7 @@ import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData, MissingLibrary
-from texture_recordings.tables import MAPPED, READERS, Table, TableFiles, TableMapping, mapping_from, template_fields
+from texture_recordings.tables import MAPPED, Frame, TableMapping, frames, import_tables, mapping_from, template_fields
 
 pa = pytest.importorskip('pyarrow')
 parquet = pytest.importorskip('pyarrow.parquet')
@@ -54,8 +54,8 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 }
 
 
-def tables(path: Path, chosen: TableMapping | None = None) -> list[Table]:
-    return list(READERS[path.suffix](path, path.name, chosen or mapping()))
+def tables(path: Path, chosen: TableMapping | None = None) -> list[Frame]:
+    return list(frames(path, path.name, chosen or mapping()))
 
 
 def made(folder: Path, suffix: str) -> Path:
@@ -69,14 +69,13 @@ each = pytest.mark.parametrize('suffix', MAPPED['table'])
 
 @each
 def test_columns_are_read_as_they_were_written(tmp_path: Path, suffix: str) -> None:
-    reader = READERS[suffix](made(tmp_path, suffix), 'a', mapping())
-    table = next(iter(reader))
-    x, y = table.names[:2]
-    read = table.read([x, y], [x])
+    for table in frames(made(tmp_path, suffix), 'a', mapping()):
+        x, y = table.names[:2]
+        read = table.read([x, y], [x])
     np.testing.assert_allclose(read.numbers[x], X, atol=1e-6)
     np.testing.assert_allclose(read.numbers[y], Y, atol=1e-6)
     assert read.texts[x].shape == X.shape
-    assert not read.malformed
+    assert not read.reasons
 
 
 @each
@@ -84,10 +83,9 @@ def test_a_file_that_is_something_else_is_refused_with_a_sentence_that_names_it(
     (tmp_path / f'other{suffix}').write_bytes(b'')
     (tmp_path / f'folder{suffix}').mkdir()
     os.mkfifo(tmp_path / f'pipe{suffix}')
-    with TableFiles() as files:
-        for name in ('other', 'folder', 'pipe'):
-            with pytest.raises(InvalidData, match=f"'{name}{suffix}'"):
-                list(files.tables(suffix, tmp_path / f'{name}{suffix}', f'{name}{suffix}', mapping()))
+    for name in ('other', 'folder', 'pipe'):
+        with pytest.raises(InvalidData, match=f"'{name}{suffix}'"):
+            [frame.read(frame.names[:1], []) for frame in tables(tmp_path / f'{name}{suffix}')]
 
 
 @each
@@ -96,36 +94,21 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
     rng = np.random.default_rng(0)
     path = tmp_path / f'damaged{suffix}'
     everything = mapping(streams={'signal': {'columns': ['*'], 'rate_hz': 100.0}})
-    with TableFiles() as files:
-        for _ in range(60):
-            data = bytearray(content[: int(rng.integers(1, len(content)))] if rng.random() < 0.3 else content)
-            for place in rng.integers(0, len(data), rng.integers(1, 6)).tolist():
-                data[place] = int(rng.integers(256))
-            path.write_bytes(data)
-            try:
-                for table in files.tables(suffix, path, path.name, everything):
-                    assert table.numbers
-            except InvalidData as error:
-                assert path.name in str(error)
-
-
-def test_a_file_that_takes_too_long_is_refused_and_the_next_one_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = made(tmp_path, '.csv')
-    with TableFiles() as files:
-        monkeypatch.setattr('texture_recordings.tables.DEADLINE_S', 1e-6)
-        with pytest.raises(InvalidData, match=r"'a\.csv' was refused: it takes longer to read than a file of its size"):
-            list(files.tables('.csv', path, 'a.csv', mapping()))
-        monkeypatch.undo()
-        [table] = files.tables('.csv', path, 'a.csv', mapping())
-        np.testing.assert_array_equal(table.numbers['x'], X)
+    for _ in range(60):
+        data = bytearray(content[: int(rng.integers(1, len(content)))] if rng.random() < 0.3 else content)
+        for place in rng.integers(0, len(data), rng.integers(1, 6)).tolist():
+            data[place] = int(rng.integers(256))
+        path.write_bytes(data)
+        try:
+            import_tables(everything, path, None)
+        except InvalidData as error:
+            assert path.name in str(error)
 
 
 @each
 def test_a_column_that_is_missing_is_refused_with_the_nearest(tmp_path: Path, suffix: str) -> None:
-    table = next(iter(READERS[suffix](made(tmp_path, suffix), 'a', mapping())))
-    with pytest.raises(InvalidData, match="'a': no column 'wrong'"):
+    table = tables(made(tmp_path, suffix))[0]
+    with pytest.raises(InvalidData, match="no column 'wrong'"):
         table.chosen(['wrong'])
     assert table.chosen(['*']) == list(table.names)
 
@@ -144,8 +127,8 @@ def test_objects_in_arrays_are_refused_and_nothing_is_run(tmp_path: Path) -> Non
     np.save(tmp_path / 'a.npy', np.array([{'a': 1}], dtype=object), allow_pickle=True)
     np.savez(tmp_path / 'a.npz', x=np.array([{'a': 1}], dtype=object))
     for suffix in ('.npy', '.npz'):
-        with TableFiles() as files, pytest.raises(InvalidData, match='Object arrays cannot be loaded'):
-            list(files.tables(suffix, tmp_path / f'a{suffix}', 'a', mapping()))
+        with pytest.raises(InvalidData, match='Object arrays cannot be loaded'):
+            tables(tmp_path / f'a{suffix}')
 
 
 def test_structs_of_matlab_are_folders_and_row_vectors_are_columns(tmp_path: Path) -> None:
@@ -205,7 +188,7 @@ def test_a_quote_that_is_never_closed_spoils_its_own_row_alone(tmp_path: Path) -
     (tmp_path / 'a.csv').write_text('a,b\n1,2\n"3,4\n5,6\n')
     [table] = tables(tmp_path / 'a.csv')
     read = table.read(['a', 'b'], [])
-    assert list(read.malformed) == [3]
+    assert list(read.reasons) == [3]
     assert read.numbers['b'][[0, 2]].tolist() == [2, 6]
 
 

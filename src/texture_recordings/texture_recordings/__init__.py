@@ -17,5 +17,5 @@ samples, labels = dataset.to_numpy('signal')  # one array (n_samples, n_channels
 With ROS: `texture record my_bag`, `texture replay my_bag --rate 2`
 
 Limits: a damaged or foreign bag is refused with a sentence, one that was cut off is read up to its last whole chunk,
-and none is overwritten. Foreign files are read in a child process with limited memory and time.
+and none is overwritten. Of foreign files the number of values is read from headers first, and limited.
 """

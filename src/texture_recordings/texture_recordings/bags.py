@@ -7,6 +7,7 @@ from __future__ import annotations
 import io
 import logging
 import os
+import re
 import struct
 import sys
 from collections import Counter
@@ -37,7 +38,16 @@ from texture_core.types import (
 
 try:
     import apsw
-    from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+    from rosbags.interfaces import (
+        Connection,
+        MessageDefinitionFormat,
+        Qos,
+        QosDurability,
+        QosHistory,
+        QosLiveliness,
+        QosReliability,
+        QosTime,
+    )
     from rosbags.rosbag2 import (
         CompressionFormat,
         CompressionMode,
@@ -64,8 +74,7 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 # it ended behind its last whole chunk.
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
-MAX_UNPACKED_BYTES = 20_000 * MB  # of one file of a bag that is compressed as a whole
-MAX_MESSAGE_BYTES = 100 * MB
+MAX_CHUNK_BYTES = 500 * MB  # that a chunk of an MCAP file declares to unpack to
 CHUNK = 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
@@ -82,11 +91,15 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
         file = open_regular(self, None)
-        if self.suffix == '.zstd':
-            _check_unpacked(file)
-        if self.suffix != '.mcap' or _has_end(file):
+        if self.suffix != '.mcap':
+            return file
+        small = file.seek(0, io.SEEK_END) < 50 * MB  # a larger one takes as much memory anyway
+        whole = _has_end(file)
+        if whole and not small:
             return file
         end = _end_of_chunks(file)
+        if whole:
+            return file
         logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
         return io.BufferedReader(_Ended(file, end))
 
@@ -126,26 +139,6 @@ class _Ended(io.RawIOBase):
         super().close()
 
 
-def _check_unpacked(file: BinaryIO) -> None:
-    """Refuse a compressed file that unpacks to more than is read: rosbags unpacks it to the disk before it looks."""
-    unpacked = 0
-    with zstd.open(file, 'rb') as stream:
-        while part := stream.read(1 << 20):
-            unpacked += len(part)
-            if unpacked > MAX_UNPACKED_BYTES:
-                raise FileRefused(f'it unpacks to more than {MAX_UNPACKED_BYTES / MB:.0f} MB; record shorter bags')
-    file.seek(0)
-
-
-def _unpacked_message(data: bytes) -> bytes:
-    """Return a message that was compressed by itself, as `ros2 bag record --compression-mode message` does."""
-    unpacker = zstd.ZstdDecompressor()
-    message = unpacker.decompress(data, MAX_MESSAGE_BYTES)
-    if not unpacker.eof:
-        raise ReaderError(f'a message is cut off, or unpacks to more than {MAX_MESSAGE_BYTES / MB:.0f} MB')
-    return message
-
-
 def _has_end(file: BinaryIO) -> bool:
     """Return whether an MCAP file has its end; FileRefused if the checksum of its summary is wrong."""
     size = file.seek(0, io.SEEK_END)
@@ -175,6 +168,8 @@ def _end_of_chunks(file: BinaryIO) -> int:
         if at > size or not kind:
             break
         if kind == CHUNK:
+            if int.from_bytes(file.read(CHUNK_HEAD.size)[16:24], 'little') > MAX_CHUNK_BYTES:
+                raise FileRefused(f'a chunk unpacks to more than {MAX_CHUNK_BYTES / MB:.0f} MB; record it again')
             chunks.append((at - length, length))
         end = at
     while chunks and not _is_whole(file, *chunks[-1]):
@@ -217,6 +212,28 @@ def typestore() -> Typestore:
         raise InvalidData(f"no message definitions in '{directory}'; build or source the workspace first")
     for path in definitions:
         store.register(get_types_from_msg(path.read_text(encoding='utf-8'), f'texture_msgs/msg/{path.stem}'))
+    return store
+
+
+# Not among the messages of ROS 2 itself.
+AUDIO: Mapping[str, str] = {
+    'audio_common_msgs/msg/AudioData': 'uint8[] data',
+    'audio_common_msgs/msg/AudioDataStamped': 'std_msgs/Header header\nAudioData audio',
+}
+
+
+def message_types(connection: Connection | None = None) -> Typestore:
+    """Return message types by the definition that a bag stores for a connection, else those of ROS 2 and of sound."""
+    definition = connection.msgdef if connection else None
+    if connection and definition and definition.format is MessageDefinitionFormat.MSG:
+        own = get_typestore(Stores.EMPTY)
+        parsed = get_types_from_msg(definition.data, connection.msgtype)
+        # Constants and defaults are left out: of a file nothing but names, as the grammar allows them, becomes code.
+        own.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
+        return own
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for name, text in AUDIO.items():
+        store.register(get_types_from_msg(text, name))
     return store
 
 
@@ -326,11 +343,27 @@ def is_bag(path: Path) -> bool:
 
 
 def _cut_off_file(path: Path) -> Path | None:
-    """Return the one file of a bag whose recorder could not write the metadata."""
-    if not path.is_dir() or os.path.lexists(path / 'metadata.yaml'):
+    """Return the one file of a bag whose recorder could not write the metadata, or left out how it is stored."""
+    if not path.is_dir():
         return None
+    if os.path.lexists(path / 'metadata.yaml'):
+        try:
+            text = CheckedPath(path / 'metadata.yaml').read_text()
+        except (OSError, ValueError):
+            return None
+        if not re.search(r'^\s*storage_identifier:\s*(""|\'\')?\s*$', text, re.MULTILINE):
+            return None
     files = list(path.glob('*.mcap'))
     return files[0] if len(files) == 1 else None
+
+
+def is_cut_off(path: Path) -> bool:
+    """Say whether a file of a bag has no end, as that of a recorder that was killed."""
+    for one in path.glob('*.mcap') if path.is_dir() else [path]:
+        with open_regular(one, None) as file:
+            if not _has_end(file):
+                return True
+    return False
 
 
 def find_bags(paths: Iterable[str | Path]) -> list[Path]:
@@ -429,15 +462,10 @@ def _read(
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)
-            packed = reader.compression_mode == 'message'
-            if packed:  # unpacked here, with a limit
-                storage: Any = reader.storage
-                storage.metadata = storage.metadata._replace(compression_mode=None)
             for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
                 missing -= 1
                 name = names.get(connection.topic, connection.topic)
-                raw = _unpacked_message(data) if packed else data
-                yield name, RawMessage(connection.topic, connection.msgtype, log_ns, raw)
+                yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
     except BROKEN as error:

@@ -38,7 +38,7 @@ from texture_core.types import (
 )
 from texture_features.feature_set import LabelledFeatures
 from texture_features.windows import CutWindow, WindowBatch, WindowEvent, WindowParams, cut_recording
-from texture_recordings.bags import find_bags, read_bag
+from texture_recordings.bags import find_bags, is_bag, read_bag, short_name, topics_in
 
 if TYPE_CHECKING:
     from texture_features.augmentation import Augmentation
@@ -498,7 +498,7 @@ class SlideDataset:
                 topic: _batch(arrays[index], (sensor or topic, (channels or {}).get(topic), rates_hz[topic]), start_ns)
                 for topic, arrays in signals.items()
             }
-            duration_ns = min(batch.end_ns for batch in batches.values()) - start_ns
+            duration_ns = max(batch.end_ns for batch in batches.values()) - start_ns
             state = ExplorationState(
                 start_ns,
                 f'{session or "array"}/{index}',
@@ -833,9 +833,11 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
     """Return the windows of a slide and its end, as the feature extractor on the robot cuts them."""
     missing = [topic for topic in feature_set.topics if not slide.signals.get(topic)]
     if missing:
+        # The bag may hold streams that the recipe did not ask for.
+        in_bag = topics_in(slide.bag, slide.namespace) if is_bag(slide.bag) else slide.signals
+        there = sorted(topic for topic in in_bag if topic not in missing and short_name(topic) in STREAMS)
         raise ModelMismatch(
-            f"slide '{slide.name}' in '{slide.bag}' has no '{missing[0]}', only "
-            f'{", ".join(sorted(topic for topic, batches in slide.signals.items() if batches)) or "states"}; '
+            f"slide '{slide.name}' in '{slide.bag}' has no '{missing[0]}', only {', '.join(there) or 'states'}; "
             f'the windows need {", ".join(feature_set.topics)}: use another recipe or record the missing topic'
         )
     used = {topic: slide.signals[topic] for topic in feature_set.topics}

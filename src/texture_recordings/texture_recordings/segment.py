@@ -14,7 +14,7 @@ from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.segmentation import SegmentationParams, segment_recording
 from texture_recordings.bags import BagWriter, RawMessage, find_bags, read_bag, read_named
 
-FAST_TOPIC, SLOW_TOPIC, STATE_TOPIC = 'signal', 'signal_static', 'exploration'
+FAST_TOPIC, STATE_TOPIC = 'signal', 'exploration'
 
 
 def segment_bags(
@@ -37,11 +37,11 @@ def segment_bags(
 
 
 def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
-    signals: dict[str, list[TactileSignal]] = {FAST_TOPIC: [], SLOW_TOPIC: []}
+    signals: list[TactileSignal] = []
     reported: list[ExplorationState] = []
-    for topic, _, value in read_bag(path, (*signals, STATE_TOPIC), namespace):
-        (reported if topic == STATE_TOPIC else signals[topic]).append(value)
-    if not signals[FAST_TOPIC]:
+    for topic, _, value in read_bag(path, (FAST_TOPIC, STATE_TOPIC), namespace):
+        (reported if topic == STATE_TOPIC else signals).append(value)
+    if not signals:
         raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; record the vibration too")
     found = segment_recording(signals, params, exploration_id=path.name)
     states = _labelled(found, sorted(reported, key=lambda state: state.stamp_ns), surface)

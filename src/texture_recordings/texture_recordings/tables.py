@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Import foreign tables by a mapping file: readers, columns, borders of slides, bags."""
+"""Import foreign tables by a mapping file: readers give frames, one strict step gives streams, labels and slides."""
 
 from __future__ import annotations
 
@@ -10,33 +10,26 @@ import dataclasses
 import fnmatch
 import io
 import math
-import os
 import re
-import resource
 import shutil
-import signal
 import struct
-import subprocess
-import sys
-import time
 import warnings
+import zlib
+from bisect import bisect_right
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from itertools import islice, pairwise
-from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from texture_core.cli import progress
 from texture_core.config import (
     MB,
-    FileRefused,
     find_file,
     library,
     load_yaml,
@@ -64,57 +57,79 @@ from texture_recordings.bags import (
     BagWriter,
     RawMessage,
     is_bag,
+    is_cut_off,
+    message_types,
     read_foreign,
     slide_batches,
-    typestore,
 )
 from texture_recordings.dataset import STREAMS
 
-try:
-    from rosbags.interfaces import Connection as BagConnection
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import get_types_from_msg
-    from rosbags.typesys.store import Typestore
-except ModuleNotFoundError as error:
-    raise MissingLibrary('rosbags', 'bags', 'bags') from error
-
 # --------------------
-# What a mapping file (YAML) says: which columns are signals, and what labels, slides and conditions come from.
+# What a mapping file (YAML) names: which columns are signals, and what labels, slides and conditions come from.
 
-FIELD = re.compile(r'\{(\w*)\}|\*')
-
-
-@cache
-def template_pattern(template: str) -> tuple[re.Pattern[str], Sequence[str]]:
-    """Return what names of the form of a template match, and the name of each group, '' for what is not kept.
-
-    A field in braces is one character or more, holds no '/', and ends where the text behind it comes first; '*' and
-    '{}' stand for any text that is not kept.
-    """
-    first, *literals = FIELD.sub('\0', template).split('\0')
-    if '' in literals[:-1]:
-        raise InvalidParameter(f"the template '{template}' has fields without text between; put text there")
-    names = [match[1] or '' for match in FIELD.finditer(template)]
-    if len(set(filter(None, names))) < len(list(filter(None, names))):
-        raise InvalidParameter(f"the template '{template}' has a field twice; give each a name of its own")
-    pattern = re.escape(first)
-    for number, (name, literal) in enumerate(zip(names, map(re.escape, literals), strict=True), 1):
-        text = '[^/]+' if name else '[^/]*'
-        # What a lookahead has found is not tried anew, so no name takes long to compare.
-        own = f'(?=({text}?){literal})\\{number}' if number < len(names) else f'({text})'
-        pattern += f'{own}{literal}'
-    return re.compile(pattern, re.DOTALL), names
+FIELD = re.compile(r'\{(\w*)(:d)?\}|\*')
 
 
 def template_fields(template: str, name: str) -> dict[str, str] | None:
-    """Return the fields of a name; None if it is not of the form of the template."""
-    pattern, names = template_pattern(template)
-    match = pattern.fullmatch(name)
-    return {key: text for key, text in zip(names, match.groups(), strict=True) if key} if match else None
+    """Return the fields of a name, None if it is not of the form of the template; InvalidData if it fits in two ways.
+
+    A field in braces is one character or more without '/', `{run:d}` digits alone, '*' and '{}' any text that is not
+    kept.
+    """
+    found: list[dict[str, str]] = []
+    for fields in islice(_fits(template, name), 100):
+        if fields not in found:
+            found.append(fields)
+        if len(found) > 1:
+            one, other = (', '.join(f'{key}={text}' for key, text in fields.items()) for fields in found)
+            raise InvalidData(
+                f"'{name}' fits '{template}' in two ways: {one}; or {other}; write a part that tells them apart, or "
+                'digits as {code:d}, or rename the files'
+            )
+    return found[0] if found else None
+
+
+def _fits(template: str, name: str) -> Iterator[dict[str, str]]:
+    """Yield the fields of a name in each way in which it is of the form of a template."""
+    first, *literals = FIELD.sub('\0', template).split('\0')
+    fields = [(match[1] or '', match[2] is not None) for match in FIELD.finditer(template)]
+    dead: set[tuple[int, int]] = set()  # so that no name takes long
+
+    def rest(number: int, at: int) -> Iterator[dict[str, str]]:
+        if number == len(fields):
+            if at == len(name):
+                yield {}
+            return
+        (field_name, digits), literal = fields[number], literals[number]
+        if (number, at) in dead:
+            return
+        fits, end = False, at + bool(field_name)
+        while (end := name.find(literal, end)) >= 0:
+            text = name[at:end]
+            if '/' in text or (digits and not text.isdigit()):
+                break
+            for others in rest(number + 1, end + len(literal)):
+                fits = True
+                yield {**({field_name: text} if field_name else {}), **others}
+            end += 1
+        if not fits:
+            dead.add((number, at))
+
+    if name.startswith(first):
+        yield from rest(0, len(first))
+
+
+def _checked_template(template: str) -> None:
+    """Refuse a template whose fields follow each other without text between, or that names one twice."""
+    if '' in FIELD.sub('\0', template).split('\0')[1:-1]:
+        raise InvalidParameter(f"the template '{template}' has fields without text between; put text there")
+    names = [match[1] for match in FIELD.finditer(template) if match[1]]
+    if len(set(names)) < len(names):
+        raise InvalidParameter(f"the template '{template}' has a field twice; give each a different name")
 
 
 TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
-BORDERS = ('file', 'column', 'pause', 'time')
+BORDERS = ('file', 'column', 'pause', 'time', 'row')
 
 
 @dataclass(frozen=True)
@@ -165,6 +180,9 @@ class StreamColumns:
     rate_hz: float = param(
         0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
     )
+    samples_per_row: int = param(
+        0, 'Number of successive columns that are consecutive samples of one channel; 0 as 1.', low=0, high=1_000_000
+    )
     time: TimeColumn = field(default_factory=TimeColumn)
 
     def __post_init__(self) -> None:
@@ -195,7 +213,7 @@ class SlideBorders:
     by: str = param(
         'file',
         "Says what ends a slide: 'file' (each file or table is one slide), 'column' (a value changes), 'pause' (time "
-        "jumps by `pause_s` or back) or 'time' (every `length_s`).",
+        "jumps by `pause_s` or back), 'time' (every `length_s`) or 'row' (each row is one, see `samples_per_row`).",
         choices=BORDERS,
     )
     column: str = param('', "Names the column whose value changes between slides, for 'column'.")
@@ -236,6 +254,10 @@ class TableMapping:
         '', "Gives the template of the arrays in a file that are a slide each, such as '{material}/speed{speed}'."
     )
     format: FileFormat = field(default_factory=FileFormat)
+    rows: Mapping[str, str] = field(
+        default_factory=dict,
+        metadata={'description': 'Values of columns, such as {sensor: S1}: only rows that have them are read.'},
+    )
     streams: Mapping[str, StreamColumns] = field(default_factory=dict)
     label: LabelColumn = field(default_factory=LabelColumn)
     slides: SlideBorders = field(default_factory=SlideBorders)
@@ -243,13 +265,10 @@ class TableMapping:
     session: str = param('', "Names the column or field by which slides go into bags; '' makes one bag a surface.")
     sensor: str = param('imported', 'Names the sensor in the bags.')
     motion: str = param('linear_slide', 'Names the motion in the bags.')
-    max_malformed: float = param(
-        0.1, 'Largest fraction of malformed rows of a file; one with more is refused.', low=0.0, high=1.0
-    )
 
     def __post_init__(self) -> None:
         for template in filter(None, (self.files, self.tables)):
-            template_pattern(template)
+            _checked_template(template)
         for name, quantity in self.conditions.items():
             if name not in CONDITION_UNITS:
                 raise unknown_name(name, CONDITION_UNITS, 'condition')
@@ -274,21 +293,17 @@ class TableMapping:
 
     def texts(self) -> list[str]:
         """Return the names of the columns that are read as texts."""
-        return [self.label.column, self.session, *[self.slides.column] * (self.slides.by == 'column')]
+        by_column = [self.slides.column] * (self.slides.by == 'column')
+        return [name for name in (self.label.column, self.session, *by_column, *self.rows) if name]
 
     def numbers(self) -> list[str]:
         """Return the names of the columns that are read as numbers, beside those of the streams."""
-        return [one.time.column for one in self.streams.values()] + [one.column for one in self.conditions.values()]
+        names = [one.time.column for one in self.streams.values()] + [one.column for one in self.conditions.values()]
+        return [name for name in names if name]
 
 
 def load_mapping(name_or_path: str | Path) -> TableMapping:
-    """Return the mapping in a file, or one that the package ships in config/mappings, by name.
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        If there is no such file, or it contains something unknown or impossible.
-    """
+    """Return the mapping in a file, or one that the package ships in config/mappings, by name."""
     path = find_file(str(name_or_path), 'texture_recordings', 'config/mappings', 'mapping')
     return mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
 
@@ -299,56 +314,44 @@ def mapping_from(content: object, where: str = 'mapping') -> TableMapping:
 
 
 # --------------------
-# Files of anybody as tables: CSV, NumPy, MATLAB, HDF5, Parquet, sound, and bags of standard messages.
-#
-# The libraries that read them believe what a file says of its size. So a child process reads, with a limit of memory
-# and of time, and no reader has limits of its own.
+# Readers: a file of anybody as frames. Each reads rows × columns from headers and asks for them before it loads.
 
 MAX_FILE_BYTES = 1000 * MB
-MEMORY_BYTES = 1000 * MB  # beyond what the interpreter takes, and `MEMORY_TIMES` the size of the file
-MEMORY_TIMES = 4
-DEADLINE_S, DEADLINE_BYTES = 10.0, 5 * MB  # for each of so many bytes; the machine may be busy
-START_S = 120.0  # for the process to load its libraries, on a machine that does much else
-MAX_VALUES = 50_000_000  # of one table: 400 MB
-EXAMPLES = 5
+MAX_VALUES = 8_000_000  # of 8 bytes, of one file; a larger file may have as many as it has bytes
+EXAMPLES = 3
 RANGE = re.compile(r'(\D*)(\d{1,9})-\1(\d{1,9})')
 MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
+MAX_ARRAYS = 50_000  # in the cells and structs of a MATLAB file, or data sets of an HDF5 file
 MAX_CHANNELS = 10_000  # more are samples: the array lies on its side
 DELIMITERS = (',', ';', '\t', '|', ' ')
 BLOCK_ROWS = 20_000  # of a text file, which are parsed at once
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 
+Take = Callable[[float], None]  # asks for a number of values; InvalidData beyond the limit of the file
+
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What was read of a table."""
+    """Columns of a frame, (n,) each: numbers, NaN where there is none, and texts."""
 
     numbers: Mapping[str, Array]
-    texts: Mapping[str, NDArray[np.str_]]
-    rows: AnyArray | None = None
-    malformed: Mapping[int, str] = field(default_factory=dict)
-    place: str = ''
-    fields: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float = 0.0
-    clocks: Mapping[str, str] = field(default_factory=dict)
-    chosen: Mapping[str, Sequence[str]] = field(default_factory=dict)
-
-    def row(self, index: int) -> int:
-        """Return the number in the file of a row."""
-        return index if self.rows is None or index >= len(self.rows) else int(self.rows[index])
+    texts: Mapping[str, AnyArray]
+    lines: AnyArray | None = None  # number in the file of each row
+    junk: AnyArray | None = None  # rows with something that is no number
+    reasons: Mapping[int, str] = field(default_factory=dict)  # of the first such rows, by line
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
-    """Columns that belong together."""
+class Frame:
+    """Columns that belong together, by name, with what holds for all their rows."""
 
     place: str
     names: Sequence[str]
     read: Callable[[Sequence[str], Sequence[str]], Columns]
     fields: Mapping[str, str] = field(default_factory=dict)
     rate_hz: float = 0.0
-    clocks: Mapping[str, str] = field(default_factory=dict)
+    clocks: Mapping[str, str] = field(default_factory=dict)  # column → column of its times, s
 
     def chosen(self, wanted: Sequence[str]) -> list[str]:
         """Return the columns that names, patterns such as 'taxel*' and ranges such as '0-8' mean, in their order."""
@@ -362,21 +365,6 @@ class Table:
             found += meant
         return found
 
-    def mapped(self, mapping: TableMapping, fields: Mapping[str, str]) -> Columns:
-        """Return the columns that a mapping uses; `fields` are those of the name of the file."""
-        fields = {**self.fields, **fields}
-        chosen = {name: self.chosen(stream.columns) for name, stream in mapping.streams.items()}
-        wanted = [column for columns in chosen.values() for column in columns] + mapping.numbers()
-        texts = mapping.texts()
-        for name in filter(None, (*wanted, *texts)):
-            if name not in fields and name not in self.names:
-                raise InvalidData(f"'{self.place}': {unknown_name(name, (*self.names, *fields), 'column')}")
-        clocks = {name: self.clocks[name] for name in (*wanted, *texts) if name in self.clocks}
-        numbers = dict.fromkeys((*wanted, *clocks.values()))
-        both = (numbers, dict.fromkeys(texts))
-        read = self.read(*([name for name in names if name and name not in fields] for names in both))
-        return replace(read, place=self.place, fields=fields, rate_hz=self.rate_hz, clocks=clocks, chosen=chosen)
-
 
 def _meant(name: str, names: Sequence[str]) -> list[str]:
     match = RANGE.fullmatch(name)
@@ -385,192 +373,110 @@ def _meant(name: str, names: Sequence[str]) -> list[str]:
     return [one for one in names if fnmatch.fnmatchcase(one, name)] if len(name) <= 100 else []
 
 
-# ---- the process that reads ------------------------------------------------------------------------------------------
-
-
-class TableFiles:
-    """Read tables in a child process that has limits; use it in a `with` block.
-
-    The child reads one file after another.
-    """
-
-    def __enter__(self) -> TableFiles:
-        self._child: subprocess.Popen[bytes] | None = None
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._end()
-
-    def tables(
-        self, kind: str, path: Path, place: str, mapping: TableMapping, fields: Mapping[str, str] | None = None
-    ) -> Iterator[Columns]:
-        """Yield the tables of a file, of each the columns that a mapping uses."""
-        size = _checked_size(path, place)
-        if self._child is None:
-            self._begin()
-        memory = MEMORY_BYTES + MEMORY_TIMES * size
-        with suppress(OSError):  # it has ended: the answer says why
-            self._connection.send((kind, path, place, mapping, dict(fields or {}), memory))
-        self._receive(place, START_S, memory)  # it has its libraries, whose time is not the file's fault
-        left_s = DEADLINE_S * max(1.0, size / DEADLINE_BYTES)
-        while True:
-            began_s = time.monotonic()
-            columns = self._receive(place, left_s, memory)
-            left_s -= time.monotonic() - began_s
-            if columns is None:
-                return
-            try:
-                yield columns
-            except GeneratorExit:
-                self._end()  # in the middle of a file: what comes next would be taken for an answer
-                raise
-
-    def _begin(self) -> None:
-        self._connection, theirs = Pipe()
-        code = f'from texture_recordings.tables import serve; serve({theirs.fileno()})'
-        # One thread: the stack and the pool of each would count as memory taken.
-        single = {'OPENBLAS_NUM_THREADS': '1', 'OMP_NUM_THREADS': '1', 'MALLOC_ARENA_MAX': '1'}
-        path = {'PYTHONPATH': os.pathsep.join(sys.path), 'ARROW_DEFAULT_MEMORY_POOL': 'system'}
-        self._child = subprocess.Popen(
-            [sys.executable, '-c', code], pass_fds=[theirs.fileno()], env={**os.environ, **single, **path},
-            stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        theirs.close()
-
-    def _end(self) -> int:
-        child, self._child = self._child, None
-        if child is None:
-            return 0
-        self._connection.close()
-        child.kill()
-        return child.wait()
-
-    def _receive(self, place: str, left_s: float, memory: int) -> Any:
-        """Return the next answer of the child, which has so many seconds; InvalidData if it is a refusal."""
-        began_s, late = time.monotonic(), False
-        try:
-            arrived = self._connection.poll(max(0.0, left_s))
-            late = not arrived or time.monotonic() - began_s >= left_s
-            reply = None if late else self._connection.recv()
-        except (EOFError, OSError):
-            late, reply = False, ''
-        if late or reply == '':
-            code = self._end()
-            ended = f'the process that reads it ended with code {code}, having at most {memory / MB:.0f} MB'
-            reason = 'it takes longer to read than a file of its size may' if late else ended
-            raise InvalidData(f"'{place}' was refused: {reason}; save it again, or split it")
-        if isinstance(reply, str):
-            raise InvalidData(reply)
-        return reply
-
-
-def _checked_size(path: Path, place: str) -> int:
+def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[Frame]:
+    """Yield the frames of a file; InvalidData with its place, whatever is wrong with it."""
+    kind = _kind(path)
+    if kind in OTHER_KINDS:
+        raise InvalidData(f"'{place}' {OTHER_KINDS[kind]}")
     try:
-        if path.is_dir() and (path / 'metadata.yaml').is_file():
-            return sum(file.stat().st_size for file in path.iterdir() if file.is_file())
-        with open_regular(path) as file:
-            size = os.fstat(file.fileno()).st_size
-    except (OSError, FileRefused) as error:
-        raise InvalidData(f"'{place}' cannot be read: {error}; give a file") from error
-    if size > MAX_FILE_BYTES:
-        raise InvalidData(f"'{place}' has {size / MB:.0f} MB; at most {MAX_FILE_BYTES / MB:.0f} are read, split it")
-    return size
+        if not path.is_dir():
+            with open_regular(path, MAX_FILE_BYTES) as file:
+                size = file.seek(0, io.SEEK_END)
+        else:
+            size = sum(one.stat().st_size for one in path.iterdir() if one.is_file())
+        left = float(max(MAX_VALUES, size))
+
+        def take(count: float) -> None:
+            nonlocal left
+            left -= count
+            if left < 0:
+                most = max(MAX_VALUES, size)
+                raise InvalidData(
+                    f"'{place}' declares more than {most / 1e6:.0f} million values in {size / MB:.3g} MB; at most that "
+                    'many are read, split it or save what the mapping needs'
+                )
+
+        for frame in READERS[kind](path, place, mapping, take):
+            yield replace(frame, read=partial(_guarded, frame.read, place))
+    except (InvalidData, MissingLibrary):
+        raise
+    # Whatever a library raises, which depends on the byte that is wrong, is a fact about the file.
+    except Exception as error:
+        raise _unreadable(place, error) from error
 
 
-def serve(number: int) -> None:
-    """Read files as asked for over an inherited connection, until it ends: the work of the child process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, whose end is ours
-    connection = Connection(number)
-    while True:
-        try:
-            kind, path, place, mapping, fields, memory = connection.recv()
-        except EOFError:
-            return
-        refused = None
-        try:
-            for name, files, extra in LIBRARIES.get(kind, ()):
-                library(name, files, extra)
-            connection.send(True)
-            taken = int(Path('/proc/self/statm').read_text(encoding='ascii').split()[0]) * resource.getpagesize()
-            _limit_memory(taken + memory)
-            for table in READERS[kind](path, place, mapping):
-                columns = table.mapped(mapping, fields)
-                _check_content(columns, place)
-                _limit_memory(resource.RLIM_INFINITY)  # what is sent is copied
-                connection.send(columns)
-                _limit_memory(taken + memory)
-        except (InvalidData, MissingLibrary) as error:
-            refused = str(error)
-        # Whatever a library raises, which depends on the byte that is wrong, is said of the file.
-        except Exception as error:
-            out_of_memory = f'it takes more than {memory / MB:.0f} MB of memory to read'
-            reason = out_of_memory if isinstance(error, MemoryError) else str(error) or type(error).__name__
-            refused = f"'{place}' cannot be read: {reason[:300]}; save it again"
-        _limit_memory(resource.RLIM_INFINITY)
-        connection.send(refused)
+def _guarded(
+    read: Callable[[Sequence[str], Sequence[str]], Columns], place: str, numbers: Sequence[str], texts: Sequence[str]
+) -> Columns:
+    """Return what a frame reads; InvalidData whatever a library raises."""
+    try:
+        return read(numbers, texts)
+    except InvalidData:
+        raise
+    except Exception as error:
+        raise _unreadable(place, error) from error
 
 
-def _limit_memory(most: int) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+def _unreadable(place: str, error: Exception) -> InvalidData:
+    return InvalidData(f"'{place}' cannot be read: {(str(error) or type(error).__name__)[:300]}; save it again")
 
 
-def _check_content(columns: Columns, place: str) -> None:
-    for array in columns.texts.values():
-        array.tolist()  # raises an error at what are no characters
-    arrays = (*columns.numbers.values(), *columns.texts.values())
-    if sum(array.nbytes for array in arrays) > 8 * MAX_VALUES:
-        raise InvalidData(f"'{place}' has more than {MAX_VALUES // 1_000_000} million values; split it into files")
-
-
-# ---- text files ------------------------------------------------------------------------------------------------------
+# ---- text files
 
 Line = tuple[int, str]  # its number in the file, from 1
+BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 
 
-def _read_csv(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
+def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
     form = mapping.format
     with _lines(path, form) as lines:
         _, first = next(lines, (0, ''))
-    form = replace(form, delimiter=form.delimiter or _likely_delimiter(first))
+    form = replace(form, delimiter=form.delimiter or next((one for one in DELIMITERS if one in first), ','))
     cells = _cells(first, form.delimiter)
     if not first:
         raise InvalidData(f"'{place}' has no columns; give a text file with a row for each sample")
     names = cells if form.header else [str(number) for number in range(len(cells))]
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidData(f"'{place}' has the column '{twice}' twice; give each column a name of its own")
-    yield Table(place, names, lambda *wanted: _csv_columns(path, place, form, (names, *wanted)))
+        raise InvalidData(f"'{place}' has the column '{twice}' twice; give each column a different name")
+    yield Frame(place, names, partial(_csv_columns, path, place, form, names, take))
 
 
-def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequence[str], ...]) -> Columns:
-    names, numbers, texts = wanted
+def _csv_columns(  # noqa: PLR0917 – bound one after the other
+    path: Path, place: str, form: FileFormat, names: Sequence[str], take: Take, numbers: Sequence[str],
+    texts: Sequence[str],
+) -> Columns:  # fmt: skip
     at = {name: number for number, name in enumerate(names)}
     blocks: list[dict[str, AnyArray]] = []
-    malformed: dict[int, str] = {}
+    reasons: dict[int, str] = {}
     with _lines(path, form) as lines:
         if form.header:
             next(lines, None)
         while block := list(islice(lines, BLOCK_ROWS)):
-            cells = [_cells(line, form.delimiter) for _, line in block]
-            rows = [row if len(row) == len(names) else None for row in cells]
-            found = {
-                number: f"column 'all': {len(row)} cells, {len(names)} are needed"
-                for (number, _), row in zip(block, cells, strict=True)
-                if len(row) != len(names)
-            }
+            take(len(block) * (len(numbers) + 2 * len(texts)))
+            rows = [_row(_cells(line, form.delimiter), len(names)) for _, line in block]
             read: dict[str, AnyArray] = {'': np.array([number for number, _ in block])}
+            junk = np.array([row is None for row in rows])
+            found = {
+                block[index][0]: f"column 'all': {len(_cells(block[index][1], form.delimiter))} cells, {len(names)} "
+                'are needed' for index in np.flatnonzero(junk)[:EXAMPLES].tolist()
+            }  # fmt: skip
             for name in numbers:
                 read[f'number {name}'] = values = _parsed(rows, at[name], form.decimal)
                 for index in np.flatnonzero(np.isnan(values)).tolist():
-                    if row := rows[index]:
-                        reason = f"column '{name}': '{row[at[name]][:40]}' is not a finite number"
-                        if form.decimal == '.' and math.isfinite(_number(row[at[name]].replace(',', '.'))):
+                    cell = rows[index][at[name]] if rows[index] else ''
+                    if cell.lower() in BLANK:
+                        continue
+                    junk[index] = True
+                    if len(found) < 2 * EXAMPLES:
+                        reason = f"column '{name}': '{cell[:40]}' is not a finite number"
+                        if form.decimal == '.' and math.isfinite(_number(cell.replace(',', '.'))):
                             reason += "; if commas are decimal, write format: {decimal: ','}"
                         found.setdefault(block[index][0], reason)
-            malformed |= dict(sorted(found.items())[: EXAMPLES - len(malformed)])
+            reasons |= dict(sorted(found.items())[: EXAMPLES - len(reasons)])
             # A row without any number, such as names or units that a logger wrote again, is none of a sample: its texts
             # are none of a sample, too, and a slide must not end at them.
-            empty = np.logical_and.reduce([np.isnan(read[f'number {name}']) for name in numbers])
+            empty = junk & np.logical_and.reduce([np.isnan(read[f'number {name}']) for name in numbers])
             for name in texts:
                 read[f'text {name}'] = np.array(
                     [
@@ -578,16 +484,15 @@ def _csv_columns(path: Path, place: str, form: FileFormat, wanted: tuple[Sequenc
                         for row, left_out in zip(rows, empty, strict=True)
                     ]
                 )
-            blocks.append(read)
+            blocks.append({**read, 'junk': junk})
     if not blocks:
         raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
     whole = {key: np.concatenate([read[key] for read in blocks]) for key in blocks[0]}
     return Columns(
         {name: whole[f'number {name}'] for name in numbers},
         {name: _without_gaps(whole[f'text {name}']) for name in texts},
-        whole[''],
-        malformed,
-    )
+        whole[''], whole['junk'], reasons,
+    )  # fmt: skip
 
 
 CP1252 = 'texture-cp1252'  # what is no UTF-8 is read as Windows of Western Europe writes it, such as 'm/s²'
@@ -605,18 +510,18 @@ codecs.register_error(CP1252, _from_windows)
 @contextmanager
 def _lines(path: Path, form: FileFormat) -> Iterator[Iterator[Line]]:
     """Give the lines that are neither empty nor comments, each with its number."""
-    with open_regular(path) as opened, io.TextIOWrapper(opened, 'utf-8-sig', CP1252, newline=None) as text:
-        yield (
-            (number, bare)
-            for number, line in enumerate(text, 1)
-            if number > form.skip_rows
-            and (bare := line.rstrip('\n')).strip()
-            and not (form.comment and bare.startswith(form.comment))
-        )
-
-
-def _likely_delimiter(line: str) -> str:
-    return next((delimiter for delimiter in DELIMITERS if delimiter in line), ',')
+    with open_regular(path) as opened:
+        start = opened.read(2)
+        opened.seek(0)
+        coding = 'utf-16' if start in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else 'utf-8-sig'
+        with io.TextIOWrapper(opened, coding, CP1252 if coding == 'utf-8-sig' else 'replace', newline=None) as text:
+            yield (
+                (number, bare)
+                for number, line in enumerate(text, 1)
+                if number > form.skip_rows
+                and (bare := line.rstrip('\n')).strip()
+                and not (form.comment and bare.startswith(form.comment))
+            )
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
@@ -632,6 +537,13 @@ def _cells(line: str, delimiter: str) -> list[str]:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
     except csv.Error:
         return []
+
+
+def _row(cells: list[str], count: int) -> list[str] | None:
+    """Return the cells of a row without an empty one behind the last delimiter; None if they are not `count`."""
+    if len(cells) == count + 1 and not cells[-1]:
+        cells = cells[:-1]
+    return cells if len(cells) == count else None
 
 
 def _parsed(rows: Sequence[list[str] | None], place: int, decimal: str) -> Array:
@@ -662,135 +574,230 @@ def _without_gaps(texts: AnyArray) -> AnyArray:
     return filled
 
 
-# ---- files of arrays -------------------------------------------------------------------------------------------------
+# ---- files of arrays
 
 
-def _read_numpy(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
+def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+    def declared(file: Any) -> None:
+        version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(file)  # type: ignore[no-untyped-call]
+        take(math.prod(shape) * max(1.0, dtype.itemsize / 8))
+
     with open_regular(path) as opened:
-        content = np.load(opened, allow_pickle=False)  # nothing in a file is run
-        if isinstance(content, np.ndarray):
-            yield from _tables([''], lambda _: content, place, mapping)
-        else:
-            yield from _tables(content.files, content.__getitem__, place, mapping)
+        if path.suffix.lower() == '.npy':
+            declared(opened)
+            opened.seek(0)
+            content = np.load(opened, allow_pickle=False)  # nothing in a file is run
+            yield from _frames([''], lambda _: content, place, mapping)
+            return
+        archive = np.load(opened, allow_pickle=False)
+
+        def load(name: str) -> AnyArray:
+            with archive.zip.open(f'{name}.npy') as member:
+                declared(member)
+            array: AnyArray = archive[name]
+            return array
+
+        yield from _frames(archive.files, load, place, mapping)
 
 
-def _read_mat(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
+def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
     from scipy.io import loadmat  # noqa: PLC0415 – recording needs no scipy
 
-    try:
-        with open_regular(path) as opened:
-            content = loadmat(opened, struct_as_record=True)
-    except NotImplementedError:  # version 7.3 is HDF5 with all dimensions in reverse order
-        yield from _read_hdf5(path, place, mapping, reverse=True)
-        return
+    with open_regular(path) as opened:
+        if opened.read(19).startswith(b'MATLAB 7.3 MAT-file'):  # HDF5 with all dimensions in reverse order
+            yield from _read_hdf5(path, place, mapping, take, matlab=True)
+            return
+        take(_unpacked_bytes(opened, place) / 8)
+        opened.seek(0)
+        content = loadmat(opened, struct_as_record=True)
     arrays = dict(_members({name: value for name, value in content.items() if not name.startswith('__')}))
-    yield from _tables(tuple(arrays), arrays.__getitem__, place, mapping)
+    yield from _frames(tuple(arrays), arrays.__getitem__, place, mapping)
+
+
+def _unpacked_bytes(file: Any, place: str) -> int:
+    """Return how many bytes the variables of a MATLAB file (version 5 to 7) unpack to, without keeping them."""
+    file.seek(124)
+    order = '<' if file.read(4)[2:] == b'IM' else '>'
+    total = arrays = 0
+    element = struct.pack(f'{order}I', 14)
+    while len(tag := file.read(8)) == 8:
+        kind, length = struct.unpack(f'{order}II', tag)
+        after = file.tell() + length
+        unpacker = zlib.decompressobj()
+        while length > 0 and total < MAX_FILE_BYTES and (packed := file.read(min(length, 1 << 16))):
+            length -= len(packed)
+            while packed:
+                part = unpacker.decompress(packed, 1 << 20) if kind == 15 else packed
+                total, arrays = total + len(part), arrays + part.count(element)
+                packed = unpacker.unconsumed_tail if kind == 15 else b''
+        file.seek(after)
+    from scipy.io import whosmat  # noqa: PLC0415 – recording needs no scipy
+
+    file.seek(0)
+    nested = any(kind in ('cell', 'struct', 'object') for _, _, kind in whosmat(file))
+    if nested and arrays > MAX_ARRAYS:
+        raise InvalidData(f"'{place}' has more than {MAX_ARRAYS} arrays in cells and structs; split it")
+    return total
 
 
 def _members(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, AnyArray]]:
-    """Yield the arrays of numbers and texts, those in structs by their path; others are left out."""
+    """Yield arrays by their path: members of structs as 'run/acc', elements of arrays of these and cells from 1 on."""
     for name, value in values.items():
-        if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
-            inner = value.ravel()[0]
-            yield from _members({part: inner[part] for part in value.dtype.names}, f'{prefix}{name}/')
-        elif isinstance(value, np.ndarray) and value.dtype.kind in 'biufU':
+        if not isinstance(value, np.ndarray):
+            continue
+        elements = {str(number): one for number, one in enumerate(value.ravel(order='F'), 1)}
+        if value.dtype.names and value.size == 1:
+            yield from _members(_record(value.ravel()[0]), f'{prefix}{name}/')
+        elif value.dtype.names:
+            for number, one in elements.items():
+                yield from _members(_record(one), f'{prefix}{name}/{number}/')
+        elif value.dtype.kind == 'O':
+            plain = [one for one in elements.values() if isinstance(one, np.ndarray) and one.size == 1]
+            if elements and len(plain) == len(elements) and all(one.dtype.kind in 'biufU' for one in plain):
+                yield f'{prefix}{name}', np.array([one.item() for one in plain])
+            else:
+                yield from _members(elements, f'{prefix}{name}/')
+        elif value.dtype.kind in 'biufU':
             yield f'{prefix}{name}', value
 
 
-def _read_hdf5(path: Path, place: str, mapping: TableMapping, *, reverse: bool = False) -> Iterator[Table]:
+def _record(value: Any) -> dict[str, Any]:
+    return {part: value[part] for part in value.dtype.names}
+
+
+def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False) -> Iterator[Frame]:
     h5py = library(*HDF5)
     with open_regular(path) as opened, h5py.File(opened, 'r') as file:
-        names: list[str] = []
+        found: dict[str, Any] = {}
 
         def note(name: str, member: Any) -> None:
-            if isinstance(member, h5py.Dataset) and not name.startswith('#refs#'):  # cells and objects of MATLAB
-                names.append(name)
+            """Keep a data set; the elements of references, as of cells and arrays of structs of MATLAB, from 1 on."""
+            if len(found) > MAX_ARRAYS or name.count('/') > 20:
+                raise InvalidData(f"'{place}' has more than {MAX_ARRAYS} data sets, or circles of them; split it")
+            if isinstance(member, h5py.Group):
+                for part, inner in member.items():
+                    note(f'{name}/{part}', inner)
+            elif isinstance(member, h5py.Dataset) and h5py.check_ref_dtype(member.dtype) is h5py.Reference:
+                take(member.size)
+                folder, _, last = name.rpartition('/')
+                for number, one in enumerate(np.asarray(member[()]).ravel(), 1):
+                    # Of an array of structs each member has as many references: the number stands before its name.
+                    in_struct = matlab and folder and 'MATLAB_class' not in member.attrs
+                    if one:
+                        note(f'{folder}/{number}/{last}' if in_struct else f'{name}/{number}', file[one])
+            elif isinstance(member, h5py.Dataset):
+                found[name] = member
 
-        file.visititems(note)  # follows no link out of the file, and comes to each data set once
+        def visit(name: str, member: Any) -> None:
+            if isinstance(member, h5py.Dataset) and not name.startswith('#refs#'):
+                note(name, member)
+
+        file.visititems(visit)  # follows no link out of the file, and comes to each data set once
 
         def load(name: str) -> AnyArray:
-            member = file[name]
+            member = found[name]
             if member.is_virtual or member.external:
                 raise InvalidData(f"'{place}': data set '{name}' lies in another file; copy it into this one")
             texts = h5py.check_string_dtype(member.dtype) is not None and member.dtype.kind == 'O'
-            array = np.asarray(member.asstr(errors='replace')[()]).astype(str) if texts else np.asarray(member[()])
-            return array.T if reverse else array
+            take(member.size * max(1.0, member.dtype.itemsize / 8) * (4 if texts else 1))
+            if matlab and member.attrs.get('MATLAB_class') == b'char':
+                return np.array(''.join(map(chr, np.asarray(member[()]).ravel().tolist())))
+            if not texts:
+                array = np.asarray(member[()])
+                return array.T if matlab else array
+            cells = member.asstr(errors='replace')
+            if not member.shape:
+                return np.array(cells[()][:MAX_TEXT])
+            return np.array([text[:MAX_TEXT] for text in np.ravel(cells[()])]).reshape(member.shape)
 
-        yield from _tables(names, load, place, mapping)
+        yield from _frames(list(found), load, place, mapping)
 
 
-def _read_wav(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
+def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
     from scipy.io import wavfile  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened, warnings.catch_warnings():
         warnings.simplefilter('ignore')  # chunks that it does not know
         rate_hz, samples = wavfile.read(opened)
+    take(samples.size)
     if not 0 < rate_hz <= MAX_HZ:
         raise InvalidData(f"'{place}' has a sampling rate of {rate_hz} Hz; above 0 and at most {MAX_HZ:g} is allowed")
     if samples.dtype.kind == 'u':
         samples = (samples.astype(np.float64) - 128.0) / 128.0
     elif samples.dtype.kind == 'i':
         samples = samples / -float(np.iinfo(samples.dtype).min)  # full scale is 1
-    for table in _tables([''], lambda _: samples, place, mapping):
-        yield replace(table, rate_hz=float(rate_hz))
+    for frame in _frames([''], lambda _: samples, place, mapping):
+        yield replace(frame, rate_hz=float(rate_hz))
 
 
-def _read_parquet(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
+def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
     types, parquet = library('pyarrow', *PARQUET[1:]).types, library(*PARQUET)
     plain = (types.is_integer, types.is_floating, types.is_boolean, types.is_string, types.is_dictionary,
              types.is_large_string, types.is_timestamp)  # fmt: skip
 
     def array(column: Any) -> AnyArray:
-        values = np.asarray(column.to_numpy())
+        if types.is_dictionary(column.type):  # each text once, however many rows have it
+            column = column.unify_dictionaries().combine_chunks()
+            one = column.chunk(0) if hasattr(column, 'chunk') else column
+            texts = np.array(['', *(str(text)[:MAX_TEXT] for text in one.dictionary.to_pylist())])
+            chosen: AnyArray = texts[1 + np.asarray(one.indices.fill_null(-1))]
+            return chosen
         if types.is_timestamp(column.type):
-            return values.astype('datetime64[ns]').astype(np.int64)
-        return np.array(['' if value is None else str(value) for value in values]) if values.dtype == object else values
+            return np.asarray(column.to_numpy()).astype('datetime64[ns]').astype(np.int64)
+        return np.asarray(column.to_numpy())
 
     def read(numbers: Sequence[str], texts: Sequence[str]) -> Columns:
-        content = file.read(columns=list(dict.fromkeys((*numbers, *texts))), use_threads=False)
-        if not content.num_rows:
+        wanted = list(dict.fromkeys((*numbers, *texts)))
+        take(file.metadata.num_rows * (len(wanted) + sum(name in coded for name in texts)))
+        if not file.metadata.num_rows:
             raise InvalidData(f"'{place}' has no rows; choose files with samples")
-        return table_columns({name: array(content[name]) for name in content.column_names}, place, numbers, texts)
+        content = file.read(columns=wanted, use_threads=False)
+        return columns_of({name: array(content[name]) for name in content.column_names}, place, numbers, texts)
 
     with open_regular(path) as opened:
-        file = parquet.ParquetFile(opened)
-        names = [one.name for one in file.schema_arrow if any(check(one.type) for check in plain)]
-        yield Table(place, names, read)
+        schema = parquet.ParquetFile(opened).schema_arrow
+        names = [one.name for one in schema if any(check(one.type) for check in plain)]
+        coded = [one.name for one in schema if types.is_string(one.type) or types.is_large_string(one.type)]
+        opened.seek(0)
+        file = parquet.ParquetFile(opened, read_dictionary=coded)
+        yield Frame(place, names, read)
 
 
-def _tables(
+def _frames(
     names: Sequence[str], load: Callable[[str], AnyArray], place: str, mapping: TableMapping
-) -> Iterator[Table]:
-    """Yield the tables that arrays form.
+) -> Iterator[Frame]:
+    """Yield the frames that arrays form.
 
-    Without a template all arrays are one table. With one, an array whose name is of its form is a table whose columns
-    count from 0, and arrays of which the first parts of the name are of its form are columns of one table.
+    Without a template all arrays are one frame. With one, an array whose name is of its form is a frame whose columns
+    count from 0, and arrays of which the first parts of the name are of its form are columns of one frame.
     """
-    groups = _groups(names, mapping.tables)
+    groups: dict[str, tuple[dict[str, str], dict[str, str]]] = {}
+    depth = mapping.tables.count('/') + 1
+    for name in names:
+        parts = name.split('/')
+        table, rest = ('/'.join(parts[:depth]), '/'.join(parts[depth:])) if mapping.tables else ('', name)
+        fields = template_fields(mapping.tables, table) if mapping.tables else {}
+        if fields is not None:
+            groups.setdefault(table, (fields, {}))[1][rest] = name
     if not groups:
         raise InvalidData(
             f"'{place}' has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}"
         )
+    # What has an element for each of the numbered frames, such as a list of their labels, holds for each its own.
+    grouped = {name for _, members in groups.values() for name in members.values()}
+    listed = {}
+    if mapping.tables and all(set(fields) and all(map(str.isdigit, fields.values())) for fields, _ in groups.values()):
+        lists = {name: load(name).ravel() for name in names if name not in grouped and '/' not in name}
+        listed = {name: array for name, array in lists.items() if len(array) == len(groups)}
     for table, (fields, members) in sorted(groups.items()):
         within = f'{place}, {table}' if table else place
         arrays = {column: _arranged(load(name), mapping.format, within) for column, name in members.items()}
         columns, constants = _unfolded_columns(arrays, within)
-        yield Table(within, tuple(columns), partial(table_columns, columns, within), {**constants, **fields})
-
-
-def _groups(names: Sequence[str], template: str) -> dict[str, tuple[dict[str, str], dict[str, str]]]:
-    """Return by table its fields, and the names of its arrays by that of their columns."""
-    if not template:
-        return {'': ({}, {name: name for name in names})}
-    groups: dict[str, tuple[dict[str, str], dict[str, str]]] = {}
-    depth = template.count('/') + 1
-    for name in names:
-        parts = name.split('/')
-        table, rest = '/'.join(parts[:depth]), '/'.join(parts[depth:])
-        fields = template_fields(template, table)
-        if fields is not None:
-            groups.setdefault(table, (fields, {}))[1][rest] = name
-    return groups
+        number = int(next(iter(fields.values()))) if listed else 0
+        of_list = {name: str(array[number - 1])[:MAX_TEXT] for name, array in listed.items() if number <= len(array)}
+        yield Frame(within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields})
 
 
 def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
@@ -816,46 +823,35 @@ def _unfolded_columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[
             constants[name] = str(array.item())[:MAX_TEXT]
         elif trials and array.ndim <= 2 and array.size == trials[0]:
             columns[name] = np.repeat(array.ravel(), trials[1])
+        elif array.ndim == 1 or (array.ndim == 2 and 1 in array.shape):
+            columns[name or '0'] = array.ravel()
+        elif array.ndim not in (2, 3) or array.shape[-1] > MAX_CHANNELS:
+            raise InvalidData(
+                f"'{place}': '{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
+                f'{MAX_CHANNELS} channels; see `transpose` under `format`'
+            )
         else:
-            columns |= _unfolded(name, array, place)
+            flat = array.reshape(-1, array.shape[-1])
+            columns |= {_joined(name, str(number)): flat[:, number] for number in range(flat.shape[1])}
     if trials:
         columns[TRIAL] = np.repeat(np.arange(trials[0]), trials[1])
     return columns, constants
-
-
-def _unfolded(name: str, array: AnyArray, place: str) -> dict[str, AnyArray]:
-    if array.ndim == 2 and 1 in array.shape:
-        array = array.ravel()
-    if array.ndim == 1:
-        return {name or '0': array}
-    if array.ndim not in (2, 3) or array.shape[-1] > MAX_CHANNELS:
-        raise InvalidData(
-            f"'{place}': '{name}' has the shape {array.shape}; (n_samples, n_channels) is needed, at most "
-            f'{MAX_CHANNELS} channels; see `transpose` under `format`'
-        )
-    flat = array.reshape(-1, array.shape[-1])
-    return {_joined(name, str(number)): flat[:, number] for number in range(flat.shape[1])}
 
 
 def _joined(name: str, part: str) -> str:
     return f'{name}.{part}' if name else part
 
 
-def table_columns(columns: Mapping[str, AnyArray], place: str, numbers: Sequence[str], texts: Sequence[str]) -> Columns:
+def columns_of(columns: Mapping[str, AnyArray], place: str, numbers: Sequence[str], texts: Sequence[str]) -> Columns:
     """Return columns, (n,) each, as numbers and texts; NaN for numbers that are not finite."""
     read: dict[str, Array] = {}
-    malformed: dict[int, str] = {}
     for name in numbers:
         array = columns[name]
         if array.dtype.kind not in 'biuf':
             raise InvalidData(f"'{place}': column '{name}' holds {array.dtype}; numbers are needed, name another")
         read[name] = array.astype(np.float64)
-        bad = ~np.isfinite(read[name])
-        for index in np.flatnonzero(bad)[:EXAMPLES].tolist():
-            malformed.setdefault(index, f"column '{name}': is not a finite number")
-        read[name][bad] = np.nan
-    first = dict(sorted(malformed.items())[:EXAMPLES])
-    return Columns(read, {name: _texts(columns[name]) for name in texts}, None, first)
+        read[name][~np.isfinite(read[name])] = np.nan
+    return Columns(read, {name: _texts(columns[name]) for name in texts})
 
 
 def _texts(array: AnyArray) -> AnyArray:
@@ -867,91 +863,72 @@ def _texts(array: AnyArray) -> AnyArray:
 
 
 # --------------------
-# Bags of standard messages: each number of a message is a column, such as '/wrench/wrench.force.x'.
+# Bags of messages: each number of a message is a column, such as '/wrench/wrench.force.x'.
 
 MAX_FIELDS = 2000  # of one message
 Rows = Mapping[str, AnyArray]  # name → values of one message, (n,) each; n > 1 where it holds consecutive samples
+BROKEN = (struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError, TypeError)
+TIME = 'time'
 
 
-def one_row(value: Any) -> Rows:
-    """Return every number and text of a message by its path, such as 'wrench.force.x' or 'data.3'."""
+def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
+    """Add every number and text of a message by its path, such as 'wrench.force.x' or 'data.3'."""
+    if len(found) > MAX_FIELDS:
+        raise ValueError(f'it has more than {MAX_FIELDS} numbers')
+    if dataclasses.is_dataclass(value):
+        for part in dataclasses.fields(value):
+            if part.name not in ('header', '__msgtype__'):
+                _collect(getattr(value, part.name), f'{path}.{part.name}' if path else part.name, found)
+    elif isinstance(value, (np.ndarray, Sequence)) and not isinstance(value, str):
+        if len(value) > MAX_FIELDS:
+            raise ValueError(f"'{path}' has {len(value)} numbers; {MAX_FIELDS} are allowed")
+        for number, one in enumerate(value):
+            _collect(one, f'{path}.{number}', found)
+    else:
+        found[path] = np.array([value])
+
+
+def _rows_of(value: Any, msgtype: str) -> Rows:
+    """Return the values of a message by name; of sound and of arrays with two dimensions, consecutive rows."""
+    if msgtype == 'sensor_msgs/msg/JointState':
+        kinds = ('position', 'velocity', 'effort')
+        return {
+            f'{kind}.{joint}': np.array([number])
+            for kind in kinds for joint, number in zip(value.name, getattr(value, kind), strict=False)
+        }  # fmt: skip
+    if msgtype in ('std_msgs/msg/Float32MultiArray', 'std_msgs/msg/Float64MultiArray'):
+        shape = [dim.size for dim in value.layout.dim]
+        data = value.data[value.layout.data_offset :]
+        table = data.reshape(shape) if len(shape) == 2 else data[None]
+        if table.shape[1] > MAX_FIELDS:
+            raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
+        return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
+    if msgtype.startswith('audio_common_msgs/msg/AudioData'):  # one channel, 16 bits little endian; full scale is 1
+        return {'data': np.frombuffer(getattr(value, 'audio', value).data.tobytes(), '<i2') / 32768.0}
     found: dict[str, AnyArray] = {}
     _collect(value, '', found)
     return found
 
 
-def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
-    if len(found) > MAX_FIELDS:
-        raise ValueError(f'it has more than {MAX_FIELDS} numbers')
-    if dataclasses.is_dataclass(value):
-        for field in dataclasses.fields(value):
-            if field.name not in ('header', '__msgtype__'):
-                _collect(getattr(value, field.name), f'{path}.{field.name}' if path else field.name, found)
-    elif isinstance(value, (np.ndarray, Sequence)) and not isinstance(value, str):
-        if len(value) > MAX_FIELDS:
-            raise ValueError(f"'{path}' has {len(value)} numbers; {MAX_FIELDS} are allowed")
-        for number, part in enumerate(value):
-            _collect(part, f'{path}.{number}', found)
-    else:
-        found[path] = np.array([value])
-
-
-def _joints(value: Any) -> Rows:
-    """Return position, velocity and effort by the names of the joints."""
-    kinds = ('position', 'velocity', 'effort')
-    return {
-        f'{kind}.{joint}': np.array([number])
-        for kind in kinds
-        for joint, number in zip(value.name, getattr(value, kind), strict=False)
-    }
-
-
-def _multi_array(value: Any) -> Rows:
-    """Return a row of numbers; consecutive rows if the layout has two dimensions, (n_samples, n_channels)."""
-    shape = [dim.size for dim in value.layout.dim]
-    data = value.data[value.layout.data_offset :]
-    table = data.reshape(shape) if len(shape) == 2 else data[None]
-    if table.shape[1] > MAX_FIELDS:
-        raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
-    return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
-
-
-def _audio(value: Any) -> Rows:
-    """Return the samples of sound of one channel, 16 bits little endian; full scale is 1."""
-    data = getattr(value, 'audio', value).data
-    return {'data': np.frombuffer(data.tobytes(), '<i2') / 32768.0}
-
-
-MESSAGE_BAG_RULES: Mapping[str, Callable[[Any], Rows]] = {
-    'sensor_msgs/msg/JointState': _joints,
-    'std_msgs/msg/Float32MultiArray': _multi_array,
-    'std_msgs/msg/Float64MultiArray': _multi_array,
-    'audio_common_msgs/msg/AudioData': _audio,
-    'audio_common_msgs/msg/AudioDataStamped': _audio,
-}
-
-
-TIME = 'time'
-BROKEN = (SerdeError, struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError)
-# Not among the messages of ROS 2 itself. Definitions in bags are not used: they would become code.
-AUDIO: Mapping[str, str] = {
-    'audio_common_msgs/msg/AudioData': 'uint8[] data',
-    'audio_common_msgs/msg/AudioDataStamped': 'std_msgs/Header header\nAudioData audio',
-}
-
-
-def read_message_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of a bag: the topics that the mapping names, each with its time.
+def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+    """Yield the one frame of a bag: the topics that the mapping names, each with its time.
 
     Times are those of the headers, or of logging where there are none, from the first message of the bag on.
     """
     columns_of_streams = [column for stream in mapping.streams.values() for column in stream.columns]
-    wanted = set(filter(None, [*columns_of_streams, *mapping.numbers(), *mapping.texts()]))
+    wanted = {*columns_of_streams, *mapping.numbers(), *mapping.texts()}
     topics: dict[str, _Topic] = {}
     first_ns = -1
-    for message in read_foreign(path, partial(_is_wanted, wanted)):
-        topic = topics.setdefault(message.topic, _Topic(message.topic, message.msgtype, place))
-        stamp_ns = topic.add(message)
+    seen: dict[str, Any] = {}
+
+    def chosen(connection: Any) -> bool:
+        seen[connection.topic] = connection
+        return any(fnmatch.fnmatchcase(connection.topic, name.rpartition('/')[0] or name) for name in wanted)
+
+    for message in read_foreign(path, chosen):
+        if message.topic not in topics:
+            topics[message.topic] = _Topic(message.topic, seen[message.topic], place)
+        stamp_ns = topics[message.topic].add(message, take)
         first_ns = stamp_ns if first_ns < 0 else first_ns
     columns: dict[str, AnyArray] = {}
     clocks: dict[str, str] = {}
@@ -963,55 +940,40 @@ def read_message_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[
             clocks[f'{name}/{part}'] = clock
     if not columns:
         raise InvalidData(
-            f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); write columns as topic and "
-            "field, such as '/wrench/wrench.force.x'"
+            f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); it has "
+            f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
         )
-    yield Table(place, tuple(columns), partial(table_columns, columns, place), clocks=clocks)
-
-
-def _is_wanted(wanted: set[str], connection: BagConnection) -> bool:
-    topic = connection.topic
-    return any(fnmatch.fnmatchcase(topic, name.rpartition('/')[0] or name) for name in wanted)
-
-
-@cache
-def _types() -> Typestore:
-    store = typestore()
-    for name, definition in AUDIO.items():
-        store.register(get_types_from_msg(definition, name))
-    return store
+    yield Frame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
 
 
 class _Topic:
-    """The messages of one topic as columns."""
+    """The messages of one topic as columns, read by the definition that the bag stores, or else that of ROS 2."""
 
-    def __init__(self, name: str, msgtype: str, place: str) -> None:
-        if msgtype not in _types().types:
+    def __init__(self, name: str, connection: Any, place: str) -> None:
+        self._types, self._msgtype, self._name, self._place = message_types(connection), connection.msgtype, name, place
+        if self._msgtype not in self._types.types:
             raise InvalidData(
-                f"'{place}': the messages of '{name}' are {msgtype}, which are none of ROS 2 itself; republish them as "
-                'std_msgs/msg/Float32MultiArray, geometry_msgs/msg/WrenchStamped or the like'
+                f"'{place}': the messages of '{name}' are {self._msgtype}, whose definition is neither in the bag nor "
+                'of ROS 2 itself; record it as MCAP, which stores definitions, or republish it as a standard message'
             )
-        self._name, self._msgtype, self._place = name, msgtype, place
         self._rows: list[Rows] = []
         self._stamps_ns: list[int] = []
         self._counts: list[int] = []
 
-    def add(self, message: RawMessage) -> int:
+    def add(self, message: RawMessage, take: Take) -> int:
         """Add a message, and return its time."""
+        where = f"'{self._place}': message {len(self._rows)} of '{self._name}'"
         try:
-            value = _types().deserialize_cdr(message.data, self._msgtype)
-            rows = MESSAGE_BAG_RULES.get(self._msgtype, one_row)(value)
+            value = self._types.deserialize_cdr(message.data, self._msgtype)
+            rows = _rows_of(value, self._msgtype)
         except BROKEN as error:
-            raise InvalidData(
-                f"'{self._place}': message {len(self._rows)} of '{self._name}' is damaged: {error}; record it again"
-            ) from error
+            raise InvalidData(f'{where} is damaged: {error}; record it again') from error
         if self._rows and rows.keys() != self._rows[0].keys():
-            raise InvalidData(
-                f"'{self._place}': message {len(self._rows)} of '{self._name}' has other fields than the first: "
-                f'{", ".join(sorted(rows.keys() ^ self._rows[0].keys())[:5])}'
-            )
+            other = ', '.join(sorted(rows.keys() ^ self._rows[0].keys())[:5])
+            raise InvalidData(f'{where} has other fields than the first: {other}')
         self._rows.append(rows)
         self._counts.append(max((len(array) for array in rows.values()), default=0))
+        take(10 * len(rows) + sum(len(array) for array in rows.values()))  # small arrays take more than their values
         stamp = getattr(getattr(value, 'header', None), 'stamp', None)
         stamped_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
         self._stamps_ns.append(stamped_ns or message.log_ns)
@@ -1019,32 +981,24 @@ class _Topic:
 
     def columns(self) -> dict[str, AnyArray]:
         """Return all columns, (n,) each."""
-        names = self._rows[0]
-        return {name: np.concatenate([rows[name] for rows in self._rows]) for name in names}
+        return {name: np.concatenate([rows[name] for rows in self._rows]) for name in self._rows[0]}
 
     def time_s(self, first_ns: int) -> Array:
         """Return the time of each row; the samples of one message lie evenly between it and the next."""
         stamps_s = (np.array(self._stamps_ns) - first_ns) / NANOSECONDS
         counts = np.array(self._counts)
-        steps_s = np.diff(stamps_s, append=stamps_s[-1] + _usual(np.diff(stamps_s)))
+        usual = float(np.median(np.diff(stamps_s))) if len(stamps_s) > 1 else 0.0
+        steps_s = np.diff(stamps_s, append=stamps_s[-1] + usual)
         within = np.concatenate([np.arange(count) / max(count, 1) for count in counts])
         times: Array = np.repeat(stamps_s, counts) + np.repeat(steps_s, counts) * within
         return times
 
 
-def _usual(steps_s: Array) -> float:
-    return float(np.median(steps_s)) if len(steps_s) else 0.0
-
-
 # --------------------
 # The kinds of files.
 
-# Opens a file as tables, in the child process: path, name to be shown, mapping. What it raises is said of the file.
-TableReader = Callable[[Path, str, TableMapping], Iterator[Table]]
-
-
 BAG = 'bag'
-READERS: Mapping[str, TableReader] = {
+READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[Frame]]] = {
     '.csv': _read_csv,
     '.tsv': _read_csv,
     '.txt': _read_csv,
@@ -1055,141 +1009,869 @@ READERS: Mapping[str, TableReader] = {
     '.h5': _read_hdf5,
     '.hdf5': _read_hdf5,
     '.parquet': _read_parquet,
-    BAG: read_message_bag,
+    BAG: _read_bag,
 }
+OTHER_KINDS = {'.bag': 'is a bag of ROS 1; convert it: rosbags-convert --src FILE.bag --dst FOLDER'}
 # Libraries that a kind of file needs: module, what it reads, and the extra of this package that brings it.
 HDF5 = ('h5py', 'HDF5 files', 'hdf5')
 PARQUET = ('pyarrow.parquet', 'Parquet files', 'parquet')
-LIBRARIES: Mapping[str, Sequence[tuple[str, str, str]]] = {
-    '.mat': (('scipy.io', 'MATLAB files', 'mat'),),
-    '.wav': (('scipy.io', 'sound files', 'wav'),),
-    '.h5': (HDF5,),
-    '.hdf5': (HDF5,),
-    '.parquet': (PARQUET,),
-}
 # What `texture import` is given a mapping for, and the kinds of files which that means.
-MAPPED: Mapping[str, Sequence[str]] = {'table': tuple(kind for kind in READERS if kind != BAG), 'bag': (BAG,)}
+MAPPED: Mapping[str, Sequence[str]] = {'table': tuple(kind for kind in READERS if kind != BAG), 'bag': (BAG, '.bag')}
 
 
 # --------------------
-# Turn tables into labelled bags, as a mapping says.
+# The clock of rows: their rate, and the place of each on a grid of it.
 
 SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
 ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
-GAP = 1.75  # steps of time longer than so many sampling intervals are gaps, whose samples count as lost
+GAP = 1.5  # steps of time longer than so many sampling intervals are gaps, whose samples count as lost
+CLEAR = 0.25  # intervals between the longest step without a loss and the shortest with one
+SAME_TIME = 0.1  # rows nearer than this share of an interval have one time
+BURST_RATIO, BURST_DUTY, BURST_SHARE, LONGEST_BURST_S = 5.0, 0.25, 0.2, 1.0
+MIN_BURSTS = 4
+MODULI = tuple(2.0**bits / unit for bits in (16, 24, 31, 32) for unit in (1.0, 1e3, 1e6, 1e9))
+RESET_ROWS = 5  # times that stay behind for longer are those of another run
+MAX_LEFT_OUT = 0.1  # share of the rows
+PLAUSIBLE_HZ = (5.0, 200_000.0)
+LIKELY_HZ = (20.0, 20_000.0)
+LONGEST_SLIDE_S = 1800.0
+TIMES = '; look at the column of time, its unit and `slides` in the mapping'
 
 
-def estimated_rate_hz(time_s: Array) -> float:
-    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other."""
-    steps = np.diff(_spread(time_s[np.isfinite(time_s)]))
-    steps = steps[steps > 0]
+class ClockFault(ValueError):
+    """Times of which no grid can be made: the row at which that is seen, and why."""
+
+    def __init__(self, row: int, reason: str) -> None:
+        super().__init__(reason)
+        self.row = row
+
+
+def unwrapped(times: Array) -> Array:
+    """Return times of a counter that rolls over at 2^16, 2^24, 2^31 or 2^32 of some unit as ones that go on."""
+    steps = np.diff(times)
+    back, forward = steps[steps < 0], steps[steps > 0]
+    if not len(back) or not len(forward):
+        return times
+    for modulus in MODULI:
+        usual = float(forward[forward < modulus / 2].mean()) if (forward < modulus / 2).any() else math.inf
+        far = back[back < -modulus / 2] + modulus
+        near = usual * (20.0 if modulus > 1000 * usual else 1.75)
+        if times.max() < modulus and times.min() >= 0 and len(far) and (far > 0).all() and (far <= near).all():
+            return np.asarray(np.unwrap(times, period=modulus))
+    return times
+
+
+def burst_step_s(steps: Array) -> float:
+    """Return the step of time that begins a burst of rows that were stamped at once, as of a buffer; 0 without."""
+    ordered = np.sort(steps[steps >= 0])
+    total = float(ordered.sum())
+    if len(ordered) < 2 * MIN_BURSTS or not total > 0:
+        return 0.0
+    floor = 1e-6 * total / len(ordered)
+    ratios = np.maximum(ordered[1:], floor) / np.maximum(ordered[:-1], floor)
+    place = int(ratios.argmax()) + 1
+    small, large = ordered[:place], ordered[place:]
+    if ratios[place - 1] < BURST_RATIO or len(small) < BURST_SHARE * len(ordered) or len(large) < MIN_BURSTS:
+        return 0.0
+    regular = np.median(large) <= LONGEST_BURST_S and np.quantile(large, 0.75) <= 3.0 * np.quantile(large, 0.25)
+    return float(large[0]) if regular and small.sum() < BURST_DUTY * total else 0.0
+
+
+def estimated_rate_hz(slides: Sequence[Array], burst_s: float) -> float:
+    """Return the rate of the rows of slides in spite of jitter and gaps, of four digits; NaN without steps of time."""
+    if burst_s:
+        counted, periods = zip(*(_bursts(times, burst_s)[1:] for times in slides if len(times)), strict=True)
+        counts, steps = np.concatenate([one[:-1] for one in counted]), np.concatenate(periods)
+    else:
+        steps = np.concatenate([np.diff(times) for times in slides])
+        counts = np.ones(len(steps))
+    counts, steps = counts[steps > 0], steps[steps > 0]
     if not len(steps):
-        return float('nan')
-    usual = steps[steps < GAP * np.median(steps)]
-    rate_hz = 1.0 / float(usual.mean())
+        return math.nan
+    usual = steps < 1.75 * np.median(steps)
+    if not burst_s:
+        usual &= steps > 0.25 * np.median(steps)  # rows that are there twice
+    rate_hz = float(counts[usual].sum() / steps[usual].sum())
     simple = float(f'{rate_hz:.2g}')
     return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
 
 
-def on_grid(samples: Array, time_s: Array | None, rate_hz: float) -> tuple[Array, NDArray[np.int64], Counter[str]]:
-    """Return the rows of one slide on a grid that begins with its first row, evenly spaced between gaps.
+def _bursts(times: Array, burst_s: float) -> tuple[AnyArray, AnyArray, Array]:
+    """Return the first row of each burst, its number of rows, and the steps of time between bursts."""
+    starts = np.flatnonzero(np.concatenate(([True], np.diff(times) >= burst_s)))
+    return starts, np.diff(np.append(starts, len(times))), np.diff(times[starts])
 
-    Jitter of the times is that of the host that stamped them, and not of the device that sampled.
+
+def on_grid(
+    samples: AnyArray, times: Array, rate_hz: float, burst_s: float = 0.0
+) -> tuple[AnyArray, AnyArray, Counter[str]]:
+    """Return which rows of a slide are samples, (n,), the place of each on a grid, and counts of what is left out.
+
+    Jitter of the times is that of the host that stamped them, and not of the device that sampled. ClockFault where the
+    times contradict the rate, go back, or lack more samples than there are.
     """
-    if time_s is None or len(samples) < 2:
-        return samples, np.arange(len(samples)), Counter(samples=len(samples))
-    times = _spread(_known(time_s))
-    later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
-    steps = np.diff(times[later]) * rate_hz
-    missing = np.where(steps > GAP, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
-    index = np.concatenate(([0], np.cumsum(1 + missing)))
-    counts = {'gaps': int((steps > GAP).sum()), 'lost': int(missing.sum()), 'disordered': int((~later).sum())}
-    return samples[later], index, Counter(samples=len(index), **counts)
+    kept = _in_order(times)
+    out = int((~kept).sum())
+    counts = Counter({'rows out of order': out} if out else {})
+    longest = max((edge.stop - edge.start for edge in _runs(~kept)), default=0)
+    if out > MAX_LEFT_OUT * len(times) or longest > RESET_ROWS:
+        row = int(np.argmax(np.diff(times) < 0)) + 1
+        raise ClockFault(
+            row, f'time goes back from {times[row - 1]:.9g} to {times[row]:.9g} s, and {out} of {len(times)} rows are '
+            'out of order; where the file holds several runs, write slides: {by: pause}, or cut them by a column; a '
+            'counter is only unwrapped at 2^16, 2^24, 2^31 or 2^32',
+        )  # fmt: skip
+    rows = np.flatnonzero(kept)
+    if burst_s:
+        index, dropped = _burst_places(times[rows], samples[rows], rate_hz, burst_s)
+        reason = 'rows of incomplete bursts'
+    else:
+        index, dropped = _places(times[rows], samples[rows], rate_hz)
+        reason = 'repeated rows'
+    counts |= {reason: int(dropped.sum())} if dropped.any() else {}
+    rows, index = rows[~dropped], index[~dropped]
+    # Of a row or two behind a gap at an end nobody knows whether the gap or their time is wrong.
+    apart = np.flatnonzero(np.diff(index) > 1)
+    low = max((place + 1 for place in apart[apart < 2]), default=0)
+    high = min((place + 1 for place in apart[apart >= len(index) - 3]), default=len(index))
+    if high - low < len(index) and high > low:
+        counts['rows alone at the end of a slide'] = len(index) - (high - low)
+        rows, index = rows[low:high], index[low:high]
+    left_out = len(times) - len(rows)
+    if left_out > MAX_LEFT_OUT * len(times):
+        row = int(np.argmax(dropped))
+        raise ClockFault(
+            row, f'{left_out} of {len(times)} rows have the time of another one or come in incomplete bursts; filter '
+            'them (`rows: {column: value}`), or give `rate_hz` in place of the column of time',
+        )  # fmt: skip
+    # The grid must agree with the clock as a whole.
+    lost = int(index[-1] - index[0] + 1 - len(index)) if len(index) else 0
+    seconds = float(times[rows[-1]] - times[rows[0]]) if len(rows) else 0.0
+    if lost > len(rows):
+        row = rows[1 + int(np.argmax(np.diff(index)))]
+        raise ClockFault(
+            row, f'by the usual step the rate is {rate_hz:g} Hz and {lost} samples are lost next to {len(rows)} rows, '
+            f'by rows and duration it is {len(rows) / max(seconds, 1e-9):.4g} Hz{TIMES}, or give `rate_hz` in place '
+            'of the column of time',
+        )  # fmt: skip
+    if len(index) and abs((index[-1] - index[0]) - seconds * rate_hz) > 3.0 + 0.03 * (index[-1] - index[0]) + (
+        2.0 * burst_s * rate_hz if burst_s else 0.0
+    ):
+        raise ClockFault(
+            0, f'{len(rows)} rows and {lost} lost samples at {rate_hz:g} Hz take other than the {seconds:.4g} s of '
+            f'their times, which are too irregular{TIMES}, or give `rate_hz` in place of the column of time',
+        )  # fmt: skip
+    counts |= {'samples': len(index), 'lost': lost}
+    return rows, index - (index[0] if len(index) else 0), counts
 
 
-def _known(time_s: Array) -> Array:
-    """Return times in which an unknown one lies between its neighbours."""
-    known = np.isfinite(time_s)
-    if known.all() or not known.any():
-        return time_s if known.any() else np.arange(len(time_s), dtype=np.float64)
-    rows = np.arange(len(time_s))
-    filled: Array = np.interp(rows, rows[known], time_s[known])
-    return filled
+def _in_order(times: Array) -> AnyArray:
+    """Return the rows, as a mask, of the longest sequence in which times do not go back."""
+    kept = np.ones(len(times), dtype=bool)
+    if not (np.diff(times) < 0).any():
+        return kept
+    ends: list[float] = []  # by length, the least time at which a sequence of it ends, and its row
+    rows: list[int] = []
+    previous = []
+    for row, time_s in enumerate(times.tolist()):
+        length = bisect_right(ends, time_s)
+        previous.append(rows[length - 1] if length else -1)
+        ends[length : length + 1], rows[length : length + 1] = [time_s], [row]
+    kept[:] = False
+    row = rows[-1]
+    while row >= 0:
+        kept[row] = True
+        row = previous[row]
+    # Of two rows that only contradict each other nobody knows which one is wrong.
+    for row in np.flatnonzero(~kept).tolist():
+        near = slice(max(0, row - 1000), row + 1001)
+        earlier = np.arange(near.start, near.start + len(times[near])) < row
+        partners = np.flatnonzero(kept[near] & np.where(earlier, times[near] > times[row], times[near] < times[row]))
+        if len(partners) == 1:
+            kept[near.start + partners[0]] = False
+    return kept
 
 
-def _spread(times: Array) -> Array:
-    """Return times in which rows of one time are spread to the next: of a coarse clock, or of samples in batches."""
-    starts = np.flatnonzero(np.concatenate(([True], times[1:] != times[:-1])))
-    if len(starts) == len(times) or len(starts) < 2:
-        return times
-    counts = np.diff(np.append(starts, len(times)))
-    steps = np.diff(times[starts]) / counts[:-1]
-    steps = np.append(steps, steps[-1])
-    within = np.arange(len(times)) - np.repeat(starts, counts)
-    forward = np.where(steps > 0, steps, 0.0)  # a time that goes back tells nothing
-    spread: Array = np.repeat(times[starts], counts) + within * np.repeat(forward, counts)
-    return spread
+def _runs(mask: AnyArray) -> list[slice]:
+    """Return the stretches of a mask that are true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return [slice(*edge) for edge in edges.reshape(-1, 2).tolist()]
+
+
+def _places(times: Array, samples: AnyArray, rate_hz: float) -> tuple[AnyArray, AnyArray]:
+    """Return the place of each row on the grid, and which rows are dropped as there twice, (n,) each."""
+    times, dropped = times.copy(), np.zeros(len(times), dtype=bool)
+    unlike: list[int] = []
+    steps = np.diff(times) * rate_hz
+    for row in np.flatnonzero(steps < SAME_TIME).tolist():
+        if np.array_equal(samples[row], samples[row + 1], equal_nan=True):
+            dropped[row + 1] = True  # written twice
+        elif row + 1 < len(steps) and GAP <= steps[row + 1] < 2.0 + GAP:
+            times[row + 1] += 0.5 * (times[row + 2] - times[row + 1])  # of a coarse clock
+        else:
+            dropped[[row, row + 1]] = True  # nobody knows which one is it
+            unlike.append(row)
+    if len(unlike) > max(2, 0.01 * len(times)):
+        raise ClockFault(
+            unlike[0], f'{len(unlike)} times come twice with other values: of a coarse clock, or of several sensors; '
+            'choose rows (`rows: {column: value}`), or give `rate_hz` in place of the column of time',
+        )  # fmt: skip
+    kept = np.flatnonzero(~dropped)
+    steps = np.diff(times[kept]) * rate_hz
+    # A late row is followed by a short step, a loss is not.
+    pairs = steps + np.append(steps[1:], np.inf)
+    missing = np.where((steps > GAP) & (pairs > 1.0 + GAP), np.rint(steps) - 1, 0).astype(np.int64)
+    index = np.zeros(len(times), dtype=np.int64)
+    index[kept] = np.concatenate(([0], np.cumsum(1 + np.maximum(missing, 0))))[: len(kept)]
+    # Losses are those that stand out: whole steps, and longer than any that is none.
+    large = missing > 0
+    uneven = np.abs(steps[large] - np.rint(steps[large])).mean() > 0.2 if large.sum() > 0.1 * len(steps) else False
+    kinds = np.unique(steps[~large].round(6))
+    coarse = float(np.diff(kinds).min()) if 1 < len(kinds) < 12 else 0.0  # resolution of the clock
+    if uneven or (large.any() and steps[large].min() - steps[~large].max(initial=1.0) < CLEAR + coarse):
+        raise ClockFault(
+            0, f'the steps of time are too irregular for a rate of {rate_hz:g} Hz: losses cannot be told from '
+            f'jitter, and by rows and duration it is '
+            f'{len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; give `rate_hz` in place of the column of time',
+        )  # fmt: skip
+    return index, dropped
+
+
+def _burst_places(times: Array, samples: AnyArray, rate_hz: float, burst_s: float) -> tuple[AnyArray, AnyArray]:
+    """Return the place of each row on the grid, and which rows of incomplete bursts are dropped, (n,) each."""
+    starts, counts, periods = _bursts(times, burst_s)
+    burst = np.repeat(np.arange(len(starts)), counts)
+    within = np.arange(len(times)) - starts[burst]
+    inside = np.diff(burst) == 0
+    twins = inside & np.all((samples[1:] == samples[:-1]) | np.isnan(samples[1:] + samples[:-1]), axis=1)
+    if twins.sum() > 0.5 * inside.sum() and np.any(samples != samples[0]):
+        raise ClockFault(1, 'most rows are there twice, with one time and the same values; save each row once')
+    size, usual = int(np.median(counts)), float(np.median(periods))
+    if (counts[1:-1] == size).mean() > 0.8:
+        # Bursts of one size: nobody knows which row one lacks or has twice, so it is left out as a whole.
+        whole = (counts == size)[burst]
+        number = np.concatenate(([0], np.cumsum(np.maximum(1, np.rint(periods / usual))))).astype(np.int64)
+        return number[burst] * size + within, ~whole
+    missing = np.rint(periods * rate_hz - counts[:-1])
+    missing = np.where((periods > 1.75 * usual) & (missing > 0), missing, 0).astype(np.int64)
+    index = np.arange(len(times)) + np.concatenate(([0], np.cumsum(missing)))[burst]
+    # As many rows as time has passed, whatever the sizes: where rows were lost within bursts, the count wanders.
+    first = index[starts].astype(float)
+    seconds = times[starts] - times[0]
+    rest = first - np.polyval(np.polyfit(seconds, first, 1), seconds)
+    if np.abs(rest).max() > 1.5:
+        raise ClockFault(
+            0, f'rows come in bursts of {counts.min()} to {counts.max()}, and their number does not follow the time; '
+            'losses within them cannot be placed; give `rate_hz` in place of the column of time',
+        )  # fmt: skip
+    return index, np.zeros(len(times), dtype=bool)
+
+
+# --------------------
+# The strict step: a frame gives clock, streams, labels, slides and conditions, or is refused.
+
+STATE_S = 0.1  # a state so often where a condition changes along a slide
+SAME_RATE = 1.05  # files of one stream may differ by this factor
+SAME_TIME_S = 1e-9
+WIDE = 100  # columns name_1 … name_n beyond this are hardly channels
+MAX_SLIDES = 20_000  # of one file
+# Lowest and highest mean of a slide that a tactile finger reaches, in SI units.
+PLAUSIBLE: Mapping[str, tuple[float, float]] = {
+    'speed': (5e-5, 2.0), 'force': (1e-3, 100.0), 'direction': (-6.3, 6.3),
+}  # fmt: skip
 
 
 @dataclass
 class ImportReport:
-    """Counts of an import."""
+    """What an import found, and all that it left out."""
 
     bags: list[Path] = field(default_factory=list)
     files: int = 0
-    ignored_files: int = 0
     rows: int = 0
-    malformed_rows: int = 0
-    examples: list[str] = field(default_factory=list)
-    short_slides: int = 0
     slides: Counter[str] = field(default_factory=Counter)
-    streams: dict[str, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))  # as `on_grid` counts
+    streams: dict[tuple[str, str], Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
+    channels: dict[str, Sequence[str]] = field(default_factory=dict)
     rates_hz: dict[str, float] = field(default_factory=dict)
+    conditions: dict[tuple[str, str], list[float]] = field(default_factory=lambda: defaultdict(list))
+    left_out: Counter[str] = field(default_factory=Counter)  # by reason
+    examples: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+
+    def leave_out(self, reason: str, count: int, *examples: str) -> None:
+        """Count what is left out, with the first places."""
+        if count:
+            self.left_out[reason] += count
+            self.examples[reason] += examples[: EXAMPLES - len(self.examples[reason])]
 
     def lines(self) -> list[str]:
-        """Return the counts in lines for people."""
+        """Return the table that a person checks, and below it what was left out and why."""
+        units = {'speed': 'm/s', 'force': 'N', 'direction': 'rad'}
+        named = [name for name in units if any(key[1] == name for key in self.conditions)]
+        table = [['surface', 'stream', 'slides', 'seconds', 'rate', 'channels', 'lost',
+                  *(f'{name} ({units[name]})' for name in named)]]  # fmt: skip
+        for (surface, stream), counts in sorted(self.streams.items()):
+            names, rate_hz = self.channels[stream], self.rates_hz[stream]
+            shown = names[0] if len(names) == 1 else f'{len(names)}: {names[0]} … {names[-1]}'
+            spread = [_range(self.conditions.get((surface, name), ())) for name in named]
+            seconds = f'{counts["samples"] / rate_hz:.1f}'
+            table.append([surface, stream, str(self.slides[surface]), seconds, f'{rate_hz:g} Hz', shown,
+                          str(counts['lost']), *spread])  # fmt: skip
+        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+        lines = ['  '.join(map(str.ljust, row, widths)).rstrip() for row in table]
         slides = sum(self.slides.values())
-        said = [
-            f'{slides} slides over {len(self.slides)} surfaces from {self.files} files'
-            + (f'; {self.ignored_files} files have other names' if self.ignored_files else ''),
-            f'malformed rows: {self.malformed_rows} of {self.rows}',
-            *(f'  {example}' for example in self.examples),
-        ]
-        said += [
-            f'{name}: {counts["samples"]} samples at {self.rates_hz[name]:g} Hz; {counts["lost"]} samples lost in '
-            f'{counts["gaps"]} gaps, {counts["disordered"]} rows out of order left out'
-            for name, counts in self.streams.items()
-        ]
-        if self.short_slides:
-            said.append(f'slides too short, left out: {self.short_slides}')
-        return said
+        lines.append(f'{slides} slides over {len(self.slides)} surfaces from {self.files} files of {self.rows} rows')
+        lines.append('left out: nothing' if not self.left_out else 'left out:')
+        for reason, count in self.left_out.items():
+            lines += [f'  {count} {reason}', *(f'    {example}' for example in self.examples[reason])]
+        return lines
 
 
-def spans(time_s: Array, rate_hz: float, keys: AnyArray | None, borders: SlideBorders, place: str) -> list[slice]:
-    """Return the rows of each slide in their order, the ends that are left out already taken away."""
-    changes: NDArray[np.intp] = np.empty(0, dtype=np.intp)
-    if borders.by == 'column' and keys is not None:  # without, it is a field of the name, which the whole file has
-        changes = np.flatnonzero(keys[1:] != keys[:-1]) + 1
-    elif borders.by == 'pause':
-        known = np.flatnonzero(np.isfinite(time_s))
-        steps = np.diff(time_s[known])
-        changes = known[1:][(steps >= borders.pause_s) | (steps < 0)]
-    elif borders.by == 'time':
-        since = np.nan_to_num(time_s - np.nanmin(time_s), nan=0.0)
-        changes = np.flatnonzero(np.diff(np.floor(np.maximum.accumulate(since) / borders.length_s + 1e-9))) + 1
-    found = [slice(first, last) for first, last in pairwise([0, *changes.tolist(), len(time_s)])]
-    if borders.by == 'time':
-        whole = (1.0 - 1e-6) * borders.length_s * rate_hz - 1.0
-        found = [span for span in found if span.stop - span.start >= whole]
-    elif borders.by == 'column' and keys is not None:
-        found = [span for span in found if _slides_at(str(keys[span.start]), borders.values)]
+def _range(values: Sequence[float]) -> str:
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return 'unknown'
+    low, high = f'{min(known):.3g}', f'{max(known):.3g}'
+    return low if low == high else f'{low} to {high}'
+
+
+def import_tables(
+    mapping: TableMapping, source: str | Path, out: str | Path | None, kinds: Sequence[str] = MAPPED['table']
+) -> ImportReport:
+    """Write bags of the slides in the tables below a folder, none if `out` is None, and return what was found.
+
+    InvalidData if no file matches, one lacks a column or contradicts itself, more than a tenth of its rows would be
+    left out, or a bag exists already.
+    """
+    report = ImportReport()
+    with SlideBags(mapping, out) as bags:
+        for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
+            for frame in frames(path, place, mapping):
+                for session, named, streams, conditions in FrameSlides(mapping, frame, fields, report).slides():
+                    bags.write(session, named, streams, conditions)
+            if path.is_dir() or path.suffix == '.mcap':
+                cut = is_cut_off(path)
+                report.leave_out('bags were cut off, and end with their last whole part', int(cut), f"'{place}'; see "
+                                 'mcap recover')  # fmt: skip
+        if not report.slides:
+            short = report.left_out['slides are too short']
+            raise InvalidData(
+                f"no slide of {mapping.slides.min_s:g} s or more in '{source}': {short} are shorter; "
+                'look at `slides` in the mapping'
+            )
+    report.bags = bags.paths
+    return report
+
+
+def _files(
+    mapping: TableMapping, source: Path, kinds: Sequence[str], report: ImportReport
+) -> Iterator[tuple[Path, str, dict[str, str]]]:
+    """Yield the files that the mapping means, in the order of their names, with these and what they hold."""
+    if not source.exists():
+        raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
+    paths = [source]
+    if source.is_dir() and not is_bag(source):
+        found = sorted(source.glob('/'.join('*' * (mapping.files.count('/') + 1))))
+        paths = [path for path in found if is_bag(path) or not path.is_dir()]
+    for path in paths:
+        place = path.name if path == source else path.relative_to(source).as_posix()
+        fields = template_fields(mapping.files, place)
+        if fields is None or _kind(path) not in (*kinds, *OTHER_KINDS):
+            report.leave_out('files have other names or endings', 1, f"'{place}'")
+            continue
+        report.files += 1
+        yield path, place, fields
+    if not report.files:
+        raise InvalidData(
+            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
+            'give the folder that holds them, or correct `files` in the mapping'
+        )
+
+
+def _kind(path: Path) -> str:
+    return BAG if is_bag(path) else path.suffix.lower()
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """One stream of a frame: its rows, (n, n_values), which of the frame these are, and their times, s, if any."""
+
+    name: str
+    params: StreamColumns
+    channels: tuple[str, ...]
+    samples: AnyArray
+    rows: AnyArray
+    time_s: Array | None
+    group: tuple[str, int]  # clock and number of rows of the columns: rows correspond where both are equal
+    per_row: int
+    rate_hz: float = 0.0  # of rows
+    burst_s: float = 0.0
+
+    def at_s(self) -> Array:
+        """Return the times of rows as recorded, or by the rate."""
+        return self.rows / self.rate_hz if self.time_s is None else self.time_s
+
+
+# By topic: a stream, and of one slide its samples and their places on the grid.
+SlideStreams = Mapping[str, tuple[Stream, AnyArray, AnyArray]]
+# What holds from a time since the start of a slide on, in SI units, NaN if unknown: time, speed, force, direction.
+Conditions = Sequence[tuple[float, float, float, float]]
+
+
+class FrameSlides:
+    """The slides of one frame."""
+
+    def __init__(self, mapping: TableMapping, frame: Frame, fields: Mapping[str, str], report: ImportReport) -> None:
+        self._mapping, self._frame, self._report, self._place = mapping, frame, report, frame.place
+        self._fields = {**frame.fields, **fields}
+        self._chosen = {name: frame.chosen(stream.columns) for name, stream in mapping.streams.items()}
+        self._columns = self._read()
+        self._check_rows()
+        streams = [self._stream(name, params) for name, params in mapping.streams.items()]
+        # Slides are cut by the rows of the stream that corresponds to the column at which they end.
+        by = mapping.slides.column
+        same = [one for one in streams if by and by not in self._fields and one.group == self._group(by)]
+        self._reference = max(same or streams[:1], key=lambda one: len(one.rows))
+        self._spans = self._cut()
+        self._streams = [self._rated(one) for one in streams]
+        self._reference = next(one for one in self._streams if one.name == self._reference.name)
+
+    def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
+        """Yield what `SlideBags.write` takes."""
+        params, short, inside = self._mapping.slides, 0, 0
+        reference, times = self._reference, self._reference.at_s()
+        for number, span in enumerate(self._spans, 1):
+            skip, drop = (round(seconds * reference.rate_hz) for seconds in (params.start_s, params.end_s))
+            rows = slice(span.start + skip, max(span.start + skip, span.stop - drop))
+            inside += max(0, span.stop - span.start)
+            count = (rows.stop - rows.start) * reference.per_row
+            if count < 2 or count / (reference.rate_hz * reference.per_row) < params.min_s - 1e-9:
+                short += span.stop - span.start
+                self._report.leave_out(
+                    'slides are too short', 1, f"'{self._place}', row {self._line(span.start)}: {count} samples"
+                )
+                continue
+            if number > MAX_SLIDES:
+                raise InvalidData(f"'{self._place}' has more than {MAX_SLIDES} slides; split it")
+            yield self._slide(times, rows, number)
+        if short > MAX_LEFT_OUT * inside and short < inside and params.min_s == SlideBorders().min_s:
+            raise InvalidData(
+                f"'{self._place}': {short} of {inside} rows lie in slides that are shorter than {params.min_s:g} s; "
+                'look at `slides` in the mapping, or set another `min_s` there'
+            )
+
+    def _read(self) -> Columns:
+        """Return the columns that the mapping uses, of the rows that it wants."""
+        frame, fields, texts = self._frame, self._fields, self._mapping.texts()
+        wanted = [column for columns in self._chosen.values() for column in columns] + self._mapping.numbers()
+        for name in (*wanted, *texts):
+            if name not in fields and name not in frame.names:
+                raise InvalidData(f"'{self._place}': {unknown_name(name, (*frame.names, *fields), 'column')}")
+        clocks = [frame.clocks[name] for name in (*wanted, *texts) if name in frame.clocks]
+        read = frame.read(*(
+            list(dict.fromkeys(name for name in names if name not in fields)) for names in ((*wanted, *clocks), texts)
+        ))  # fmt: skip
+        for name, value in self._mapping.rows.items():
+            if name in fields:
+                raise InvalidData(f"'{self._place}': '{name}' under `rows` holds for the whole file; name a column")
+            mask = np.array([fnmatch.fnmatchcase(text, value) or text == value for text in read.texts[name]])
+            if not mask.any():
+                has = ', '.join(np.unique(read.texts[name])[:5].tolist())
+                raise InvalidData(f"'{self._place}': column '{name}' has no row '{value}'; it has {has}")
+            self._report.leave_out('rows are not those under `rows`', int((~mask).sum()))
+
+            def cut(array: AnyArray | None, mask: AnyArray = mask) -> Any:
+                return array if array is None or len(array) != len(mask) else array[mask]
+
+            read = replace(
+                read, lines=cut(np.arange(len(mask)) if read.lines is None else read.lines), junk=cut(read.junk),
+                numbers={key: cut(array) for key, array in read.numbers.items()},
+                texts={key: cut(array) for key, array in read.texts.items()},
+            )  # fmt: skip
+        return read
+
+    def _line(self, row: int) -> int:
+        lines = self._columns.lines
+        return int(row) if lines is None or row >= len(lines) else int(lines[row])
+
+    def _group(self, name: str) -> tuple[str, int]:
+        columns = self._columns
+        array = columns.texts[name] if name in columns.texts else columns.numbers[name]
+        return self._frame.clocks.get(name, ''), len(array)
+
+    def _blank(self, name: str) -> AnyArray:
+        """Return rows in which a stream has no value and another one has: they are none of a slower stream's."""
+        group = self._group(self._chosen[name][0])
+        others = [
+            self._columns.numbers[column]
+            for other, columns in self._chosen.items() if other != name
+            for column in columns if self._group(column) == group
+        ]  # fmt: skip
+        none = np.logical_and.reduce([np.isnan(self._columns.numbers[column]) for column in self._chosen[name]])
+        if not others:
+            return np.zeros(group[1], dtype=bool)
+        blank: AnyArray = none & np.logical_or.reduce([np.isfinite(column) for column in others])
+        steps = np.diff(np.flatnonzero(~blank))
+        if not self._mapping.streams[name].time.column and len(steps) and np.ptp(steps):
+            blank[:] = False  # by no clock and no pattern can their places be known
+        return blank
+
+    def _check_rows(self) -> None:
+        """Count the rows with a bad number; InvalidData if they are too many."""
+        bad: dict[int, AnyArray] = {}
+        for name, columns in self._chosen.items():
+            if len({self._group(column)[1] for column in columns}) > 1:
+                lengths = sorted({self._group(column)[1] for column in columns})
+                raise InvalidData(
+                    f"'{self._place}': the columns of '{name}' have {lengths} rows; put columns of different rates "
+                    'into two streams'
+                )
+            blank = self._blank(name)
+            found = bad.setdefault(len(blank), np.zeros(len(blank), dtype=bool))
+            for column in columns:
+                found |= np.isnan(self._columns.numbers[column]) & ~blank
+            if (time := self._mapping.streams[name].time.column) and len(self._columns.numbers[time]) == len(found):
+                found |= np.isnan(self._columns.numbers[time])
+        for length, marked in bad.items():
+            junk = self._columns.junk
+            found = marked | junk if junk is not None and length == len(junk) else marked
+            count = int(found.sum())
+            self._report.rows += length
+            told = dict(self._columns.reasons)
+            if count and not told:
+                told[self._line(int(found.argmax()))] = 'no finite number'
+            reasons = [f'row {line}, {reason}' for line, reason in told.items()]
+            if not length or count > MAX_LEFT_OUT * length:
+                raise InvalidData(
+                    f"'{self._place}' has {count} malformed rows of {length}, first "
+                    f'{(reasons or ["no row at all"])[0]}; at most {100 * MAX_LEFT_OUT:g} % are taken; look at the '
+                    'columns and at `format` in the mapping'
+                )
+            self._report.leave_out('malformed rows', count, *(f"'{self._place}', {reason}" for reason in reasons))
+
+    def _stream(self, name: str, params: StreamColumns) -> Stream:
+        names, group = self._chosen[name], self._group(self._chosen[name][0])
+        self._check_width(name, params, names, group[1])
+        per_row = params.samples_per_row or 1
+        if len(names) % per_row:
+            raise InvalidData(
+                f"'{self._place}': the stream '{name}' has {len(names)} columns, no multiple of "
+                f'samples_per_row: {per_row}'
+            )
+        channels = tuple(params.channels) or tuple(names[::per_row])
+        if len(channels) * per_row != len(names):
+            raise InvalidData(
+                f"'{self._place}': the stream '{name}' has {len(names) // per_row} channels and {len(channels)} names "
+                'of channels; give one for each'
+            )
+        samples = np.empty((group[1], len(names)), dtype=np.float32)
+        with np.errstate(over='ignore'):
+            for place, column in enumerate(names):
+                samples[:, place] = self._columns.numbers[column] * params.scale
+        if np.isinf(samples).any():
+            raise InvalidData(f"'{self._place}': '{name}' has values above 3.4e38; look at the columns and at `scale`")
+        kept, time_s = ~self._blank(name), None
+        column = params.time.column or self._frame.clocks.get(names[0], '')
+        if column:
+            raw = self._columns.numbers[column]
+            if len(raw) != len(samples):
+                raise InvalidData(f"'{self._place}': column '{column}' has {len(raw)} rows, '{name}' {len(samples)}")
+            raw = _with_places(raw, kept)
+            kept &= np.isfinite(raw)
+            unit = TIME_UNITS[params.time.unit if params.time.column else 's']
+            time_s = unwrapped(raw[kept]) * unit
+        rows = np.flatnonzero(kept)
+        self._report.channels.setdefault(name, channels)
+        if self._report.channels[name] != channels and len(self._report.channels[name]) != len(channels):
+            raise InvalidData(
+                f"'{self._place}': '{name}' has {len(channels)} channels, {len(self._report.channels[name])} in the "
+                'files before; give each sensor a mapping'
+            )
+        return Stream(name, params, channels, samples[rows], rows, time_s, group, per_row)
+
+    def _check_width(self, name: str, params: StreamColumns, names: Sequence[str], rows: int) -> None:
+        """Refuse a row that looks like a window, or an array that lies on its side, unless the mapping tells."""
+        numbered = all(re.fullmatch(r'.*?\d+', one) for one in names)
+        if not params.samples_per_row and len(names) > 8 and (len(names) > rows or (numbered and len(names) > WIDE)):
+            raise InvalidData(
+                f"'{self._place}': the stream '{name}' has {len(names)} columns, {names[0]} … {names[-1]}, and {rows} "
+                f'rows; write samples_per_row: {len(names)} if a row holds that many consecutive samples of one '
+                'channel (slides: {by: row} if it is a window), samples_per_row: 1 if the columns are channels, or '
+                'format: {transpose: true} if the array lies on its side'
+            )
+
+    def _cut(self) -> list[slice]:
+        """Return the rows of the reference in each slide."""
+        params, reference = self._mapping.slides, self._reference
+        count, times = len(reference.rows), reference.time_s
+        changes: AnyArray = np.empty(0, dtype=np.intp)
+        keys = None
+        if params.by == 'row':
+            changes = np.arange(1, count)
+        elif params.by == 'column' and params.column not in self._fields:
+            keys = self._aligned(params.column)
+            changes = np.flatnonzero(keys[1:] != keys[:-1]) + 1
+        elif params.by == 'pause' and times is not None and count > 1:
+            ahead = np.lib.stride_tricks.sliding_window_view(
+                np.append(times[1:], np.full(RESET_ROWS, times[-1])), RESET_ROWS + 1
+            )
+            reset = (ahead < times[:-1, None]).all(axis=1)
+            changes = np.flatnonzero((np.diff(times) >= params.pause_s) | reset) + 1
+        elif params.by == 'time':
+            if times is not None and (np.diff(times) < 0).any():
+                row = int(np.argmax(np.diff(times) < 0)) + 1
+                raise InvalidData(self._fault(reference, row, 'time goes back; slides by time need one that goes on'))
+            rate_hz = reference.params.rate_hz / reference.per_row or self._frame.rate_hz
+            since = times - times[0] if times is not None else reference.rows / max(rate_hz, MIN_HZ)
+            number = np.floor(since / params.length_s + 1e-9)
+            changes = np.flatnonzero(np.diff(number)) + 1
+            whole = float(since[-1]) + float(np.median(np.diff(since))) if count > 1 else 0.0
+            count = (
+                count
+                if whole >= (number[-1] + 1) * params.length_s * (1 - 1e-6)
+                else int((changes if len(changes) else [0])[-1])
+            )
+        found = [slice(first, last) for first, last in pairwise([0, *changes[changes < count].tolist(), count])]
+        if keys is None:
+            return found
+        found = [span for span in found if _slides_at(str(keys[span.start]), params.values)]
         if not found:
             raise InvalidData(
-                f"'{place}': column '{borders.column}' has none of the values "
-                f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(keys)[:5].tolist())}'
+                f"'{self._place}': column '{params.column}' has none of the values "
+                f'{", ".join(params.values) or "but empty"}; it has {", ".join(np.unique(keys)[:5].tolist())}'
             )
-    skip, drop = (round(seconds * rate_hz) for seconds in (borders.start_s, borders.end_s))
-    return [slice(span.start + skip, max(span.start + skip, span.stop - drop)) for span in found]
+        return found
+
+    def _rated(self, stream: Stream) -> Stream:
+        """Return a stream with the rate of its rows: as stated, else by its times, which must agree."""
+        name, params, per_row = stream.name, stream.params, stream.per_row
+        measured, burst_s = self._frame.rate_hz, 0.0
+        if stream.time_s is not None:
+            parts = [stream.time_s]
+            if stream.group == self._reference.group:
+                edges = [
+                    (self._reference.rows[one.start], self._reference.rows[one.stop - 1])
+                    for one in self._spans
+                    if one.stop > one.start
+                ]
+                places = [(np.searchsorted(stream.rows, a), np.searchsorted(stream.rows, b, 'right')) for a, b in edges]
+                parts = [stream.time_s[a:b] for a, b in places] or parts
+            parts = [part for part in parts if len(part) > 1] or [stream.time_s]
+            burst_s = burst_step_s(np.concatenate([np.diff(part) for part in parts]))
+            measured = per_row * estimated_rate_hz(parts, burst_s)
+            self._refuse_mixed(stream, parts, burst_s)
+        # Of the first file: windows of all are to have as many samples.
+        rate_hz = self._report.rates_hz.get(name) or params.rate_hz or measured
+        if measured and not 1 / SAME_RATE <= measured / rate_hz <= SAME_RATE:
+            raise InvalidData(
+                f"'{self._place}': '{name}' has {measured:g} Hz by its times, {rate_hz:g} Hz are expected; "
+                f"look at the unit of column '{params.time.column}' and at `rate_hz` in the mapping"
+            )
+        low, high = PLAUSIBLE_HZ if not params.rate_hz else (MIN_HZ, MAX_HZ)
+        if not low <= rate_hz <= high:
+            unit = TIME_UNITS[params.time.unit]
+            likely = [
+                one for one, factor in TIME_UNITS.items() if LIKELY_HZ[0] <= rate_hz * unit / factor <= LIKELY_HZ[1]
+            ]
+            hint = f'; with unit: {likely[0]} it were {rate_hz * unit / TIME_UNITS[likely[0]]:g} Hz' if likely else ''
+            raise InvalidData(
+                f"'{self._place}': the rate of '{name}' is {rate_hz:g} Hz by its times{hint}; give a column of "
+                f'time that grows and its unit, or `rate_hz`, from {low:g} to {high:g}'
+            )
+        self._report.rates_hz[name] = rate_hz
+        return replace(stream, rate_hz=rate_hz / per_row, burst_s=burst_s)
+
+    def _refuse_mixed(self, stream: Stream, parts: Sequence[Array], burst_s: float) -> None:
+        """Refuse times that come again where an unused column differs between their rows, as the name of a sensor."""
+        whole = np.concatenate(parts)
+        if len(np.unique(whole)) > 0.9 * len(whole) and not (np.diff(whole) < 0).sum() > MAX_LEFT_OUT * len(whole):
+            return
+        used = {*self._columns.numbers, *self._columns.texts}
+        for name in [one for one in self._frame.names if one not in used][:40]:
+            texts = self._frame.read([], [name]).texts[name]
+            texts = texts[stream.rows] if len(texts) == stream.group[1] else texts
+            values, codes = np.unique(texts, return_inverse=True)
+            if len(texts) != len(stream.rows) or not 2 <= len(values) <= len(texts) / 4:
+                continue
+            _, places = np.unique(stream.at_s(), return_inverse=True)
+            if len(np.unique(places.astype(np.int64) * len(values) + codes)) == len(texts):
+                raise InvalidData(
+                    f"'{self._place}': each time occurs once for each value of '{name}' "
+                    f'({", ".join(values[:5].tolist())}), so the signals of several sensors or runs alternate; choose '
+                    f"one by rows: {{{name}: {values[0]}}}, or cut slides at '{name}'"
+                )
+
+    def _aligned(self, name: str) -> AnyArray:
+        """Return the texts of a column at the rows of the reference: of another clock, the last one until then."""
+        texts = self._columns.texts[name]
+        if self._group(name) == self._reference.group:
+            return texts[self._reference.rows]
+        clock, times = self._frame.clocks.get(name), self._reference.time_s
+        if clock is None or times is None:
+            raise InvalidData(
+                f"'{self._place}': column '{name}' has {len(texts)} rows, as no stream has; name one of the same length"
+            )
+        held = np.searchsorted(self._columns.numbers[clock], times + SAME_TIME_S, 'right') - 1
+        return np.where(held >= 0, texts[np.maximum(held, 0)], '')
+
+    def _value(self, name: str, rows: slice, kind: str) -> str:
+        """Return the one value that a column has during a slide, the last one before it where it has none."""
+        if name in self._fields:
+            return str(self._fields[name])
+        texts = self._aligned(name)
+        inside = np.flatnonzero(texts[rows] != '') + rows.start
+        before = np.flatnonzero(texts[: rows.start] != '')
+        if not len(inside):
+            if not len(before):
+                raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
+            return str(texts[before[-1]])
+        first = str(texts[inside[0]])
+        if inside[0] > rows.start and len(before) and texts[before[-1]] != first:
+            inside, first = np.append(before[-1], inside), str(texts[before[-1]])
+        other = inside[texts[inside] != first]
+        if len(other):
+            raise InvalidData(
+                f"'{self._place}', row {self._line(self._reference.rows[other[0]])}, column '{name}': the "
+                f"{kind} changes from '{first}' to '{texts[other[0]]}' within a slide; let slides end "
+                f"where '{name}' changes "
+                '(`slides: {by: column}`)'
+            )
+        return first
+
+    def _slide(self, times: Array, rows: slice, number: int) -> tuple[str, ExplorationState, SlideStreams, Conditions]:
+        label, reference = self._mapping.label, self._reference
+        code = label.value or self._value(label.column, rows, 'label')
+        surface = checked_label(label.names.get(code, code))
+        if not surface:
+            raise InvalidData(f"'{self._place}': a slide has an empty label; name another column under `label`")
+        session = self._value(self._mapping.session, rows, 'session') if self._mapping.session else surface
+        begin_s, end_s = float(times[rows].min()), float(times[rows].max()) + 1.0 / reference.rate_hz
+        if end_s - begin_s > LONGEST_SLIDE_S:
+            raise InvalidData(
+                f"'{self._place}', row {self._line(reference.rows[rows.start])}: a slide lasts "
+                f'{end_s - begin_s:.4g} s, at most {LONGEST_SLIDE_S:g} s are plausible{TIMES}'
+            )
+        group_rows = reference.rows[rows.start], reference.rows[rows.stop - 1] + 1
+        streams = {one.name: self._samples(one, surface, group_rows, begin_s, end_s) for one in self._streams}
+        conditions = self._conditions(group_rows, begin_s, end_s)
+        for place, name in enumerate(CONDITION_UNITS, 1):
+            known = [state[place] for state in conditions if math.isfinite(state[place])]
+            if known:
+                self._report.conditions[surface, name].append(self._plausible(name, float(np.mean(known))))
+        self._report.slides[surface] += 1
+        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
+        return session, named, streams, conditions
+
+    def _samples(
+        self, stream: Stream, surface: str, group_rows: tuple[int, int], begin_s: float, end_s: float
+    ) -> tuple[Stream, AnyArray, AnyArray]:
+        if stream.group == self._reference.group:
+            first, last = np.searchsorted(stream.rows, group_rows)
+        else:
+            first, last = np.searchsorted(stream.at_s(), (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
+        samples = stream.samples[first:last]
+        if not len(samples):
+            raise InvalidData(
+                f"'{self._place}' has no samples of '{stream.name}' from {begin_s:g} to {end_s:g} s of a slide; "
+                'look at the times of the streams'
+            )
+        rows: AnyArray
+        index: AnyArray
+        if stream.time_s is None or len(samples) < 2:
+            rows, index, counts = np.arange(len(samples)), np.arange(len(samples)), Counter(samples=len(samples))
+        else:
+            try:
+                rows, index, counts = on_grid(samples, stream.time_s[first:last], stream.rate_hz, stream.burst_s)
+            except ClockFault as fault:
+                raise InvalidData(self._fault(stream, first + fault.row, str(fault))) from fault
+        # Successive columns that are consecutive samples of one channel.
+        count, wide = stream.per_row, samples if len(rows) == len(samples) else samples[rows]
+        flat = (
+            wide if count == 1 else wide.reshape(len(rows), -1, count).transpose(0, 2, 1).reshape(len(rows) * count, -1)
+        )
+        places = (index[:, None] * count + np.arange(count)).ravel()
+        total = self._report.streams[surface, stream.name]
+        total['samples'] += count * counts['samples']
+        total['lost'] += count * counts['lost']
+        for reason, left in counts.items():
+            if reason not in ('samples', 'lost'):
+                self._report.leave_out(f"{reason} of '{stream.name}'", left, f"'{self._place}'")
+        return stream, flat, places
+
+    def _fault(self, stream: Stream, row: int, reason: str) -> str:
+        column = stream.params.time.column or self._frame.clocks.get(self._chosen[stream.name][0], '')
+        return f"'{self._place}', row {self._line(stream.rows[row])}, column '{column}': {reason}"
+
+    def _plausible(self, name: str, value: float) -> float:
+        """Return the mean of a condition over a slide; InvalidData if no finger reaches it."""
+        low, high = PLAUSIBLE[name]
+        if low <= value <= high or (value == 0.0 and name != 'direction'):
+            return value
+        units = CONDITION_UNITS[name]
+        given = self._mapping.conditions[name].unit or next(iter(units))
+        number = value / units[given]
+        likely = [unit for unit, factor in units.items() if low <= number * factor <= high]
+        raise InvalidData(
+            f"'{self._place}': the {name} of a slide is {number:.4g} {given}, plausible are "
+            f'{low / units[given]:.3g} to {high / units[given]:.3g} {given}; look at its unit in the mapping'
+            + (f', which may be {" or ".join(likely)}' if likely else '')
+        )
+
+    def _conditions(self, group_rows: tuple[int, int], begin_s: float, end_s: float) -> Conditions:
+        """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
+        tracks = {name: self._track(name, group_rows, begin_s, end_s) for name in CONDITION_UNITS}
+        changing = any(len(values) > 1 and np.ptp(values) > 0 for _, values in tracks.values())
+        count = max(1, round((end_s - begin_s) / STATE_S)) if changing else 1
+        edges = begin_s + STATE_S * np.arange(count + 1) if changing else np.array([begin_s, math.inf])
+        edges[-1] = math.inf
+        means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
+        return [(start, *mean) for start, mean in zip((edges[:-1] - begin_s).tolist(), means, strict=True)]
+
+    def _track(self, name: str, group_rows: tuple[int, int], begin_s: float, end_s: float) -> tuple[Array, Array]:
+        """Return times and known values of a condition in SI units, (n,) each; a force and a speed without sign."""
+        quantity = self._mapping.conditions.get(name, Quantity())
+        factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
+        if quantity.column in self._fields or not quantity.column:
+            text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
+            try:
+                values, times = np.array([float(text)]), np.array([begin_s])
+            except ValueError as error:
+                raise InvalidParameter(
+                    f"'{self._place}': '{quantity.column}' is '{text}' in its name; a number is needed there"
+                ) from error
+        else:
+            times = np.empty(0)
+            values, group = self._columns.numbers[quantity.column], self._group(quantity.column)
+            if group == self._reference.group:
+                low, high = np.searchsorted(self._reference.rows, group_rows)
+                rows = self._reference.rows[low:high]
+                times, values = self._reference.at_s()[low:high], values[rows]
+            else:
+                clock = self._frame.clocks.get(quantity.column)
+                if clock is None:
+                    raise InvalidData(
+                        f"'{self._place}': column '{quantity.column}' has {len(values)} rows, as no stream has; name "
+                        'one of the same length'
+                    )
+                times = self._columns.numbers[clock]
+                first, last = np.searchsorted(times, (begin_s - SAME_TIME_S, end_s - SAME_TIME_S))
+                first = max(0, first - 1) if first == last else first  # the last value holds
+                times, values = times[first:last], values[first:last]
+        times, values = times[np.isfinite(values)], values[np.isfinite(values)] * factor
+        negative = name != 'direction' and len(values) and values.mean() < 0
+        return times, -values if negative else values
+
+
+def _with_places(times: Array, kept: AnyArray) -> Array:
+    """Return times in which malformed rows that stand for a sample, as the step around them shows, have its time."""
+    times = times.copy()
+    steps = np.diff(times[kept & np.isfinite(times)])
+    usual = float(np.median(steps)) if len(steps) else math.nan
+    for run in _runs(kept & np.isnan(times)):
+        before, after = run.start - 1, run.stop
+        if before >= 0 and after < len(times):
+            step = (times[after] - times[before]) / (after - before)
+            if abs((step / usual - 1.0) * (after - before)) < 0.5:
+                times[run] = times[before] + step * np.arange(1, after - before)
+    return times
 
 
 def _slides_at(value: str, wanted: Sequence[str]) -> bool:
@@ -1197,30 +1879,19 @@ def _slides_at(value: str, wanted: Sequence[str]) -> bool:
     return any(fnmatch.fnmatchcase(value, one) or value == one for one in wanted) if wanted else value != ''
 
 
+def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
+    """Return the mean of values between two times; the last one before where there is none."""
+    if len(values) <= 1:
+        return float(values[0]) if len(values) else math.nan
+    inside = values[(times >= begin_s) & (times < end_s)]
+    return float(inside.mean()) if len(inside) else float(values[max(0, int(np.searchsorted(times, begin_s)) - 1)])
+
+
+# --------------------
+# Bags of the slides.
+
 MAX_BAGS = 500
 Message = tuple[int, str, TactileSignal | ExplorationState]  # log time, topic, value
-
-
-@dataclass(frozen=True, eq=False)
-class Stream:
-    """One stream of a table: its samples, (n, n_channels), and the time of each, s.
-
-    `timed` says whether times were recorded, and `clock` names the column of time that the file states for it.
-    """
-
-    params: StreamColumns
-    channels: tuple[str, ...]
-    samples: Array
-    time_s: Array
-    timed: bool
-    rate_hz: float
-    clock: str
-
-
-# By topic: a stream, and of one slide its samples and their places on the grid.
-SlideStreams = Mapping[str, tuple[Stream, Array, NDArray[np.int64]]]
-# What holds from a time since the start of a slide on, in SI units, NaN if unknown: time, speed, force, direction.
-Conditions = Sequence[tuple[float, float, float, float]]
 
 
 class SlideBags:
@@ -1230,8 +1901,8 @@ class SlideBags:
     order over all bags.
     """
 
-    def __init__(self, mapping: TableMapping, out: str | Path) -> None:
-        self._mapping, self._out = mapping, Path(out)
+    def __init__(self, mapping: TableMapping, out: str | Path | None) -> None:
+        self._mapping, self._out = mapping, None if out is None else Path(out)
         self._open = ExitStack()
         self._bags: dict[str, BagWriter] = {}
         self._next: dict[tuple[str, str], int] = {}
@@ -1245,20 +1916,26 @@ class SlideBags:
     def write(self, session: str, named: ExplorationState, streams: SlideStreams, conditions: Conditions) -> None:
         """Write a slide into the bag of a session."""
         bag = self._bag(session)
-        duration_s = min(float(index[-1] + 1) / stream.rate_hz for stream, _, index in streams.values())
+        if bag is None:
+            return
+        duration_s = max(
+            float(index[-1] + 1) / (stream.rate_hz * stream.per_row) for stream, _, index in streams.values()
+        )
         messages: list[Message] = [*self._states(named, conditions, duration_s)]
         sensor = self._mapping.sensor
         for topic, (stream, samples, index) in streams.items():
             first, units = self._next.get((session, topic), 0), (stream.params.unit,) * len(stream.channels)
             none = np.empty((0, len(units)), dtype=np.float32)
-            like = TactileSignal(0, sensor, stream.channels, units, stream.rate_hz, first, none, sensor)
+            like = TactileSignal(
+                0, sensor, stream.channels, units, stream.rate_hz * stream.per_row, first, none, sensor
+            )
             for batch in slide_batches(like, samples, index, self._now_ns):
                 messages.append((batch.end_ns + DELAY_NS, topic, batch))
                 self._next[session, topic] = batch.next_sample
         bag.write_all(messages)
         self._now_ns = max(log_ns for log_ns, _, _ in messages) + PAUSE_NS
 
-    def _bag(self, session: str) -> BagWriter:
+    def _bag(self, session: str) -> BagWriter | None:
         if session not in self._bags:
             name = checked_label(session)
             if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
@@ -1266,6 +1943,8 @@ class SlideBags:
                     f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
                     'names are made, choose another `session`'
                 )
+            if self._out is None:
+                return None
             self._out.mkdir(parents=True, exist_ok=True)
             self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
         return self._bags[session]
@@ -1291,327 +1970,3 @@ class SlideBags:
         if error[0]:
             for path in self.paths:
                 shutil.rmtree(path, ignore_errors=True)
-
-
-STATE_S = 0.1  # a state so often where a condition changes along a slide
-SAME_RATE = 1.05  # files of one stream may differ by this factor
-LONGEST_GAP_S = 3600.0
-SAME_TIME_S = 1e-9
-
-
-def import_tables(
-    mapping: TableMapping, source: str | Path, out: str | Path, kinds: Sequence[str] = MAPPED['table']
-) -> ImportReport:
-    """Write bags of the slides in the tables below a folder, and return what was found.
-
-    Parameters
-    ----------
-    mapping
-        What becomes of the columns; see `load_mapping`.
-    source
-        Folder of the files, or one file.
-    out
-        Folder for the bags; made if missing.
-    kinds
-        Endings of the files that are read, of `MAPPED`.
-
-    Returns
-    -------
-    ImportReport
-        The bags, and what was counted.
-
-    Raises
-    ------
-    InvalidData
-        If no file matches, a file lacks a column or has too many malformed rows, or a bag exists already.
-    """
-    report = ImportReport()
-    with SlideBags(mapping, out) as bags, TableFiles() as files:
-        for path, place, fields in progress(_files(mapping, Path(source), kinds, report), 'import files'):
-            for table in files.tables(_kind(path), path, place, mapping, fields):
-                for session, named, streams, conditions in _TableSlides(mapping, table, report).slides():
-                    bags.write(session, named, streams, conditions)
-                    report.slides[named.surface] += 1
-        if not report.slides:
-            raise InvalidData(
-                f"no slide of {mapping.slides.min_s:g} s or more in '{source}': {report.short_slides} are shorter; "
-                'look at `slides` in the mapping'
-            )
-    report.bags = bags.paths
-    return report
-
-
-def _files(
-    mapping: TableMapping, source: Path, kinds: Sequence[str], report: ImportReport
-) -> Iterator[tuple[Path, str, dict[str, str]]]:
-    """Yield the files that the mapping means, with their names for sentences and what these hold."""
-    found = False
-    for path in _paths(source, mapping.files.count('/') + 1):
-        place = path.name if path == source else path.relative_to(source).as_posix()
-        fields = template_fields(mapping.files, place)
-        if fields is None or _kind(path) not in kinds:
-            report.ignored_files += 1
-            continue
-        found = True
-        report.files += 1
-        yield path, place, fields
-    if not found:
-        raise InvalidData(
-            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
-            'give the folder that holds them, or correct `files` in the mapping'
-        )
-
-
-def _paths(source: Path, depth: int) -> list[Path]:
-    """Return the files at a depth below a folder, in the order of their names as texts: 10 comes before 2."""
-    if not source.exists():
-        raise InvalidData(f"there is no '{source}'; give the folder that holds the files")
-    if source.is_file() or is_bag(source):
-        return [source]
-    found = source.glob('/'.join('*' * depth))
-    return sorted(path for path in found if is_bag(path) or not path.is_dir())
-
-
-def _kind(path: Path) -> str:
-    return BAG if is_bag(path) else path.suffix.lower()
-
-
-class _TableSlides:
-    """The slides of one table."""
-
-    def __init__(self, mapping: TableMapping, columns: Columns, report: ImportReport) -> None:
-        self._mapping, self._columns, self._report = mapping, columns, report
-        self._place, self._fields, self._clocks = columns.place, columns.fields, columns.clocks
-        self._check_rows()
-        self._streams = {name: self._stream(name, params) for name, params in mapping.streams.items()}
-
-    def slides(self) -> Iterator[tuple[str, ExplorationState, SlideStreams, Conditions]]:
-        """Yield what `SlideBags.write` takes."""
-        borders = self._mapping.slides
-        reference, found = self._spans()
-        for number, span in enumerate(found, 1):
-            if (span.stop - span.start) / reference.rate_hz < max(borders.min_s, 2.0 / reference.rate_hz):
-                self._report.short_slides += 1
-                continue
-            yield self._slide(reference, span, number)
-
-    def _spans(self) -> tuple[Stream, list[slice]]:
-        """Return the stream by which slides are cut, and its rows of each slide."""
-        borders, place = self._mapping.slides, self._place
-        reference = next(iter(self._streams.values()))
-        keys = self._text(borders.column) if borders.by == 'column' else None
-        if keys is None:
-            return reference, spans(reference.time_s, reference.rate_hz, None, borders, place)
-        clock = self._clocks.get(borders.column, '')
-        # Rows of the column and of a stream correspond where their clocks and numbers do; otherwise, as of topics of a
-        # bag, only their times can be compared.
-        same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
-        if same:
-            return same[0], spans(same[0].time_s, same[0].rate_hz, keys, borders, place)
-        times = self._times_of(borders.column, len(keys))
-        found = spans(times, estimated_rate_hz(times), keys, borders, place)
-        return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in found]
-
-    def _slide(
-        self, reference: Stream, span: slice, number: int
-    ) -> tuple[str, ExplorationState, SlideStreams, Conditions]:
-        times = reference.time_s[span]
-        begin_s, end_s = float(np.nanmin(times)), float(np.nanmax(times)) + 1.0 / reference.rate_hz
-        cut = _Cut(len(reference.samples), reference.clock, span, begin_s, end_s)
-        surface = self._label(cut)
-        session = self._value(self._mapping.session, cut, 'session') if self._mapping.session else surface
-        named = ExplorationState(0, f'{self._place}/{number}', self._mapping.motion, Phase.SLIDE, surface=surface)
-        streams = {name: self._samples(name, stream, cut) for name, stream in self._streams.items()}
-        return session, named, streams, self._conditions(cut)
-
-    def _samples(self, name: str, stream: Stream, cut: _Cut) -> tuple[Stream, Array, NDArray[np.int64]]:
-        rows = cut.rows(len(stream.samples), stream.clock, stream.time_s)
-        samples, times = stream.samples[rows], stream.time_s[rows]
-        if not len(samples):
-            raise InvalidData(
-                f"'{self._place}' has no samples of '{name}' from {cut.begin_s:g} to {cut.end_s:g} s of a slide; "
-                'look at the times of the streams'
-            )
-        steps = np.diff(times[np.isfinite(times)]) if stream.timed else np.empty(0)
-        if steps.max(initial=0.0) > LONGEST_GAP_S:
-            row = self._columns.row(rows.start + int(steps.argmax()) + 1)
-            raise InvalidData(
-                f"'{self._place}', row {row}, column '{stream.params.time.column}': time jumps by "
-                f'{steps.max():g} s within a slide; look at the unit of time and at `slides` in the mapping'
-            )
-        samples, index, counts = on_grid(samples, times if stream.timed else None, stream.rate_hz)
-        self._report.streams[name] += counts
-        return stream, samples, index
-
-    def _stream(self, name: str, params: StreamColumns) -> Stream:
-        names = self._columns.chosen[name]
-        columns = [self._columns.numbers[column] for column in names]
-        # Arrays of a file need not be of one length: those of one stream must.
-        if len({len(column) for column in columns}) > 1:
-            raise InvalidData(
-                f"'{self._place}': the columns of '{name}' have {sorted({len(c) for c in columns})} rows; put "
-                'columns of different rates into two streams'
-            )
-        if params.channels and len(params.channels) != len(names):
-            raise InvalidData(
-                f"'{self._place}': the stream '{name}' has {len(names)} columns and {len(params.channels)} names "
-                'of channels; give one for each'
-            )
-        samples = np.stack(columns, axis=1)
-        samples *= params.scale
-        time_column = params.time.column or self._clocks.get(names[0], '')
-        if not time_column:
-            rate_hz = self._rate_hz(name, params, self._columns.rate_hz)
-            time_s = np.arange(len(samples)) / rate_hz
-        else:
-            unit = params.time.unit if params.time.column else 's'
-            time_s = self._columns.numbers[time_column] * TIME_UNITS[unit]
-            rate_hz = self._rate_hz(name, params, estimated_rate_hz(time_s))
-            if len(time_s) != len(samples):
-                raise InvalidData(
-                    f"'{self._place}': column '{time_column}' has {len(time_s)} rows, '{name}' {len(samples)}"
-                )
-        channels = tuple(params.channels) or tuple(names)
-        return Stream(params, channels, samples, time_s, bool(time_column), rate_hz, self._clocks.get(names[0], ''))
-
-    def _rate_hz(self, name: str, params: StreamColumns, own: float) -> float:
-        """Return the rate of a stream: as stated, else that of the first file, from which later ones differ little."""
-        # Of the first file: windows of all are to have as many samples.
-        rate_hz = self._report.rates_hz.setdefault(name, params.rate_hz or own)
-        if not MIN_HZ <= rate_hz <= MAX_HZ:
-            raise InvalidData(
-                f"'{self._place}': the rate of '{name}' is {rate_hz:g} Hz by its times; give a column of "
-                f'time that grows and its unit, or `rate_hz`, from {MIN_HZ:g} to {MAX_HZ:g}'
-            )
-        if own and not 1 / SAME_RATE <= own / rate_hz <= SAME_RATE:
-            raise InvalidData(
-                f"'{self._place}': '{name}' has {own:g} Hz by its times, {rate_hz:g} Hz are expected; "
-                f"look at the unit of column '{params.time.column}' and at `rate_hz` in the mapping"
-            )
-        return rate_hz
-
-    def _check_rows(self) -> None:
-        """Count the rows with a bad number; InvalidData if they are too many."""
-        by_length: dict[int, AnyArray] = {}
-        for values in self._columns.numbers.values():
-            bad = by_length.setdefault(len(values), np.zeros(len(values), dtype=bool))
-            bad |= np.isnan(values)
-        for rows, bad in by_length.items():
-            count = int(bad.sum())
-            self._report.rows += rows
-            self._report.malformed_rows += count
-            if count:
-                told = [f"'{self._place}', row {row}, {reason}" for row, reason in self._columns.malformed.items()]
-                self._report.examples += told[: EXAMPLES - len(self._report.examples)]
-            if not rows or count > self._mapping.max_malformed * rows:
-                first = next((f'row {row}, {why}' for row, why in self._columns.malformed.items()), 'no row at all')
-                raise InvalidData(
-                    f"'{self._place}' has {count} malformed rows of {rows}, first {first}; "
-                    f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
-                    'and at `format` in the mapping'
-                )
-
-    def _text(self, name: str) -> AnyArray | None:
-        return None if name in self._fields else self._columns.texts[name]
-
-    def _label(self, cut: _Cut) -> str:
-        label = self._mapping.label
-        code = label.value or self._value(label.column, cut, 'label')
-        surface = checked_label(label.names.get(code, code))
-        if not surface:
-            raise InvalidData(f"'{self._place}': a slide has an empty label; name another column under `label`")
-        return surface
-
-    def _value(self, name: str, cut: _Cut, kind: str) -> str:
-        """Return the one value that a column has during a slide."""
-        texts = self._text(name)
-        if texts is None:
-            return str(self._fields[name])
-        rows = cut.rows(len(texts), self._clocks.get(name, ''), self._times_of(name, len(texts)))
-        own = texts[rows]
-        if not len(own):
-            raise InvalidData(f"'{self._place}': column '{name}' has no value during a slide; name another")
-        other = np.flatnonzero(own != own[0])
-        if len(other):
-            place = f"'{self._place}', row {self._columns.row(rows.start + int(other[0]))}, column '{name}'"
-            change = f"the {kind} changes from '{own[0]}' to '{own[other[0]]}' within a slide"
-            raise InvalidData(f"{place}: {change}; let slides end where '{name}' changes (`slides: {{by: column}}`)")
-        return str(own[0])
-
-    def _times_of(self, name: str, length: int) -> Array:
-        """Return the times of a column: of its own clock, or of the stream with as many rows."""
-        clock = self._clocks.get(name)
-        if clock:
-            return self._columns.numbers[clock]
-        for stream in self._streams.values():
-            if len(stream.samples) == length:
-                return stream.time_s
-        raise InvalidData(
-            f"'{self._place}': column '{name}' has {length} rows, as no stream has; name one of the same length"
-        )
-
-    def _conditions(self, cut: _Cut) -> list[tuple[float, float, float, float]]:
-        """Return what holds from 0 on, and every 0.1 s after if a condition changes along the slide."""
-        tracks = {name: self._track(name, cut) for name in CONDITION_UNITS}
-        changing = any(len(values) > 1 and np.ptp(values[np.isfinite(values)]) > 0 for _, values in tracks.values()
-                       if np.isfinite(values).any())  # fmt: skip
-        count = max(1, round((cut.end_s - cut.begin_s) / STATE_S)) if changing else 1
-        edges = cut.begin_s + STATE_S * np.arange(count + 1) if changing else np.array([cut.begin_s, math.inf])
-        edges[-1] = math.inf
-        means = [[_mean(*tracks[name], a, b) for name in CONDITION_UNITS] for a, b in pairwise(edges)]
-        starts = (edges[:-1] - cut.begin_s).tolist()
-        return [(start, *mean) for start, mean in zip(starts, means, strict=True)]
-
-    def _track(self, name: str, cut: _Cut) -> tuple[Array, Array]:
-        """Return times and values of a condition in SI units, (n,) each."""
-        quantity = self._mapping.conditions.get(name, Quantity())
-        factor = CONDITION_UNITS[name].get(quantity.unit, 1.0)
-        if quantity.column in self._fields or not quantity.column:
-            text = self._fields[quantity.column] if quantity.column else quantity.value or 'nan'
-            try:
-                return np.array([cut.begin_s]), np.array([float(text)]) * factor
-            except ValueError as error:
-                raise InvalidParameter(
-                    f"'{self._place}': '{quantity.column}' is '{text}' in its name; a number is needed there"
-                ) from error
-        values = self._columns.numbers[quantity.column]
-        times = self._times_of(quantity.column, len(values))
-        rows = cut.rows(len(values), self._clocks.get(quantity.column, ''), times)
-        return times[rows], values[rows] * factor
-
-
-@dataclass(frozen=True)
-class _Cut:
-    """A slide: rows of the stream by which it was cut, and its time."""
-
-    length: int
-    clock: str
-    span: slice
-    begin_s: float
-    end_s: float
-
-    def rows(self, length: int, clock: str, time_s: Array) -> slice:
-        """Return the rows of a column: the same ones if it has the same clock, else those of the time of the slide."""
-        if length == self.length and clock == self.clock:
-            return self.span
-        return _rows_between(time_s, self.begin_s, self.end_s)
-
-
-def _rows_between(time_s: Array, begin_s: float, end_s: float) -> slice:
-    inside = np.flatnonzero((time_s >= begin_s - SAME_TIME_S) & (time_s < end_s - SAME_TIME_S))
-    return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
-
-
-def _ends(time_s: Array, span: slice) -> tuple[float, float]:
-    """Return the time of the first row, and of the row after the last."""
-    if span.stop <= span.start:
-        return 0.0, 0.0
-    after = time_s[span.stop] if span.stop < len(time_s) else 2 * time_s[-1] - time_s[max(0, len(time_s) - 2)]
-    return float(time_s[span.start]), float(after)
-
-
-def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:
-    if len(values) == 1:
-        return float(values[0])
-    inside = values[(times >= begin_s) & (times < end_s) & np.isfinite(values)]
-    return float(inside.mean()) if len(inside) else math.nan

@@ -24,7 +24,6 @@ from texture_simulation.devices.fingers import (
     EmulatedBioTac,
     EmulatedDaq,
     EmulatedDevice,
-    EmulatedPapillArray,
     EmulatedPvdf,
     EmulatedTsf85,
 )
@@ -41,8 +40,6 @@ DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
     'daq': EmulatedDaq,
     'pvdf': EmulatedPvdf,
     'anyskin': EmulatedAnySkin,
-    'papillarray': EmulatedPapillArray,
-    'papillarray_pair': partial(EmulatedPapillArray, arrays=2),
 }
 
 
@@ -107,16 +104,6 @@ def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
 
 
-def feed_papillarray(arrays: int) -> Feed:
-    """Return what feeds a hub with so many arrays; it samples four times as often as it sends."""
-
-    def feed(device: Any, first: int, ticks: int) -> None:
-        numbers = np.repeat(np.arange(first, first + ticks) % 30_000, 4)
-        device.sample(np.broadcast_to(numbers[:, None, None, None], (4 * ticks, arrays, 9, 6)).astype(np.float64))
-
-    return feed
-
-
 def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
     """Return how a TSF-85 is fed."""
     imu = ('m/s²',) * 3 + ('rad/s',) * 3
@@ -132,16 +119,6 @@ def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
     """Return how a BioTac is fed."""
     units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
     return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
-
-
-def papillarray(prefix: str = '', arrays: int = 1) -> RigCase:
-    """Return how a hub of PapillArrays is fed."""
-    units: dict[str, str | tuple[str, ...]] = {
-        f'{prefix}signal': (*('N',) * 3, *('mm',) * 3) * 9,
-        f'{prefix}signal_wrench': (*('N',) * 3, *('N mm',) * 3),
-    }
-    feed = feed_papillarray(arrays)
-    return RigCase(f'{prefix}signal', 250.0, 1, feed, units, 30_000, config='{rate_hz: 250}')
 
 
 CASES: Mapping[str, RigCase] = {
@@ -160,8 +137,6 @@ CASES: Mapping[str, RigCase] = {
         'signal', 250.0, 1, feed_alike(15, np.float64), {'signal': 'µT', 'temperature': '°C'}, 30_000,
         config='{rate_hz: 250.0, temperature: true}',
     ),
-    'papillarray': papillarray(),
-    'papillarray_pair': papillarray('finger1/', 2),
 }  # fmt: skip
 
 DEADLINE_S = 30.0

@@ -13,15 +13,11 @@ from scipy import signal
 
 from texture_simulation.effects import (
     EFFECTS,
-    Drift,
     Dropouts,
     FingerSpread,
     ForceGain,
-    MainsHum,
-    MotorVibration,
     Noise,
     PatchGrowth,
-    Quantisation,
     Skids,
     Skin,
     SlideError,
@@ -53,28 +49,6 @@ def test_noise_has_the_stated_density_at_all_frequencies() -> None:
     _, density = signal.welch(made, RATE_HZ, nperseg=64)
     assert density[2:-2] == pytest.approx(2 * 20.0**2 / RATE_HZ, rel=0.1)
     assert on_signal(Noise(slow_count=3.0), np.zeros((50_000, 1)), slow=True).std() == pytest.approx(3.0, rel=0.02)
-
-
-def test_hum_is_the_mains_and_its_third_harmonic() -> None:
-    made = on_signal(MainsHum(rms_count=10.0, mains_hz=60.0), np.zeros((1000, 2)))
-    spectrum = np.abs(np.fft.rfft(made[:, 0])) * np.sqrt(2) / 1000
-    assert spectrum[60] == pytest.approx(10.0)
-    assert spectrum[180] == pytest.approx(3.0)
-    assert np.sum(spectrum > 1e-6) == 2
-    assert np.array_equal(made[:, 0], made[:, 1])
-
-
-def test_drift_spreads_with_the_root_of_time() -> None:
-    through = Drift(count_per_sqrt_s=5.0).start_signal(rng(), RATE_HZ, (2000,), 1, slow=False)
-    wandered = through(np.zeros((2000, 400, 1)))[..., 0].std(axis=0)
-    assert wandered[[99, 399]] == pytest.approx([5.0 * np.sqrt(0.1), 5.0 * np.sqrt(0.4)], rel=0.06)
-
-
-def test_quantisation_leaves_whole_steps_and_half_a_step_of_error_at_most() -> None:
-    samples = rng().normal(0, 100, (500, 1))
-    made = on_signal(Quantisation(step_count=16.0), samples)
-    assert not (made % 16.0).any()
-    assert np.abs(made - samples).max() <= 8.0
 
 
 def test_dropouts_repeat_the_last_sample_for_so_long_and_so_often() -> None:
@@ -110,18 +84,9 @@ def test_the_energy_of_a_pushed_skin_never_grows() -> None:
     skin = Skin(resonance_hz=400.0, damping=0.01).start_force(rng(), RATE_HZ, ())
     impulse = np.zeros(4000)
     impulse[0] = 1.0
-    rung = skin(along_x(0.0, 4000), impulse)
+    rung = skin(impulse)
     envelope = np.abs(rung).reshape(-1, 200).max(axis=1)
     assert (np.diff(envelope) <= 0).all()
-
-
-def test_the_motor_shakes_at_speed_times_steps_and_not_at_rest_or_in_the_air() -> None:
-    shaking = MotorVibration(rms_n=1e-3, steps_1_m=1000.0)
-    measured = shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1), np.zeros(1000))
-    assert np.abs(np.fft.rfft(measured)).argmax() == 100
-    assert measured.std() == pytest.approx(1e-3, rel=0.01)
-    assert np.ptp(shaking.start_force(rng(), RATE_HZ, ())(along_x(0.0), np.zeros(1000))) < 1e-15
-    assert not shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1, force_n=0.0), np.zeros(1000)).any()
 
 
 def test_size_and_stiffness_of_the_contact_grow_with_the_cube_root_of_the_force() -> None:

@@ -24,11 +24,11 @@ pytestmark = pytest.mark.realtime
 # A recording; a card that PortAudio opens, whose rows of the contract are in test_sound_card.py.
 WITHOUT_DEVICE = {'file', 'sound_card'}
 # Number or time their packets; others of these differ by a table alone.
-NUMBERED = ('tsf85', 'biotac', 'daq', 'pvdf', 'papillarray')
+NUMBERED = ('tsf85', 'biotac', 'daq', 'pvdf')
 FAMILIES = (*NUMBERED, 'anyskin')
-CHECKED = ('biotac', 'daq', 'pvdf', 'papillarray')  # have a checksum on the line
+CHECKED = ('biotac', 'daq', 'pvdf')  # have a checksum on the line
 # Of a slow device; the same number of faults in the time of the test.
-FAULT_RATES = {'anyskin': 2e-3, 'papillarray': 5e-4}
+FAULT_RATES = {'anyskin': 2e-3}
 Make = Callable[..., Rig]
 
 
@@ -197,7 +197,7 @@ def test_a_stall_of_the_line_delays_and_loses_nothing(make: Make, name: str) -> 
     assert max(abs(rig.lateness_s(batch)) for batch in batches[len(batches) // 2 :]) < 0.04
 
 
-@pytest.mark.parametrize('name', ['biotac', 'daq', 'papillarray', 'anyskin'])  # a TSF-85 waits for its start command
+@pytest.mark.parametrize('name', ['biotac', 'daq', 'anyskin'])  # a TSF-85 waits for its start command
 def test_after_a_brown_out_of_the_device_the_index_goes_on_with_the_time(make: Make, name: str) -> None:
     rig = make(name)
     rig.sensor.open()
@@ -221,7 +221,7 @@ def test_a_clock_that_drifts_is_followed_and_reported(make: Make, name: str) -> 
     assert rig.sensor.details['device clock slow by [ppm]'] == pytest.approx(-4000, abs=1500)
 
 
-@pytest.mark.parametrize('name', ['anyskin', 'papillarray'])
+@pytest.mark.parametrize('name', ['anyskin'])
 def test_a_device_ten_times_too_fast_is_read_in_order_and_noticed(make: Make, name: str) -> None:
     rig = make(name, pace=10.0)
     rig.sensor.open()

@@ -111,7 +111,7 @@ class SkinContact:
                 dragged_n = dragged_n * self._surface.variation.at(*np.broadcast_arrays(placed.x_m, placed.y_m))[2]
             variation_n = variation_n + (dragged_n if offset_m is None else dragged_n[..., None, :])
         for apply in self._force_filters:
-            variation_n = apply(placed, variation_n)
+            variation_n = apply(variation_n)
         return np.asarray(variation_n)
 
     def static_variation_n(self, placed: Trajectory, blur_m: float, offset_m: tuple[Array, Array]) -> Array:

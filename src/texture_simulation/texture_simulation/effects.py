@@ -29,7 +29,7 @@ from texture_simulation.path import Filter, Trajectory, interpolated_field
 
 BatchShape = tuple[int, ...]  # () for one slide, (count,) for many at once
 TrajectoryFilter = Callable[[Trajectory], Trajectory]
-ForceFilter = Callable[[Trajectory, Array], Array]
+ForceFilter = Callable[[Array], Array]
 SignalFilter = Callable[[Samples], Samples]
 
 
@@ -94,49 +94,10 @@ class FingerSpread:
         return self.factors(finger)[0]
 
     def factors(self, finger: int) -> tuple[float, float, float]:
-        """Return the factors of a finger: of its sensitivity, of the thickness of its skin, and of its noise.
-
-        Parameters
-        ----------
-        finger
-            Which individual of the sensor.
-        """
+        """Return the factors of a finger: of its sensitivity, of the thickness of its skin, and of its noise."""
         drawn = np.random.default_rng([SALT, finger]).standard_normal(3)
         gain, thicker, noisier = np.exp(np.array([self.relative, self.skin, self.noise]) * drawn)
         return float(gain), float(thicker), float(noisier)
-
-
-# --------------------
-# What warms up wanders.
-
-
-@dataclass(frozen=True)
-class Drift:
-    """Each channel wanders at random (a Wiener process)."""
-
-    count_per_sqrt_s: float = param(
-        20.0,
-        'Standard deviation of the random walk after one second; larger values drift faster.',
-        unit='count',
-        low=0.0,
-    )
-
-    def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
-    ) -> SignalFilter:
-        """Return what adds the drift."""
-        at = np.zeros((*batch_shape, 1, channels))
-        step = self.count_per_sqrt_s / np.sqrt(rate_hz)
-
-        def add(samples: Samples) -> Samples:
-            nonlocal at
-            if not samples.shape[-2]:
-                return samples
-            wandered = at + np.cumsum(step * rng.standard_normal(samples.shape), axis=-2)
-            at = wandered[..., -1:, :]
-            return np.asarray(samples + wandered)
-
-        return add
 
 
 # --------------------
@@ -184,82 +145,6 @@ class Dropouts:
 
 
 # --------------------
-# What cables pick up from the mains.
-
-THIRD = 0.3  # of the fundamental; rectifiers draw odd harmonics
-
-
-@dataclass(frozen=True)
-class MainsHum:
-    """A sine of the mains' frequency, and its third harmonic, on all channels alike."""
-
-    rms_count: float = param(
-        20.0, 'Root mean square of the fundamental; larger values give more hum.', unit='count', low=0.0
-    )
-    mains_hz: float = param(50.0, 'Frequency of the mains, 50 or 60 Hz.', unit='Hz', low=40.0, high=70.0)
-
-    def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
-    ) -> SignalFilter:
-        """Return what adds the hum; its phase is another in each slide."""
-        phase = rng.uniform(0, 2 * np.pi, (*batch_shape, 1))
-        turn, done = 2 * np.pi * self.mains_hz / rate_hz, 0
-
-        def add(samples: Samples) -> Samples:
-            nonlocal done
-            angle = phase + turn * (done + np.arange(samples.shape[-2]))
-            done += samples.shape[-2]
-            hum = np.sqrt(2) * self.rms_count * (np.sin(angle) + THIRD * np.sin(3 * angle))
-            return np.asarray(samples + hum[..., None])
-
-        return add
-
-
-# --------------------
-# The motor shakes the finger.
-
-
-@dataclass(frozen=True)
-class MotorVibration:
-    """A ripple of the force with each step of the motor: its frequency is speed · steps; none in the air or at rest."""
-
-    rms_n: float = param(
-        2e-3,
-        'Root mean square of the force ripple; larger values vibrate more.',
-        unit='N',
-        low=0.0,
-        high=1.0,
-    )
-    steps_1_m: float = param(
-        1000.0,
-        'Motor steps per metre of travel; the ripple has speed times this frequency.',
-        unit='1/m',
-        low=1.0,
-        high=1e5,
-    )
-
-    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
-        """Return what adds the ripple."""
-        travelled_m = rng.uniform(0, 1 / self.steps_1_m, (*batch_shape, 1))
-        last: tuple[Array, Array] | None = None
-
-        def add(path: Trajectory, variation_n: Array) -> Array:
-            nonlocal travelled_m, last
-            if not len(path):
-                return variation_n
-            x_m, y_m = last or (path.x_m[..., :1], path.y_m[..., :1])
-            last = path.x_m[..., -1:], path.y_m[..., -1:]
-            travelled_m = travelled_m[..., -1:] + np.cumsum(
-                np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)), axis=-1
-            )
-            ripple = np.sqrt(2) * self.rms_n * np.sin(2 * np.pi * self.steps_1_m * travelled_m) * (path.force_n > 0)
-            # All elements of a finger with several shake alike: they have an axis more than the path.
-            return variation_n + (ripple if variation_n.ndim == ripple.ndim else ripple[..., None, :])
-
-        return add
-
-
-# --------------------
 # The electronics' own noise.
 
 
@@ -281,26 +166,6 @@ class Noise:
             return samples + spread * rng.standard_normal(samples.shape, dtype=np.float32)
 
         return add
-
-
-# --------------------
-# A converter of fewer bits than its numbers have.
-
-
-@dataclass(frozen=True)
-class Quantisation:
-    """Samples come in steps of several counts; steps of one count are always there."""
-
-    step_count: float = param(16.0, 'Quantisation step; a larger step is coarser.', unit='count', low=1.0)
-
-    def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
-    ) -> SignalFilter:
-        """Return what rounds the samples."""
-        return self._round
-
-    def _round(self, samples: Samples) -> Samples:
-        return self.step_count * np.rint(samples / self.step_count)
 
 
 # --------------------
@@ -385,26 +250,10 @@ class Skin:
 
     def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
         """Return what filters the variation."""
-        skin = Filter(self.sections(rate_hz))
-
-        def through(path: Trajectory, variation_n: Array) -> Array:
-            return skin(variation_n)
-
-        return through
+        return Filter(self.sections(rate_hz))
 
     def sections(self, rate_hz: float) -> Array:
-        """Return the filter, (1, 6).
-
-        Parameters
-        ----------
-        rate_hz
-            Sampling rate.
-
-        Returns
-        -------
-        (1, 6)
-            Second-order section as scipy.signal.sosfilt takes it.
-        """
+        """Return the filter at a sampling rate: a second-order section (1, 6) as scipy.signal.sosfilt takes it."""
         k = math.tan(math.pi * self.resonance_hz / rate_hz)
         scale = 1 + 2 * self.damping * k + k * k
         ahead = [k * k / scale, 2 * k * k / scale, k * k / scale]
@@ -468,11 +317,7 @@ EFFECTS: Mapping[str, type] = {
     'force_gain': ForceGain,  # a harder pressed finger senses textures more
     'unevenness': Unevenness,  # no sample is everywhere the same
     'finger_spread': FingerSpread,  # no finger is as sensitive as another
-    'motor_vibration': MotorVibration,  # a ripple of the force with the way
     'skin': Skin,  # resonance of mass, spring and damper
     'noise': Noise,  # of the electronics
-    'mains_hum': MainsHum,  # 50 or 60 Hz
-    'drift': Drift,  # a baseline that wanders
     'dropouts': Dropouts,  # moments in which the signal stands still
-    'quantisation': Quantisation,  # steps of several counts
 }

@@ -143,13 +143,6 @@ def live_anyskin(scene: Scene, surface: Surface, link: Path, rng: np.random.Gene
     return LiveSensor(model, device, device.sample, device.skip, pace)
 
 
-def live_papillarray(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
-    """Return a PapillArray alone on its hub."""
-    model, device = models.PapillArrayModel(scene, surface, rng), fingers.EmulatedPapillArray(link, rng)
-    pace = models.PAPILLARRAY_PATH_RATE_HZ, 1
-    return LiveSensor(model, device, lambda pillars: device.sample(pillars[:, None]), device.skip, pace)
-
-
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': partial(live_tsf85, layout='tsf85'),
     'tsf85_pair': live_tsf85_pair,
@@ -159,7 +152,6 @@ LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'daq': live_daq,
     'pvdf': live_pvdf,
     'anyskin': live_anyskin,
-    'papillarray': live_papillarray,
 }
 
 

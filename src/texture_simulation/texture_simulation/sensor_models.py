@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import signal as filters
 
 from texture_core.types import Array, Samples
-from texture_drivers import anyskin, biotac, daq, papillarray, pvdf, tsf85
+from texture_drivers import anyskin, biotac, daq, pvdf, tsf85
 from texture_drivers.biotac import FULL_SCALE, PAC, SLOT_RATE_HZ, BioTacLayout
 from texture_drivers.biotac import LAYOUTS as BIOTACS
 from texture_drivers.tsf85 import LAYOUTS as TSF85S
@@ -442,60 +442,6 @@ ANYSKIN_KIND = SensorKind(
 
 
 # --------------------
-# What a PapillArray measures while it goes along a path: force and displacement of its nine pillars.
-#
-# The stiffness and the bandwidth of the pillars are ours, and so is how the force spreads over them.
-
-PAPILLARRAY_PATH_RATE_HZ = 1000.0  # of the device, too
-PAPILLARRAY_RATE_HZ = 500.0
-PAPILLARRAY_OVERSAMPLING = 2
-PITCH_M = 5e-3
-PAPILLARRAY_PLACES_M = tuple((PITCH_M * column, PITCH_M * row) for row in (-1, 0, 1) for column in (-1, 0, 1))
-PAPILLARRAY_BLUR_M = 3e-4
-PAPILLARRAY_BAND = filters.butter(4, 200.0, 'lowpass', fs=PAPILLARRAY_PATH_RATE_HZ, output='sos')
-STIFFNESS_N_MM = 1.5
-N_PER_COUNT = 1e-5
-PAPILLARRAY_LIMITS = (-2_000_000, 2_000_000)  # ±20 N
-COUNTS_PER_EFFECT = 100.0  # one count of the effects is 1 mN
-PAPILLARRAY_CHANNELS = papillarray.pillar_channels(len(PAPILLARRAY_PLACES_M))
-
-
-class PapillArrayModel(SensorModel):
-    """Turn a path, block by block, into forces and displacements; see `SensorModel` for the arguments."""
-
-    PATH_RATE_HZ = PAPILLARRAY_PATH_RATE_HZ
-
-    def __init__(self, *touched: Any, **individual: Any) -> None:
-        super().__init__(*touched, **individual)
-        self._elements = PressedElements(PAPILLARRAY_PLACES_M, PAPILLARRAY_BLUR_M, self.PATH_RATE_HZ, self._finger)
-        self._band = self._filter(PAPILLARRAY_BAND)
-        axes = 3 * len(PAPILLARRAY_PLACES_M)
-        self._counts = self._converter(self.PATH_RATE_HZ, axes, PAPILLARRAY_LIMITS, scale=COUNTS_PER_EFFECT)
-
-    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return forces (N) and displacements (mm) of the pillars, (..., n_samples, 54)."""
-        measured = self.advance(path)[..., PAPILLARRAY_OVERSAMPLING - 1 :: PAPILLARRAY_OVERSAMPLING, :, :]
-        return {papillarray.SIGNAL: measured.reshape(*measured.shape[:-2], -1)}
-
-    def advance(self, path: Trajectory) -> Array:
-        """Return what is measured along the next piece of path."""
-        forces_n = self._band(self._elements.forces_n(self.touch, path))
-        measured_n = N_PER_COUNT * self._counts.exact(as_samples(forces_n) / N_PER_COUNT)
-        measured_n = measured_n.reshape(*measured_n.shape[:-1], len(PAPILLARRAY_PLACES_M), 3)
-        return np.concatenate([measured_n, measured_n / STIFFNESS_N_MM], axis=-1)
-
-
-PAPILLARRAY_KIND = SensorKind(
-    make=PapillArrayModel,
-    path_rate_hz=PAPILLARRAY_PATH_RATE_HZ,
-    step_points=PAPILLARRAY_OVERSAMPLING,
-    streams=(
-        SimulatedStream(papillarray.SIGNAL, papillarray.PILLARS_SENSOR, PAPILLARRAY_CHANNELS, '', PAPILLARRAY_RATE_HZ),
-    ),
-)
-
-
-# --------------------
 # What the PVDF finger of Hu et al. 2014 measures while it goes along a path.
 #
 # The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses the
@@ -673,7 +619,6 @@ SENSORS: Mapping[str, SensorKind] = {
     'biotac': biotac_kind(BIOTACS['biotac']),  # PAC at 2.2 kHz, 19 electrodes, pressure, temperature at 100 Hz
     'pvdf': PVDF_KIND,  # film at 4096 Hz with leaking charge, force at 64 Hz
     'anyskin': ANYSKIN_KIND,  # field at 5 magnetometers, 100 Hz
-    'papillarray': PAPILLARRAY_KIND,  # force and displacement of 9 pillars, 500 Hz
 }
 
 

@@ -375,6 +375,7 @@ def _work(
 ARM = {
     'arm': 'ros_controllers',
     'accept_no_timeout': True,
+    'accept_shared_group': True,
     'watch_signal': False,
     'connect_timeout_s': 10.0,
     # Patient with a busy machine; what comes 0.5 s late is too late all the same.
@@ -385,7 +386,7 @@ ARM = {
 }
 CONTROLLER = {'start_height_m': 0.004, 'command_timeout_s': 0.0}  # it holds the last velocity for ever
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=3.0, distance_m=0.06)
-GUARD = 'texture_exploration.ros.controllers'
+GUARD = 'texture_exploration.ros.guard'
 SETTLED_S = 1.0
 OTHER_M_S, OTHER_PERIOD_S = 0.01, 0.02  # what the other commander wants, along the surface, and how often
 

@@ -315,6 +315,7 @@ async function ask(name, body) {
 
 async function loadMotions() {
   const motions = await (await fetch('api/motions')).json();
+  if (!Object.keys(motions).length) return void window.setTimeout(loadMotions, RETRY_MS); // no explorer yet
   const chosen = at('motion').value;
   at('motion').replaceChildren(...Object.keys(motions).map((name) => element('option', name)));
   at('motion').value = chosen in motions ? chosen : Object.keys(motions)[0];

@@ -5,20 +5,21 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from texture_bringup.nodes.collector import collect_surface, recorder
 from texture_bringup.operator import ExplorationResult, Operator
-from texture_core.cli import Command, add_namespace, add_parameters, parameters_from
+from texture_core.cli import USER_ERROR, Command, add_namespace, add_parameters, parameters_from
 from texture_core.config import find
 from texture_core.errors import CollectionError, InvalidParameter, MotionAborted, MotionRefused
 from texture_core.types import (
@@ -33,6 +34,7 @@ from texture_estimation.next_motion import slide_values
 from texture_evaluation.check import adapt_to_today, check_finger, store_reference
 from texture_evaluation.collection import CollectionParams
 from texture_exploration.motions import MOTIONS
+from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
 from texture_recordings.dataset import SlideDataset
 
@@ -51,7 +53,9 @@ TIMEOUT_S = 300.0
 
 
 def _configure_explore(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument('motion', help=f'how to move: {", ".join(MOTIONS)}')
+    parser.add_argument('motion', nargs='?', default='', help=f'how to move: {", ".join(MOTIONS)}')
+    parser.add_argument('--preset', metavar='NAME', help='make all motions of a preset instead, such as ets-linear')
+    parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
     for option, _, unit, meaning in NUMBERS:
         shown = f'{meaning}, {unit}' if unit else meaning
         parser.add_argument(f'--{option}', type=float, default=0.0, help=f'{shown}; 0: the default of the motion')
@@ -85,18 +89,61 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
 
 
 def _explore(options: argparse.Namespace) -> int:
-    """Explore once in each direction; after the first without success say how to go on, and return 1."""
-    requests, made = requests_of(options), 0
+    """Explore once in each direction, until one has no success; return the worst end, see `exit_code`."""
+    requests, made, code = requests_of(options), 0, 0
     try:
         with Operator(options.namespace) as operator:
             operator.wait_for_explorer(deadline_s=10.0)
-            while made < len(requests) and tell(explored(operator, requests[made])):
+            while made < len(requests):
+                result = explored(operator, requests[made])
+                code = max(code, exit_code(result))
+                if options.json:
+                    print(json.dumps(as_json(result)), flush=True)
+                else:
+                    tell(result)
+                if not result.success:
+                    break
                 made += 1
     finally:
-        if made < len(requests) > 1:
+        if made < len(requests) > 1 and not options.preset:
             left = ' '.join(f'{degrees:g}' for degrees in options.direction[made:])
             print(f'{made} of {len(requests)} slides were made; go on with --direction {left}', file=sys.stderr)
-    return int(made < len(requests))
+    return code
+
+
+ACCEPTED, REJECTED, ABORTED = 0, 3, 4  # 1 is for a fault of a program, 2 for a mistake of its user
+
+
+def exit_code(result: ExplorationResult) -> int:
+    """Return what `explore` ends with: a label that may be used, none, an abort, or a refused request."""
+    if not result.exploration_id:
+        return USER_ERROR
+    if not result.success:
+        return ABORTED
+    return ACCEPTED if result.texture.known else REJECTED
+
+
+OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER_ERROR: 'refused'}
+
+
+def as_json(result: ExplorationResult) -> dict[str, Any]:
+    """Return a result as JSON carries it: numbers that are not known are null."""
+    values = {
+        'outcome': OUTCOMES[exit_code(result)],
+        'error': result.error.name.lower(),
+        'message': result.message,
+        'exploration_id': result.exploration_id,
+        'texture': {**asdict(result.texture), 'rejection': result.texture.rejection.name.lower()},
+        'roughness': asdict(result.roughness),
+    }
+    return cast(dict[str, Any], finite(values))
+
+
+def finite(value: Any) -> Any:
+    """Return a tree of dictionaries with None for each number that is not finite."""
+    if isinstance(value, dict):
+        return {name: finite(one) for name, one in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def explored(operator: Operator, request: ExplorationRequest) -> ExplorationResult:
@@ -131,6 +178,10 @@ def tell(explored: ExplorationResult) -> bool:
 
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     """Return the requests that the options stand for, one for each direction."""
+    if bool(options.motion) == bool(options.preset):
+        raise InvalidParameter('give the motion, such as linear_slide, or --preset NAME')
+    if options.preset:
+        return [replace(one, surface=options.surface) for one in load_preset(options.preset).all(0)]
     find(MOTIONS, options.motion, 'motion')  # said before an explorer is waited for
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     x_m, y_m = options.start or (0.0, 0.0)

@@ -206,7 +206,7 @@ class Collector(Node):
             result.error_code, result.message = CollectionError.CANCELLED, str(error)
         else:
             result.error_code, result.message, result.bag = end.error, end.message, str(bag or '')
-            result.slides, result.places, result.right = end.slides, end.accuracy.places, end.accuracy.right
+            result.slides, result.places, result.right = end.slides, end.accuracy.places, end.accuracy.correct
         finally:
             self._busy.release()
         self.get_logger().info(f'collect: {result.message}')

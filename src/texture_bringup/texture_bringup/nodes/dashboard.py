@@ -6,11 +6,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import signal
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -24,31 +25,25 @@ from rclpy.parameter_client import AsyncParameterClient
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
-from texture_bringup.dashboard import FRAME_PERIOD_S, Access, Feed, Recorder, Serving, make_app, offered
-from texture_bringup.operator import GONE_S, RESTARTED, VANISHED, answer_of, ready
+from texture_bringup.dashboard import Access, Recorder, Serving, make_app
+from texture_bringup.feed import FRAME_PERIOD_S, Feed
+from texture_bringup.operator import GONE_S, RESTARTED, VANISHED, answer_of, note_diagnostics, ready, subscribe
 from texture_core.config import folder, from_mapping, param
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.ros import (
-    ESTIMATE_QOS,
-    LEVELS,
-    SENSOR_QOS,
     STATE_QOS,
     DiagnosticReport,
     Diagnostics,
     declare,
-    from_msg,
-    has_ended,
     quality_of_service,
     run,
     to_msg,
 )
-from texture_core.types import ExplorationRequest, ExplorationState, checked_label
-from texture_exploration.safety import SafetyLimits
+from texture_core.types import ExplorationRequest, checked_label
 
 ANSWER_DEADLINE_S = 30.0
 RETRY_PERIOD_S = 2.0
 MAX_CHARACTERS = 200
-LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 
 
 @dataclass(frozen=True)
@@ -71,6 +66,7 @@ class DashboardNode(Node):
         super().__init__('dashboard')
         params = declare(self, DashboardParams)
         self._feed = Feed()
+        self._info = msg.ExplorerInfo()
         self._bad = 0
         self._heard_s = 0.0  # of the explorer
         self._recordings = Path(params.recordings).expanduser()
@@ -164,16 +160,12 @@ class DashboardNode(Node):
         return {'success': True, 'message': message}
 
     async def offered(self) -> Mapping[str, Any]:
-        """Return the motions with their numbers, within the limits of the running explorer."""
-        names = [item.name for item in fields(SafetyLimits)]
-        if not self._limits.services_are_ready():
-            return offered(SafetyLimits())
-        try:
-            answer = await answer_of(self._limits.get_parameters(names), RETRY_PERIOD_S)
-        except LaunchFailed:
-            return offered(SafetyLimits())
-        values = {name: value.double_value for name, value in zip(names, answer.values, strict=True)}
-        return offered(SafetyLimits(**values))
+        """Return the motions of the running explorer with their numbers; none while there is no explorer."""
+        motions: dict[str, list[dict[str, Any]]] = {name: [] for name in self._info.motions}
+        for one in self._info.numbers:
+            number = {'name': one.field, 'default': one.default_value, 'low': one.low, 'high': one.high}
+            motions[one.motion].append({**number, 'unit': one.unit})
+        return motions
 
     # ROS
 
@@ -184,46 +176,27 @@ class DashboardNode(Node):
         self._undo = self.create_client(Trigger, 'classifier/remove_last_added')
         self._tare = self.create_client(Trigger, 'sensor/tare')
         self._recover = self.create_client(Trigger, 'explorer/recover')
-        self._limits = AsyncParameterClient(self, 'explorer')
         self._model = AsyncParameterClient(self, 'classifier')
 
     def _subscribe(self) -> None:
-        feed = self._feed
-        for kind, topic, take, qos in (
-            (msg.TactileSignal, 'signal', feed.on_signal, SENSOR_QOS),
-            (msg.TactileSignal, 'signal_static', feed.on_static, SENSOR_QOS),
-            (msg.ExplorationState, 'exploration', self._on_state, STATE_QOS),
-            (msg.TextureEstimate, 'texture', feed.on_texture, ESTIMATE_QOS),
-            (msg.RoughnessEstimate, 'roughness', feed.on_roughness, ESTIMATE_QOS),
-            (msg.ModelInfo, 'model_info', feed.on_model, quality_of_service('model_info')),
-        ):
-            self.create_subscription(kind, topic, partial(self._on_message, take), qos)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
+        subscribe(self, self._feed, self._on_bad)
+        self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS, raw=True)
+        qos = quality_of_service('explorer_info')
+        self.create_subscription(msg.ExplorerInfo, 'explorer_info', partial(setattr, self, '_info'), qos)
+        self.create_subscription(DiagnosticArray, '/diagnostics', partial(note_diagnostics, self, self._feed), 100)
 
-    def _on_message(self, take: Any, message: Any) -> None:
-        try:
-            take(from_msg(message))
-        except InvalidData as error:
-            self._bad += 1
-            self.get_logger().warning(f'left out: {error}', throttle_duration_sec=10.0)
+    def _on_bad(self, error: InvalidData) -> None:
+        self._bad += 1
+        self.get_logger().warning(f'left out: {error}', throttle_duration_sec=10.0)
 
-    def _on_state(self, state: ExplorationState) -> None:
+    def _on_state(self, _data: bytes) -> None:
         self._heard_s = time.monotonic()
-        self._feed.on_state(state)
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        ours = self.get_namespace().rstrip('/') + '/'
-        for status in message.status:
-            if status.name.startswith(ours):
-                level = LEVEL_NAMES.get(status.level, 'ERROR')
-                name = status.name.removeprefix(ours)
-                self._feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
 
     def _show(self) -> None:
         self._recorder.watch()
         self._feed.recording = self._recorder.bag
         if self._serving.watched:
-            self._serving.show(self._feed.frame(time.monotonic()))
+            self._serving.show(json.dumps(self._feed.frame(time.monotonic()), allow_nan=False))
 
     def _report(self) -> DiagnosticReport:
         fault = self._recorder.fault

@@ -20,7 +20,7 @@ from std_msgs.msg import ColorRGBA, Header
 from texture_msgs import msg
 from visualization_msgs.msg import Marker
 
-from texture_bringup.dashboard import places_of
+from texture_bringup.feed import places_of
 from texture_core.config import param
 from texture_core.errors import TextureError
 from texture_core.ros import SENSOR_QOS, STATE_QOS, DiagnosticReport, Diagnostics, declare, from_msg, run, to_stamp

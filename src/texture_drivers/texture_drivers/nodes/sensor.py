@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from sensor_msgs.msg import Imu
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
@@ -27,13 +29,17 @@ from texture_core.ros import (
     read,
     run,
     to_msg,
+    to_stamp,
 )
-from texture_core.types import Sensor, TactileSignal
+from texture_core.types import NANOSECONDS, Sensor, TactileSignal
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.health import ChannelWatch, SensorHealth, TareParams
 from texture_drivers.sensor import SensorParams, SensorReader
 
 TARE_POLL_S, TARE_LATE_S = 0.02, 5.0  # how often a tare is looked at, and how much longer it may take with a bias
+
+# A signal of this name is published as sensor_msgs/Imu too, on imu/data_raw as REP-145 has it, while anyone listens.
+IMU_SIGNAL = 'signal_imu'
 
 # Phases of an exploration in which nothing touches the finger; after an abort it may still.
 UNLOADED = frozenset(
@@ -61,6 +67,7 @@ class SensorNode(PatientLifecycleNode):
         self._reader: SensorReader | None = None
         self._topics: dict[str, Any] = {}
         self._baselines: dict[str, Any] = {}
+        self._imus: dict[str, Any] = {}
         self.create_service(Trigger, '~/tare', self._on_tare, callback_group=ReentrantCallbackGroup())
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_exploration, STATE_QOS)
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
@@ -84,6 +91,11 @@ class SensorNode(PatientLifecycleNode):
         }
         self._baselines = {
             topic: self.create_publisher(msg.TactileSignal, f'{topic}_baseline', STATE_QOS) for topic in self._topics
+        }
+        self._imus = {
+            topic: self.create_publisher(Imu, f'{topic.removesuffix(IMU_SIGNAL)}imu/data_raw', SENSOR_QOS)
+            for topic in self._topics
+            if topic.endswith(IMU_SIGNAL)
         }
         self._tare_s = params.tare_s
         self._watch = ChannelWatch(params, list(self._topics), getattr(sensor, 'limits', {}))
@@ -124,13 +136,17 @@ class SensorNode(PatientLifecycleNode):
         return find(SENSORS, params.sensor, 'sensor')(params, lambda: self.get_clock().now().nanoseconds)
 
     def _destroy_publishers(self) -> None:
-        for publisher in (*self._topics.values(), *self._baselines.values()):
+        for publisher in (*self._topics.values(), *self._baselines.values(), *self._imus.values()):
             self.destroy_publisher(publisher)
-        self._topics, self._baselines = {}, {}
+        self._topics, self._baselines, self._imus = {}, {}, {}
 
     def _publish(self, topic: str, batch: TactileSignal) -> None:
         published, baseline = self._watch.add(topic, batch)
-        self._topics[topic].publish(self._message(topic, published))
+        message = self._message(topic, published)
+        self._topics[topic].publish(message)
+        if topic in self._imus and self._imus[topic].get_subscription_count():
+            for imu in imu_messages(message, published):
+                self._imus[topic].publish(imu)
         if baseline is not None:
             self._baselines[topic].publish(self._message(topic, baseline.as_signal()))
             self.get_logger().info(f"'{topic}' is tared")
@@ -185,6 +201,18 @@ class SensorNode(PatientLifecycleNode):
             self._start_tare()
         self._diagnostics.hardware_id = self._health.details.get('serial number', self._device)
         return self._health.report(time.monotonic())
+
+
+def imu_messages(message: msg.TactileSignal, signal: TactileSignal) -> Iterator[Imu]:
+    """Yield a sensor_msgs/Imu for each sample of an inertial unit: no orientation, covariances unknown (REP-145)."""
+    for number, row in enumerate(signal.samples[:, :6].tolist()):
+        imu = Imu()
+        imu.header.frame_id = message.header.frame_id
+        imu.header.stamp = to_stamp(signal.stamp_ns + round(number / signal.sampling_rate_hz * NANOSECONDS))
+        imu.orientation_covariance[0] = -1.0
+        imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z = row[:3]
+        imu.angular_velocity.x, imu.angular_velocity.y, imu.angular_velocity.z = row[3:]
+        yield imu
 
 
 def main() -> None:

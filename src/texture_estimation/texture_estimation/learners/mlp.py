@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The networks of our recipes: training with augmented copies, plain-array predictors, onset network."""
+"""The networks of our recipes: training with augmented copies, plain-array predictor."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.types import Array
-from texture_estimation.learners.discriminant import linear_discriminant
-from texture_estimation.learners.learner import UNBOUND, Codes, Fitted, chunks, column_of, fit_in_folds
+from texture_estimation.learners.learner import Codes, Fitted, chunks, fit_in_folds
 from texture_features.augmentation import Augmentation
-from texture_features.features.temporal import SLIDE_ONSET
 
 # --------------------
 # Augmented training examples of a learner: copies of slides, gains and slide jitter, drawn batch by batch.
@@ -163,8 +161,8 @@ HIDDEN_LAYER, OUTPUT_LAYER = 0, 2  # of the weights; their offsets follow them
 # Of one network, steps times features and labels: larger trainings make fewer passes, so that they end within minutes.
 # The shipped recipes come to 3 to 5 millions with 20 textures of 40 slides.
 MAX_WORK = 10e6
-# Parameters of which the scores are linear functions; the last two are those of a learner with a layer for the onset.
-TEMPERED = ('output', 'output_offset', 'onset', 'onset_offset')
+# Parameters of which the scores are linear functions.
+TEMPERED = ('output', 'output_offset')
 
 
 @dataclass(frozen=True)
@@ -390,108 +388,3 @@ class MlpTraining:
         np.multiply(means, pace, out=change)
         change /= spread
         weights -= change
-
-
-# --------------------
-# Predict with a fitted multi-layer perceptron and a linear discriminant for first windows.
-
-
-class OnsetMlpPredictor(MlpPredictor):
-    """The layers of the network, and one that is added to its scores for first windows."""
-
-    def __init__(self, parameters: Mapping[str, Any]) -> None:
-        super().__init__(parameters)
-        self._onset = np.asarray(parameters['onset'], dtype=np.float64, order='F')
-        self._onset_offset = np.asarray(parameters['onset_offset'], dtype=np.float64)
-        self._column = int(parameters['onset_column'])
-
-    def __call__(self, X: Array) -> Array:
-        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores, first = super().__call__(X), X[..., self._column, None]
-        if first.any():
-            scores += first * (X @ self._onset + self._onset_offset)
-        return scores
-
-
-# --------------------
-# Multilayer perceptron with a linear discriminant for the first window of a slide.
-
-
-@dataclass(frozen=True)
-class OnsetMlp(Mlp):
-    """The network `mlp` for all windows; the first of a slide is also judged by linear discriminant analysis.
-
-    While friction, contact and sensor settle, features have other means and another covariance than later: a classifier
-    of all windows knows little of it. First windows therefore have class-conditional Gaussians of their own, with one
-    covariance that is shrunk towards its diagonal, as there is one example a slide. Their log-probabilities are added
-    to those of the network. The feature `slide_onset` says which windows these are; the network does not see it.
-    Without this feature there is the network alone.
-
-    Source: Fisher 1936; Friedman 1989 for the shrinkage.
-
-    Examples
-    --------
-    >>> codes, slides = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
-    >>> X = np.stack([codes + 0.1 * np.random.default_rng(0).standard_normal(40), np.arange(40) % 5 == 0], axis=1)
-    >>> learner = OnsetMlp(epochs=1).of_examples(['signal/mean/pac', 'signal/slide_onset'], ['cork', 'felt'])
-    >>> predictor = learner.predictor(learner.fit(X, codes, slides).parameters)
-    >>> predictor(np.array([[0.0, 1.0], [1.0, 1.0]])).argmax(axis=1).tolist()
-    [0, 1]
-    """
-
-    onset_weight: float = param(
-        1.0,
-        'Weight of the discriminant of the first window, relative to the network; a larger one lets the first '
-        'window count more in the whole slide.',
-        low=0.0,
-        high=100.0,
-    )
-    shrinkage: float = param(
-        0.3,
-        'How far the correlations within classes are shrunk towards 0; more needs fewer slides and separates '
-        'less finely.',
-        low=0.0,
-        high=1.0,
-    )
-    column: int = param(
-        UNBOUND, 'Number of the feature `slide_onset`; set by the training from the names of the features.', low=UNBOUND
-    )
-
-    def of_examples(self, names: Sequence[str], _labels: Sequence[str]) -> OnsetMlp:
-        """Return the learner for examples with these features; without `slide_onset` it is the network alone."""
-        return dataclasses.replace(self, column=column_of(names, SLIDE_ONSET))
-
-    @staticmethod
-    def predictor(parameters: Mapping[str, Any]) -> OnsetMlpPredictor:
-        """Return the predictor made from the stored parameters."""
-        return OnsetMlpPredictor(parameters)
-
-    def _fit(
-        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
-    ) -> dict[str, Array]:
-        """Return the layers of the network and that of the onset."""
-        blind = X.copy()
-        first: Codes = np.zeros(0, dtype=np.intp)
-        if self.column != UNBOUND:
-            first = np.flatnonzero(X[:, self.column] > 0.0)
-            blind[:, self.column] = 0.0  # what is constant tells nothing
-        network = super()._fit(blind, y, n_labels, augmented, share)
-        values, codes = X[first].astype(np.float64), y[first]
-        if augmented is not None and len(first):
-            values, codes = self._with_copies(values, codes, augmented)
-        onset, offset = linear_discriminant(values, codes, n_labels, self.shrinkage)
-        return {
-            **network,
-            'onset': self.onset_weight * onset,
-            'onset_offset': self.onset_weight * offset,
-            'onset_column': np.array(self.column),
-        }
-
-    def _with_copies(self, values: Array, codes: Codes, augmented: AugmentedExamples) -> tuple[Array, Codes]:
-        """Return the first windows with those of changed copies, and all of them at both ends of the range of gains."""
-        rows = np.unique(augmented.rows)
-        rows = rows[augmented.values[rows, self.column] > 0.0]
-        every = np.concatenate([values, augmented.values[rows].astype(np.float64)])
-        labels = np.concatenate([codes, augmented.codes[rows]])
-        louder = np.log(augmented.augmentation.gain_range) / np.sqrt(3.0) * augmented.gain_response
-        return np.concatenate([every + louder, every - louder]), np.concatenate([labels, labels])

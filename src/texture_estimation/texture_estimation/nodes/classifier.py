@@ -123,6 +123,13 @@ class EstimatorNode(Node):
             **faults,
             'processing_s': self._processing_s,
         }
+        if (publishers := self.count_publishers(self.estimate[1])) > 1:
+            topic = self.resolve_topic_name(self.estimate[1])
+            return (
+                'WARN',
+                f"{publishers} nodes publish on '{topic}'; end all but one, or give each a namespace",
+                numbers,
+            )
         if model is None:
             return 'WARN', self.no_model, numbers
         count = sum(faults.values())

@@ -101,7 +101,7 @@ def _cross_validate(options: argparse.Namespace) -> int:
         setting = {'split': split.name, 'seed': options.seed, 'bags': bags, 'slides': options.slides or 'all'}
         write_json({**setting, **(figures[0] if len(figures) == 1 else several)}, options.json)
     if options.chart:
-        title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}, {results[0].border}'
+        title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}, {results[0].shift}'
         print(comparison_chart(results, title, options.chart))
     return 0
 

@@ -55,6 +55,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *(f'this fraction is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
+        *_unfit(model),
         *_uneven(model.acceptance.domain.slides),
         *training.get('tare', []),
         *filter(
@@ -63,6 +64,26 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]
+
+
+def _unfit(model: TextureModel) -> list[str]:
+    """Return warnings that the recipe does not fit the data: no better than chance, or more windows than samples."""
+    training, labels = model.training, len(model.labels)
+    warnings = []
+    chance = 1.0 / max(labels, 1)
+    margin = 1.64 * (chance * (1.0 - chance) / max(training['slides'], 1)) ** 0.5
+    accuracy = training['held_out_window_accuracy']
+    if accuracy is not None and labels > 1 and accuracy <= chance + margin:
+        warnings.append(
+            f'warning: {100 * accuracy:.1f} % of the held-out windows is not above chance, {100 * chance:.1f} % of '
+            f'{labels} surfaces; use a recipe for this sensor and rate, or look at the labels'
+        )
+    if training['windows'] > training.get('samples', training['windows']):
+        warnings.append(
+            f'warning: {training["windows"]} windows overlap more than the {training["samples"]} samples that exist; '
+            'use a recipe with longer hops, or look at the rate of the recording'
+        )
+    return warnings
 
 
 def _uneven(slides: Mapping[str, int]) -> list[str]:

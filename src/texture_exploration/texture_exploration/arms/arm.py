@@ -6,14 +6,21 @@ from __future__ import annotations
 
 import contextlib
 import enum
+import fcntl
 import math
+import os
+import signal
+import socket
 import subprocess
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import quote
 
 import numpy as np
 
@@ -97,6 +104,7 @@ class Arm:
     Params: type[Any]
     force_reading = ForceReading.CONTROLLED
     reboots = False
+    keeps_start = False  # nobody else moves it: explorations begin where they did before it was let go
 
     def __init__(self, params: Any) -> None:
         """Take the parameters; nothing is reached yet."""
@@ -180,28 +188,18 @@ PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
 class SurfacePoseParams:
     """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
 
-    surface_x_m: float = param(
-        0.4, 'X coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_y_m: float = param(
-        0.0, 'Y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_z_m: float = param(
-        0.1, 'Z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
+    surface_x_m: float = param(0.4, 'X of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
+    surface_y_m: float = param(0.0, 'Y of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
+    surface_z_m: float = param(0.1, 'Z of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
     surface_rx_rad: float = param(
         0.0,
-        'X component of the rotation vector of the surface frame; its z axis points away from the surface.',
+        'X of the rotation vector of the surface frame; its z axis points away from the surface.',
         unit='rad',
         low=-7.0,
         high=7.0,
     )
-    surface_ry_rad: float = param(
-        0.0, 'Y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
-    )
-    surface_rz_rad: float = param(
-        0.0, 'Z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
-    )
+    surface_ry_rad: float = param(0.0, 'Y of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
+    surface_rz_rad: float = param(0.0, 'Z of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
 
     def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
         """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""
@@ -290,40 +288,27 @@ class CommandedVelocity:
 
     def __init__(self, params: ForceLoopParams, period_s: float) -> None:
         self._loop = ForceLoop(params, period_s)
-        self._travelled_m = 0.0
-
-    @property
-    def lag_s(self) -> float:
-        """How late the arm follows, as measured while it came down; NaN until it is measured."""
-        return self._loop.lag.value_s
 
     def doubt(self) -> str:
         """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
-        return self._loop.doubt()
-
-    def travelled(self, distance_m: float) -> None:
-        """Take note of how far the finger has gone along the surface since the last call."""
-        self._travelled_m += distance_m
+        return self._loop.doubt
 
     def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
         """Return the velocity to ask for, m/s."""
-        normal_m_s = self._normal_m_s(command, state, held_s)
-        self._loop.asked(state.position[2], normal_m_s, held_s)
-        return (*command.tangential_m_s, normal_m_s)
-
-    def _normal_m_s(self, command: ArmCommand, state: ArmState, held_s: float) -> float:
-        contact = ContactState(state.time_ns, state.position[2], self._travelled_m, state.force_n)
-        speed_m_s = math.hypot(*command.tangential_m_s)
-        self._loop.observe(contact, speed_m_s)
         if command.force_n is None:
             self._loop.restart()
-            return max(command.normal_m_s, -self._loop.approach_m_s(contact.height_m))
-        return self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s)
+            self._loop.doubt = ''  # whoever lifts has read it
+            return (*command.tangential_m_s, max(command.normal_m_s, -self._loop.approach_m_s))
+        contact, speed_m_s = ContactState(state.time_ns, state.force_n), math.hypot(*command.tangential_m_s)
+        return (*command.tangential_m_s, self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s))
 
 
 # --------------------
-# A process that stops the robot when the process that commanded it is gone.
+# One commander a robot: a lock that the kernel frees however its holders end, and the process that stops the robot.
 
+RUNTIME = Path(
+    '/dev/shm'
+)  # one a host, for all users; no environment variable moves it, and no service has a private one
 DONE = b'.'
 LEAVE_S = 2.0
 ENDING = threading.Event()  # set once this process was told to end
@@ -335,21 +320,58 @@ def give_up_when_ending() -> None:
         raise DeviceError('connecting was given up, as this process was told to end')
 
 
-class GuardProcess:
-    """A process at a pipe whose other end only the commanding process holds.
+def claim(resource: str, patience_s: float) -> int:
+    """Return a descriptor that locks a robot, by the name of what commands it; DeviceError if another process has it.
 
-    The kernel closes that end however the process ends, also by SIGKILL; whoever ends in order says so first.
+    The lock lasts until every process that inherited the descriptor has closed it or ended; `patience_s` is for the
+    guard of a process that was killed.
+    """
+    path = RUNTIME / f'tactile_texture_{quote(resource, safe="")[:200]}'
+    flags = os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW
+    try:
+        with contextlib.suppress(FileExistsError):
+            os.close(os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o644))
+        lock = os.open(path, flags)  # without O_CREAT: the kernel may refuse that for a file of another user
+    except OSError as error:
+        raise DeviceError(
+            f"the lock '{path}' of the arm cannot be opened ({error}); see that the folder exists"
+        ) from error
+    end_s = time.monotonic() + patience_s
+    while True:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            if time.monotonic() < end_s and not ENDING.is_set():
+                time.sleep(0.02)
+                continue
+            os.close(lock)
+            raise DeviceError(
+                f'another process on this machine commands the arm ({resource}), or its guard still brings it to rest: '
+                f"it holds '{path}', and fuser names it; end it first"
+            ) from error
+        return lock
+
+
+class GuardProcess:
+    """A process at a socket whose other end only the commanding process holds, and which may hold its lock, too.
+
+    The kernel closes that end however the process ends, also by SIGKILL; whoever ends in order says so first. The
+    socket is nobody's stdout, so that what a library prints there is no message.
     """
 
-    def __init__(self, module: str, *arguments: str, start: Sequence[str] = ()) -> None:
-        # A session of its own: what ends all processes of a terminal or a launch file must not end the guard first.
-        self._process = subprocess.Popen(
-            [*start, sys.executable, '-m', module, *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+    def __init__(self, module: str, *arguments: str, start: Sequence[str] = (), holds: Sequence[int] = ()) -> None:
+        self.line, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.line.setblocking(False)
+        with end:
+            # A session of its own: what ends all processes of a terminal or a launch file must not end the guard first.
+            self._process = subprocess.Popen(
+                [*start, sys.executable, '-m', module, str(end.fileno()), *arguments],
+                pass_fds=[end.fileno(), *holds],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
 
     @property
     def pid(self) -> int:
@@ -359,9 +381,23 @@ class GuardProcess:
     def dismiss(self) -> None:
         """End the guard: the robot stands or has let go, or the line to it is gone."""
         with contextlib.suppress(OSError, subprocess.TimeoutExpired):  # of a guard that has ended
-            self._process.communicate(DONE, timeout=LEAVE_S)
+            self.line.send(DONE)
+            self._process.wait(LEAVE_S)
         self._process.kill()
         self._process.wait()
+        self.line.close()
+
+
+def guard_socket() -> socket.socket:
+    """Return the guard's end of the line: the first argument of its process, which no signal of a terminal ends."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    with contextlib.suppress(OSError):  # who may not, is as fast as others
+        os.setpriority(os.PRIO_PROCESS, 0, GUARD_NICENESS)
+    return socket.socket(fileno=int(sys.argv[1]))
+
+
+GUARD_NICENESS = -10  # before whatever else keeps the machine busy
 
 
 # --------------------
@@ -377,13 +413,6 @@ UNSTEADY = (
 class ZeroingParams:
     """When a finger counts as in free air; a base of the parameters of each arm that zeroes its force sensor there."""
 
-    zero_rise_m: float = param(
-        0.003,
-        'Rise, at constant force, after which the force is zeroed; a larger rise zeroes it less often.',
-        unit='m',
-        low=0.001,
-        high=0.05,
-    )
     zero_steady_n: float = param(
         0.5,
         'Largest change of the smoothed force that counts as constant; it must exceed the noise of the sensor.',
@@ -393,6 +422,7 @@ class ZeroingParams:
     )
 
 
+ZERO_RISE_M = 0.003  # through which a constant force proves free air; it notices contacts of zero_steady_n / 3 mm
 SMOOTHING_S = 0.02  # time constant over which the force is averaged: noise is no contact
 RISE_M_S = 0.02  # of an arm that looks for free air before it presses, as its force sensor is not zeroed
 MAX_RISES = 5.0  # it rises at most by so many times what proves free air
@@ -476,8 +506,8 @@ class ForceZero:
     rise first.
     """
 
-    def __init__(self, rise_m: float, steady_n: float) -> None:
-        self.air = FreeAir(rise_m, steady_n)
+    def __init__(self, steady_n: float) -> None:
+        self.air = FreeAir(ZERO_RISE_M, steady_n)
         self._readings: deque[Array] = deque(maxlen=READINGS)
         self._rest_ns: int | None = None
         self.zeroed = False
@@ -514,3 +544,39 @@ class ForceZero:
         self.zeroed = True
         self.zeroings += 1
         self.presume_contact()
+
+
+# --------------------
+# Whether the finger is at rest, by its pose alone.
+
+REST_NS = 200_000_000  # over which it is looked at
+REST_POSES = 4  # at least
+RESTING_M = 3e-5  # between the mean places of both halves of that time: slower than 0.3 mm/s, above the noise of a pose
+
+
+class RestWatch:
+    """Tell whether the pose has shown rest since it was last asked to forget: nobody leaves an arm before."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """The arm was told to move, or nothing was heard for a while."""
+        self.at_rest = False
+        self._poses: deque[tuple[int, Vector]] = deque()
+
+    def update(self, now_ns: int, position: Vector) -> None:
+        """Take a new pose, by the time of its arrival."""
+        if self.at_rest:
+            return
+        poses = self._poses
+        poses.append((now_ns, position))
+        if now_ns - poses[0][0] < REST_NS:
+            return
+        half_ns = now_ns - REST_NS // 2
+        halves = [[at for time_ns, at in poses if (time_ns > half_ns) is late] for late in (False, True)]
+        while now_ns - poses[0][0] >= REST_NS:
+            poses.popleft()
+        if min(map(len, halves)) >= REST_POSES // 2:
+            before, after = (np.mean(np.array(half), axis=0) for half in halves)
+            self.at_rest = bool(np.linalg.norm(after - before) <= RESTING_M)

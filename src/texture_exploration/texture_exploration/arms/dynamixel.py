@@ -9,7 +9,6 @@ import fcntl
 import importlib
 import math
 import os
-import signal
 import sys
 import termios
 import threading
@@ -22,7 +21,7 @@ from typing import Any, NamedTuple
 import serial
 
 from texture_core.errors import CommandRefused, DeviceError
-from texture_exploration.arms.arm import DONE, STANDSTILL, ArmCommand, GuardProcess
+from texture_exploration.arms.arm import DONE, STANDSTILL, ArmCommand, GuardProcess, guard_socket
 from texture_exploration.arms.hand import (
     FingerSet,
     Fingertip,
@@ -107,12 +106,12 @@ class DynamixelBus:
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
-        self._lock: int | None = None
+        self.lock = -1  # on the device
         self._profile = profile
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
         with self._line(), contextlib.ExitStack() as on_error:
-            self._lock = _locked(device)
+            self.lock = _locked(device)
             on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
             if opened:
@@ -131,9 +130,9 @@ class DynamixelBus:
         """Close the port; never raises."""
         with contextlib.suppress(*LINE_FAULTS):
             self._port.closePort()
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        if self.lock >= 0:
+            os.close(self.lock)
+            self.lock = -1
 
     def start(self) -> None:
         """Find and check the motors, set mode and gains; only when all is well, let them hold where they are."""
@@ -465,18 +464,16 @@ PAUSE_S = 0.02
 
 
 class TorqueGuard(GuardProcess):
-    """The guard of one hand; start it before the torque is switched on."""
+    """The guard of one hand, which holds the lock on its device; start it before the torque is switched on."""
 
-    def __init__(self, device: str, baud: int, packet: bytes) -> None:
-        super().__init__(__name__, device, str(baud), packet.hex())
+    def __init__(self, device: str, baud: int, packet: bytes, lock: int) -> None:
+        super().__init__(__name__, device, str(baud), packet.hex(), holds=(lock,))
 
 
 def main() -> None:
-    """Run as `python -m texture_exploration.arms.dynamixel DEVICE BAUD PACKET`; the hand starts it."""
-    device, baud, packet = sys.argv[1:]
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    if sys.stdin.buffer.read() == DONE:
+    """Run as `python -m texture_exploration.arms.dynamixel SOCKET DEVICE BAUD PACKET`; the hand starts it."""
+    _, _, device, baud, packet = sys.argv
+    if guard_socket().recv(len(DONE)) == DONE:
         return
     with contextlib.suppress(serial.SerialException, OSError), serial.Serial(device, int(baud), timeout=0) as line:
         for _ in range(REPEATS):
@@ -616,7 +613,7 @@ class DynamixelHand:
         bus = guard = None
         try:
             bus = DynamixelBus(self._device, self.profile)
-            guard = TorqueGuard(self._device, self.profile.baud, bus.torque_off_packet())
+            guard = TorqueGuard(self._device, self.profile.baud, bus.torque_off_packet(), bus.lock)
             self._highest_a = bus.limits_a
             bus.start()
             self._doubt = self._doubtful(bus.deaf)

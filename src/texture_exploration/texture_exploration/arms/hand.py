@@ -157,7 +157,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     'torque_nm_a': (0.01, 100.0),
     'idle_a': (0.0, 0.5),
     'move_a': (0.001, 5.0),
-    'lever_m': (0.001, 1.0),  # of either sign
+    'lever_m': (0.001, 0.3),  # of either sign; no finger is longer
     'start_height_m': (0.0, 1.0),
     'id': (0, 252),
     'address': (0, 2047),

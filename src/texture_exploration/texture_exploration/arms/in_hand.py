@@ -26,32 +26,17 @@ class InHandParams(CommandLimits):
     """Which hand holds what how."""
 
     hand: str = param('simulated', "Hand that is used: 'simulated' or 'dynamixel'.", choices=('simulated', 'dynamixel'))
-    finger_set: str = param(
-        'kaboli-train', 'Which fingers hold and which slide, by the name of a finger set of the hand.'
-    )
-    grip_force_n: float = param(
-        2.0,
-        'Force with which each holding finger presses; a larger force grips more firmly.',
-        unit='N',
-        low=0.1,
-        high=20.0,
-    )
+    finger_set: str = param('kaboli-train', 'Finger set of the hand: which fingers hold and which slide.')
+    grip_force_n: float = param(2.0, 'Force with which each holding finger presses.', unit='N', low=0.1, high=20.0)
     grip_timeout_s: float = param(
-        3.0,
-        'How long the fingers may take to grip the object before connecting fails.',
-        unit='s',
-        low=0.1,
-        high=30.0,
+        3.0, 'How long the fingers may take to grip the object before connecting fails.', unit='s', low=0.1, high=30.0
     )
     profile: str = param('leap', 'Profile of a Dynamixel hand: the name of a shipped one or the path of a file.')
     device: str = param(f'{DEVICES}/dynamixel', 'Path of the serial device of a Dynamixel hand.')
     torque_off_on_fault: bool = param(
-        False,
-        'Switches the torque of a Dynamixel hand off, so that it releases the object, when a motor reports a fault.',
+        False, 'Switches the torque off, which releases the object, when a motor of a Dynamixel hand reports a fault.'
     )
-    finger_pipe: str = param(
-        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
-    )
+    finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
 
 
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {

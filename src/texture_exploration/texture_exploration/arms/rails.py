@@ -67,37 +67,15 @@ READ_S = 0.05
 class RailsParams(CommandLimits):
     """Where the rails are, and what their encoders count."""
 
-    device: str = param(
-        f'{DEVICES}/rails',
-        'Path of the serial device of the rails; the default is that of the emulated rails.',
-    )
-    baud: int = param(
-        230400,
-        'Baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
-        low=9600,
-        high=12_000_000,
-    )
-    xy_counts_m: float = param(
-        200_000.0,
-        'Encoder counts per metre of the rails; larger values give shorter measured distances.',
-        unit='1/m',
-        low=1e3,
-        high=1e8,
-    )
+    device: str = param(f'{DEVICES}/rails', 'Path of the serial device of the rails; the default is the emulated one.')
+    xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3, high=1e8)
     z_counts_m: float = param(
-        1_000_000.0,
-        'Encoder counts per metre of the pressing motor; larger values give shorter measured distances.',
-        unit='1/m',
-        low=1e3,
-        high=1e8,
+        1_000_000.0, 'Encoder counts per metre of the pressing motor.', unit='1/m', low=1e3, high=1e8
     )
-    height_m: float = param(
-        0.01,
-        'Height of the finger above the surface at 0 counts; larger values move the origin up.',
-        unit='m',
-        low=-0.5,
-        high=0.5,
-    )
+    height_m: float = param(0.01, 'Height of the finger above the surface at 0 counts.', unit='m', low=-0.5, high=0.5)
+
+
+BAUD = 230400  # of a UART; a USB device ignores it
 
 
 class RailsArm(Arm):
@@ -134,9 +112,7 @@ class RailsArm(Arm):
         self._deframer.restart()
         self._states.clear()
         with self._line():
-            self._port = serial.Serial(
-                self._params.device, self._params.baud, exclusive=True, timeout=READ_S, write_timeout=0.2
-            )
+            self._port = serial.Serial(self._params.device, BAUD, exclusive=True, timeout=READ_S, write_timeout=0.2)
         self._failure = ''
         self._thread = threading.Thread(target=self._read, name='rails', daemon=True)
         self._thread.start()
@@ -146,7 +122,7 @@ class RailsArm(Arm):
                 raise DeviceError(
                     self._failure
                     or f"device '{self._params.device}' is open and sends no state of rails; check that it is the "
-                    f'right device, and its baud rate ({self._params.baud} is set)'
+                    f'right device, and its baud rate ({BAUD} is set)'
                 )
         except DeviceError:
             self.close()

@@ -140,49 +140,30 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
     """Parameters of the simulated arm and of its contact with the surface."""
 
     force_mode: bool = param(
-        True,
-        'Lets the arm control forces itself, ideally; false gives a delayed velocity interface with a force'
-        ' loop around it.',
+        True, 'Lets the arm control forces itself, ideally; false gives a delayed velocity interface.'
     )
-
     undeclared_lag_s: float = param(
-        0.0,
-        "Lag of an arm without force mode beyond 'loop_delay_s', unknown to its force control.",
-        unit='s',
-        low=0.0,
-        high=0.2,
+        0.0, "Lag of an arm without force mode beyond 'loop_delay_s', not declared.", unit='s', low=0.0, high=0.2
     )
     force_noise_n: float = param(
-        0.001,
-        'Standard deviation of the force noise of an arm without force mode.',
-        unit='N',
-        low=0.0,
-        high=1.0,
+        0.001, 'Standard deviation of the force noise of an arm without force mode.', unit='N', low=0.0, high=1.0
     )
-    seed: int = param(1, 'Seed of the noise; equal seeds give equal noise.', low=0)
     stiffness_n_m: float = param(
         2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
     )
     admittance_m_s_n: float = param(
-        0.01,
-        "Normal speed per force error of the arm's own force mode; larger values settle faster.",
-        unit='m/s/N',
-        low=1e-4,
-        high=1.0,
+        0.01, "Normal speed per force error of the arm's force mode.", unit='m/s/N', low=1e-4, high=1.0
     )
     start_height_m: float = param(
         0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
     )
     command_timeout_s: float = param(
-        0.1,
-        'How long a command holds without a new one; afterwards the arm stands still.',
-        unit='s',
-        low=0.02,
-        high=2.0,
+        0.1, 'How long a command holds without a new one; afterwards the arm stands.', unit='s', low=0.02, high=2.0
     )
-    finger_pipe: str = param(
-        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
-    )
+    finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
+
+
+SEED = 1  # of the noise: equal runs are equal
 
 
 class SimulatedArm(Arm):
@@ -203,6 +184,7 @@ class SimulatedArm(Arm):
     """
 
     Params = SimulatedArmParams
+    keeps_start = True
 
     def __init__(
         self,
@@ -223,7 +205,7 @@ class SimulatedArm(Arm):
         self._stuck_n: float | None = None  # what a frozen force sensor shows
         self._drift_n = self._drift_n_s = 0.0
         self._noise_n = 0.0 if params.force_mode else params.force_noise_n
-        self._rng = np.random.default_rng(params.seed)
+        self._rng = np.random.default_rng(SEED)
         self.force_reading = _force_reading(params)
         self._wake = threading.Event()
         self._closing = threading.Event()
@@ -329,8 +311,6 @@ class SimulatedArm(Arm):
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
         moved = self._delayed.moved_m(now_ns) if self._velocity else self._moved_m(command, moving_s)
-        if self._velocity:
-            self._velocity.travelled(math.hypot(*moved[:2]))
         moved = (0.0, 0.0, moved[2]) if self._jammed else moved
         x, y, z = (at + step_m for at, step_m in zip(self._state.position, moved, strict=True))
         velocity = _speed(moved, moving_s)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
+import os
 import signal
 import socket
 import struct
@@ -32,6 +33,7 @@ from texture_exploration.arms.arm import (
     SurfacePoseParams,
     Vector,
     ZeroingParams,
+    claim,
     give_up_when_ending,
     tangential_force_n,
 )
@@ -50,17 +52,10 @@ class TcpConnection:
         self._end_s = time.monotonic() + timeout_s
         try:
             self._socket = socket.create_connection((ip, port), timeout_s)
-        except ConnectionRefusedError as error:
-            raise DeviceError(
-                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address?"
-            ) from error
-        except TimeoutError as error:
-            raise DeviceError(
-                f'{self._where} cannot be reached within {timeout_s:g} s; check the cable, the network and parameter '
-                "'ip'"
-            ) from error
         except OSError as error:
-            raise DeviceError(f"{self._where} cannot be reached: {error}; check parameter 'ip'") from error
+            refused = isinstance(error, ConnectionRefusedError)
+            what = f'nothing listens on {self._where}' if refused else f'{self._where} cannot be reached: {error}'
+            raise DeviceError(f"{what}; is the controller on, and is parameter 'ip' its address?") from error
 
     def close(self) -> None:
         """End the conversation."""
@@ -83,7 +78,7 @@ class TcpConnection:
             except OSError as error:
                 raise self._silent() from error
             if not chunk:
-                raise DeviceError(f'{self._where} ended the conversation; is it a UR controller, and has it started?')
+                raise self._silent()
             data += chunk
         return data
 
@@ -163,31 +158,9 @@ def command_of(data: bytes) -> UrCommand:
 class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
-    ip: str = param(
-        '127.0.0.2',
-        'IP address of the controller; the default is that of the emulated one, and a path stands for that of the '
-        'emulated one with the same path.',
-    )
-    rate_hz: float = param(
-        250.0,
-        'Rate of commands and states; a higher rate reacts faster and costs more computing time.',
-        unit='Hz',
-        low=50.0,
-        high=500.0,
-    )
-    arm_acceleration_m_s2: float = param(
-        2.0,
-        'Acceleration towards a new velocity; larger values follow commands faster.',
-        unit='m/s²',
-        low=0.1,
-        high=10.0,
-    )
+    ip: str = param('127.0.0.2', 'IP address of the controller; the default, and a path, are of the emulated one.')
     command_timeout_s: float = param(
-        0.2,
-        'How long a command holds without a new one; afterwards the arm stands still.',
-        unit='s',
-        low=0.02,
-        high=2.0,
+        0.2, 'How long a command holds without a new one; afterwards the arm stands.', unit='s', low=0.02, high=2.0
     )
     watchdog_hz: float = param(
         10.0,
@@ -197,19 +170,7 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
         high=50.0,
     )
     silence_s: float = param(
-        0.1,
-        'How long the controller may send no state before that is a fault; a longer time notices faults later.',
-        unit='s',
-        low=0.02,
-        high=2.0,
-    )
-    acknowledge_s: float = param(
-        1.0,
-        'How long the controller may take to stop, to end its force control and to zero the force '
-        'sensor; the watchdog waits as long.',
-        unit='s',
-        low=0.2,
-        high=5.0,
+        0.1, 'How long the controller may send no state before that is a fault.', unit='s', low=0.02, high=2.0
     )
     unlock_protective_stop: bool = param(
         False, 'Releases a protective stop when connecting; false leaves that to a person at the pendant.'
@@ -218,25 +179,19 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
         False, 'Stops a program of another user that runs or pauses on the controller; false refuses to connect.'
     )
     upper_range_registers: bool = param(
-        False,
-        'Lets the control program use the registers 24 to 47, so that a fieldbus (EtherNet/IP, PROFINET) may keep 0 to '
-        '23; false uses 0 to 23.',
-    )
-    probe_timeout_s: float = param(
-        1.5,
-        'How long the controller may take to answer the first requests before connecting fails.',
-        unit='s',
-        low=0.1,
-        high=10.0,
+        False, 'Uses the registers 24 to 47, so that a fieldbus (EtherNet/IP, PROFINET) may keep 0 to 23.'
     )
     connect_timeout_s: float = param(
-        10.0,
-        'How long the arm may take to be ready to move before connecting fails.',
-        unit='s',
-        low=0.5,
-        high=60.0,
+        10.0, 'How long the arm may take to be ready before connecting fails.', unit='s', low=0.5, high=60.0
     )
 
+
+RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
+ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
+ACKNOWLEDGE_S = (
+    1.0  # so long a controller may take to stop, to end force control and to zero; its watchdog waits as long
+)
+PROBE_S = 1.5  # so long it may take to answer the first requests
 
 # --------------------
 # The worker process as its parent sees it: start it, exchange messages with it, end it.
@@ -250,17 +205,17 @@ FINAL_MESSAGE_S = 0.05
 class WorkerLink:
     """One worker process, from its start to its end."""
 
-    def __init__(self, params: UrArmParams) -> None:
+    def __init__(self, params: UrArmParams, lock: int) -> None:
         self.report: UrReport | None = None
         self._failure = ''
         self._timeout_s = params.connect_timeout_s
-        self._stopping_s = UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * params.acknowledge_s
+        self._stopping_s = UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S
         self._state_received = threading.Event()
         self._channel, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         command = [sys.executable, '-m', MODULE, str(end.fileno()), json.dumps(dataclasses.asdict(params))]
         with end:
             self._process = subprocess.Popen(
-                command, pass_fds=[end.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+                command, pass_fds=[end.fileno(), lock], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
             )
         self._reader = threading.Thread(target=self._read, name='ur_link', daemon=True)
         self._reader.start()
@@ -525,8 +480,8 @@ def check_program(params: UrArmParams, version: tuple[int, int], *, pause_is_our
     ours whose process was killed is ended by its watchdog; one that has none yet is known by its name and by nobody
     writing the register that it obeys.
     """
-    ip, timeout_s = params.ip, params.probe_timeout_s
-    end_s = time.monotonic() + max(params.acknowledge_s, 1.0 / params.watchdog_hz) + WATCHDOG_S
+    ip, timeout_s = params.ip, PROBE_S
+    end_s = time.monotonic() + max(ACKNOWLEDGE_S, 1.0 / params.watchdog_hz) + WATCHDOG_S
     while program := _program(ip, version, timeout_s):
         if params.take_over or (pause_is_ours and program.upper().startswith('PAUSED')):
             break
@@ -590,6 +545,7 @@ class UrArm(SurfaceArm):
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:
         super().__init__(replace(params, ip=loopback_address(params.ip)))
         self._link: WorkerLink | None = None
+        self._lock = -1  # on the address; the worker, which brings the arm to rest, holds it, too
         self._series = 0  # of the controller that was connected last
         self._paused = False  # a stop by the safety system may have left our program paused
 
@@ -601,7 +557,7 @@ class UrArm(SurfaceArm):
         DeviceError
             If it cannot be reached, or its arm cannot move.
         """
-        check_ready(self._params.ip, self._params.probe_timeout_s, unlock=False)
+        check_ready(self._params.ip, PROBE_S, unlock=False)
 
     def connect(self) -> None:
         """Reach the controller and start its control program; release a protective stop if the parameters say so.
@@ -618,15 +574,15 @@ class UrArm(SurfaceArm):
                 'it exists for Python up to 3.12 on Linux with an x86-64 processor'
             )
         params = self._params
-        version = check_ready(params.ip, params.probe_timeout_s, params.unlock_protective_stop)
-        check_program(params, version, pause_is_ours=self._paused)
-        link = WorkerLink(params)
         try:
-            link.wait_for_report()
+            self._lock = claim(f'ur {params.ip}', UR_LINK_STOPPING_S + ACKNOWLEDGEMENTS * ACKNOWLEDGE_S)
+            version = check_ready(params.ip, PROBE_S, params.unlock_protective_stop)
+            check_program(params, version, pause_is_ours=self._paused)
+            self._link, self._series = WorkerLink(params, self._lock), version[0]
+            self._link.wait_for_report()
         except DeviceError:
-            link.end()
+            self.close()
             raise
-        self._link, self._series = link, version[0]
 
     def warning(self) -> str:
         """Return in a sentence that the controller is a CB3, which only estimates forces; '' if it is another."""
@@ -643,6 +599,9 @@ class UrArm(SurfaceArm):
         if link is not None:
             self._paused = link.report is not None and link.report.safety_mode in SAFETY_FAULTS
             link.end()
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -663,7 +622,7 @@ class UrArm(SurfaceArm):
     def command(self, command: ArmCommand) -> None:
         """Hand a command to the worker.
 
-        The force sensor is zeroed in free air only, which a rise of `zero_rise_m` without a change of the force proves.
+        The force sensor is zeroed in free air only, which a rise of 3 mm without a change of the force proves.
         As long as it has not been zeroed since the arm was connected or recovered, a command with a force lifts first.
 
         Raises
@@ -697,7 +656,7 @@ class UrArm(SurfaceArm):
         """
         link = self._connected()
         if self._report().safety_mode in SAFETY_FAULTS:
-            unlock_protective_stop(self._params.ip, self._params.probe_timeout_s)
+            unlock_protective_stop(self._params.ip, PROBE_S)
         link.send(RECOVER)
         end_s = time.monotonic() + RECOVERY_S
         while fault := self._fault(self._report()):

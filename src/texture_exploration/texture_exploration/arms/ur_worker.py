@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The process that talks to a UR controller at `rate_hz`, its stream of commands and its watchdog."""
+"""The process that talks to a UR controller at 250 Hz, its stream of commands and its watchdog."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from texture_core.config import from_mapping
-from texture_exploration.arms.arm import CALM_NS, RISE_M_S, FreeAir, SurfaceFrame, Vector
+from texture_exploration.arms.arm import CALM_NS, RISE_M_S, ZERO_RISE_M, FreeAir, SurfaceFrame, Vector
 from texture_exploration.arms.ur import (
+    ACCELERATION_M_S2,
+    ACKNOWLEDGE_S,
     COMMAND,
     FAILURE,
     FORCE_DEVIATION_M,
@@ -29,6 +31,7 @@ from texture_exploration.arms.ur import (
     FORCE_FRAME_FIXED,
     LARGEST,
     PROGRAM_PLAYING,
+    RATE_HZ,
     RECOVER,
     REPORT,
     STOP,
@@ -65,7 +68,7 @@ class Watchdog:
         self.slowest_s = 0.0
         self._control = control
         self._period_s = self.moving_s = 1.0 / params.watchdog_hz
-        self._patient_s = max(params.acknowledge_s, self._period_s)
+        self._patient_s = max(ACKNOWLEDGE_S, self._period_s)
         self._guard = guard
         self._clock = clock
 
@@ -141,7 +144,7 @@ class UrCommandStream:
         self._watchdog = watchdog
         self._frame = SurfaceFrame(params.surface_pose)
         self._up = self._frame.to_base((0.0, 0.0, RISE_M_S))
-        self._air = FreeAir(params.zero_rise_m, params.zero_steady_n)
+        self._air = FreeAir(ZERO_RISE_M, params.zero_steady_n)
         self._measured_ns = self._rest_ns = 0
         self._height_m = 0.0
         self._mode = Mode.STANDSTILL
@@ -201,7 +204,7 @@ class UrCommandStream:
             return False
         if mode is Mode.STANDSTILL and not self._braking:
             self._braking = True
-            self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / self._params.rate_hz)))
+            self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / RATE_HZ)))
             return False
         if not self._leave(mode):
             return False
@@ -265,8 +268,8 @@ class UrCommandStream:
         self._led_m_s = ur_command.velocity_m_s
         # Whoever turns back has met something: as hard as a stop.
         turns = self._measured_ns - self._turned_ns < TURN_NS
-        acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, self._params.arm_acceleration_m_s2)
-        return bool(self._control.speedL(velocity, acceleration, 1.0 / self._params.rate_hz))
+        acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, ACCELERATION_M_S2)
+        return bool(self._control.speedL(velocity, acceleration, 1.0 / RATE_HZ))
 
     def _turns_back(self, velocity_m_s: Vector) -> bool:
         return sum(now * before for now, before in zip(velocity_m_s, self._led_m_s, strict=True)) < 0.0
@@ -339,7 +342,7 @@ class Observer:
         self._receive = receive
         self._channel = channel
         self._silence_s = params.silence_s
-        self._period_s = 1.0 / params.rate_hz
+        self._period_s = 1.0 / RATE_HZ
         self._stamp = -1.0
         self._time_ns = time.monotonic_ns()
         self._silent_for_s = 0.0
@@ -407,8 +410,8 @@ class Worker:
         flags = control_class.FLAG_UPLOAD_SCRIPT | control_class.FLAG_DISABLE_REMOTE_CONTROL_CHECK
         if params.upper_range_registers:
             flags |= control_class.FLAG_UPPER_RANGE_REGISTERS
-        receive = receive_class(params.ip, params.rate_hz, VARIABLES)
-        self._control = control_class(params.ip, params.rate_hz, flags)
+        receive = receive_class(params.ip, RATE_HZ, VARIABLES)
+        self._control = control_class(params.ip, RATE_HZ, flags)
         self._observer = Observer(receive, channel, params)
         self._watchdog = Watchdog(self._control, params, lambda seconds: set_alarm(seconds + HANGING_S))
         self._commands = UrCommandStream(self._control, params, self._watchdog)

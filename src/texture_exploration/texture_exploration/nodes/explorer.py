@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import copy
 import importlib
 import itertools
 import threading
@@ -21,6 +23,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
@@ -38,6 +41,7 @@ from texture_core.ros import (
     frame_name,
     from_msg,
     on_change,
+    quality_of_service,
     run,
     to_msg,
     to_stamp,
@@ -56,6 +60,7 @@ from texture_exploration.explorer import (
     no_signal_watch,
     refusal,
 )
+from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import Listening, SafetyLimits, SignalWatch, SignalWatchParams, SurfacePatch
 from texture_exploration.stages import TouchParams
 
@@ -102,6 +107,7 @@ class FrameBroadcaster:
                 raise InvalidParameter(
                     "parameter 'broadcast_fingertip' is true, which needs tf2_msgs; install it (ros-jazzy-tf2-msgs)"
                 ) from error
+            node.get_logger().info('no frame is published on tf, as tf2_msgs is not installed')
             return
         if params.broadcast_surface:
             self._static = node.create_publisher(self._kind, '/tf_static', STATIC_QOS)
@@ -190,6 +196,8 @@ class ExplorerNode(PatientLifecycleNode):
         self._publishing = threading.Lock()
         self._closing = False
         self._states = self.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+        self._infos = self.create_publisher(msg.ExplorerInfo, 'explorer_info', quality_of_service('explorer_info'))
+        self._info, self._last_error, self._active = msg.ExplorerInfo(), ExplorationError.NONE, False
         self.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
@@ -214,7 +222,7 @@ class ExplorerNode(PatientLifecycleNode):
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
-        self._active, self._autostart, self._lift_at_start = False, params.autostart, params.lift_at_start
+        self._autostart, self._lift_at_start = params.autostart, params.lift_at_start
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()
@@ -347,9 +355,11 @@ class ExplorerNode(PatientLifecycleNode):
         result = msg.ExplorationResult()
         try:
             exploration_id = new_id(self.get_clock().now().nanoseconds, next(self._numbers), self._rng)
+            self._check_clock()
             exploration = self._explorer.begin(exploration_id, from_msg(request))
         except (MotionRefused, UnknownName, InvalidData) as error:
             result.error_code, result.message = int(refusal(error)), str(error)
+            result.field = 'motion' if isinstance(error, UnknownName) else error.field
             # Their numbers are NaN, not the zeros that a new message holds.
             nothing = ExplorationEstimates('')
             result.texture, result.roughness = to_msg(nothing.texture), to_msg(nothing.roughness)
@@ -367,9 +377,18 @@ class ExplorerNode(PatientLifecycleNode):
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
         self._last_end = outcome.sentence(exploration.exploration_id)
         self._not_lifted = '' if outcome.lifted else self._last_end
+        self._last_error = outcome.error
         if not self._closing:
             self._log_end(exploration.exploration_id, outcome)
         return result
+
+    def _check_clock(self) -> None:
+        """Refuse to move while the time of ROS stands still: nothing could be stamped."""
+        if not self.get_clock().now().nanoseconds:
+            raise MotionRefused(
+                "'use_sim_time' is true, and no time has come on '/clock'; start what publishes it, or set it to false",
+                ExplorationError.NOT_ACTIVE,
+            )
 
     def _log_end(self, exploration_id: str, outcome: ExplorationOutcome) -> None:
         LOGGED[outcome.severity](self.get_logger(), outcome.sentence(exploration_id))
@@ -446,8 +465,31 @@ class ExplorerNode(PatientLifecycleNode):
     def _publish_idle(self) -> None:
         with self._publishing:
             if self._explorer.current is None:
-                idle = ExplorationState(self._explorer.now_ns(), '', '', Phase.IDLE)
+                idle = ExplorationState(self._explorer.now_ns(), '', '', Phase.IDLE, lifted=self._explorer.lifted)
                 self._publish(self._stamped(idle))
+        self._publish_info()
+
+    def _publish_info(self) -> None:
+        """Publish what the explorer can do, if that has changed."""
+        limits, why_not = self._explorer.limits, self._why_not_ready()
+        info = msg.ExplorerInfo(ready=not why_not, message=why_not, last_error_code=int(self._last_error))
+        info.motions = list(MOTIONS)
+        for motion, defaults in DEFAULTS.items():
+            for name, value in defaults.items():
+                low, high, unit = limits.range(name)
+                number = {'default_value': limits.default(name, value), 'low': float(low), 'high': float(high)}
+                info.numbers.append(msg.MotionNumber(motion=motion, field=name, unit=unit, **number))
+        if info != self._info:
+            self._info = info
+            published = copy.copy(info)
+            published.header = Header(stamp=self.get_clock().now().to_msg())
+            with contextlib.suppress(RCLError):  # after a shutdown of ROS nobody listens any more
+                self._infos.publish(published)
+
+    def _why_not_ready(self) -> str:
+        if not self._active:
+            return 'the explorer is not active: it has no control of the arm'
+        return 'an exploration is running' if self._explorer.current else self._explorer.fault()
 
     def _broadcast_surface(self) -> None:
         arm = self._explorer.arm

@@ -8,9 +8,9 @@ import argparse
 from pathlib import Path
 
 from texture_core.cli import add_seed
-from texture_estimation.search import SearchParams
 from texture_papers.catalogue import EXPERIMENTS, run_experiment, run_over_seeds
 from texture_papers.protocol import Experiment
+from texture_papers.search import SearchParams
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -19,7 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
     parser.add_argument('--quick', '--reduced', action='store_true', help='fewer slides; not for publishing')
     parser.add_argument(
-        '--tune', action='store_true', help="search the recipe's parameters first, as the paper does, if it can"
+        '--tune', action='store_true', help='search the variables of each pair of textures, or of a regressor, first'
     )
     parser.add_argument(
         '--seeds', type=int, default=1, metavar='N', help='so many seeds from --seed on: mean and interval over them'
@@ -29,7 +29,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         nargs=3,
         metavar=('INDIVIDUALS', 'GENERATIONS', 'HALVES'),
-        help="size of the search with --tune, instead of the paper's 20 30 20",
+        help="size of the search with --tune; the papers' is 20 30 20",
     )
     add_seed(parser)
 
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     search = None
     if options.search:
         population, generations, halves = options.search
-        search = SearchParams(population, generations, halves, min(SearchParams.search_halves, halves))
+        search = SearchParams(population, generations, halves)
     experiment = Experiment(options.out, options.seed, options.quick, options.tune, search=search)
     if options.seeds == 1:
         result, path = run_experiment(options.name, experiment)

@@ -8,11 +8,11 @@ import argparse
 from pathlib import Path
 
 from texture_core.cli import Command, add_parameters, add_slides, parameters_from, task
-from texture_core.config import find, writing
+from texture_core.config import find
 from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.export import KINDS, export_slides, model_card
+from texture_recordings.export import export_slides
 from texture_recordings.public_sets import IMPORTS
 from texture_recordings.segment import segment_bags
 from texture_recordings.tables import MAPPED, import_tables, load_mapping
@@ -30,11 +30,14 @@ def _configure_import(parser: argparse.ArgumentParser) -> None:
         '--materials', nargs='+', default=(), metavar='NAME', help='only these surfaces; all if not given'
     )
     add_slides(parser)
+    parser.add_argument('--dry-run', action='store_true', help='only print what a mapping would import; no OUT')
 
 
 def _import(options: argparse.Namespace) -> int:
     """Import, and name the bags."""
     mapped = options.data_set in MAPPED
+    if options.dry_run and mapped and len(options.places) == 2:
+        options.places.append('')
     if len(options.places) != 2 + mapped:
         raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
     if mapped and (options.slides or options.materials):
@@ -42,6 +45,8 @@ def _import(options: argparse.Namespace) -> int:
             f'--slides and --materials choose from a known data set; of {options.data_set} the mapping '
             'file says what is read'
         )
+    if options.dry_run and not mapped:
+        raise InvalidParameter(f'--dry-run prints what a mapping means; {options.data_set} has none, leave it out')
     for bag in _import_mapped(options) if mapped else _import_known(options):
         print(bag)
     return 0
@@ -61,6 +66,7 @@ def _import_known(options: argparse.Namespace) -> list[Path]:
 
 def _import_mapped(options: argparse.Namespace) -> list[Path]:
     mapping, source, out = options.places
+    out = None if options.dry_run else out
     report = import_tables(load_mapping(mapping), source, out, MAPPED[options.data_set])
     for line in report.lines():
         print(line)
@@ -84,31 +90,21 @@ def _segment(options: argparse.Namespace) -> int:
 
 
 def _configure_export(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument('kind', choices=(*KINDS, 'card'), help='format; card: the card of a model, for a hub')
-    parser.add_argument('sources', nargs='+', metavar='BAG', help='bags, or folders of bags; of a card, MODEL.json')
-    parser.add_argument('-o', '--out', required=True, metavar='DIR', help='folder to make; of a card, file to write')
-    parser.add_argument('--license', default='other', metavar='NAME', help='as hubs name it, such as cc-by-4.0')
+    parser.add_argument('bags', nargs='+', help='bags, or folders of bags')
+    parser.add_argument('-o', '--out', required=True, metavar='DIR', help='folder to make')
     parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
     add_slides(parser)
 
 
 def _export(options: argparse.Namespace) -> int:
-    """Write slides as others read them, or the card of a model."""
-    if options.kind == 'card':
-        if Path(options.out).exists():
-            raise InvalidParameter(f"'{options.out}' exists already; name another file or remove it")
-        card = ''.join(model_card(source, options.license) for source in options.sources[:1])
-        with writing(options.out):
-            Path(options.out).write_text(card, encoding='utf-8')
-        print(options.out)
-        return 0
-    dataset = SlideDataset.from_bags(options.sources, options.slides, options.namespace)
+    """Write slides as Parquet."""
+    dataset = SlideDataset.from_bags(options.bags, options.slides, options.namespace)
     with task(f"write '{options.out}'"):
-        lines = export_slides(dataset, options.out, options.kind, options.license)
+        lines = export_slides(dataset, options.out)
     print('\n'.join(lines))
     return 0
 
 
-export = Command('write labelled slides as Parquet, HDF5 or a LeRobot data set', _configure_export, _export)
+export = Command('write labelled slides as Parquet, a row for each sample', _configure_export, _export)
 import_ = Command("turn other people's recordings into labelled bags", _configure_import, _import)
 segment = Command('find the slides in bags that do not tell them', _configure_segment, _segment)

@@ -33,47 +33,30 @@ from texture_simulation.devices.rails import FingerPipeParams
 from texture_simulation.devices.twist_controller import TouchedSurfaceParams, coulomb_n
 
 # --------------------
-# What moves the emulated robot: each motion says which velocity comes next.
+# What moves the emulated robot.
 #
 # Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched: rotation
 # vectors change component by component, and 1 rad counts as 1 m.
 
 
-class RobotMove:
-    """One motion of the robot; `done` when it will not move any further by itself."""
-
-    done: bool
-
-    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Return the velocity of the next step, (6,)."""
-        raise NotImplementedError
-
-
-class StopMove(RobotMove):
-    """Lose speed (stopl)."""
-
-    def __init__(self, deceleration: float) -> None:
-        self.done = False
-        self._deceleration = deceleration
-
-    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Slow down."""
-        slower = approach(velocity, np.zeros(6), self._deceleration * step_s)
-        self.done = not slower.any()
-        return slower
-
-
-class SpeedMove(RobotMove):
-    """Gain a velocity and keep it (speedl)."""
+class SpeedMove:
+    """Gain a velocity and keep it (speedl); `done` when it will not move any further by itself."""
 
     def __init__(self, wanted: Array, acceleration: float) -> None:
         self.done = False
         self._wanted = wanted
         self._acceleration = acceleration
 
-    def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Go towards the wanted velocity."""
-        return approach(velocity, self._wanted, self._acceleration * step_s)
+    def velocity(self, velocity: Array, step_s: float) -> Array:
+        """Return the velocity of the next step, (6,)."""
+        led = approach(velocity, self._wanted, self._acceleration * step_s)
+        self.done = not led.any() and not self._wanted.any()
+        return led
+
+
+def stop_move(deceleration: float) -> SpeedMove:
+    """Return the loss of all speed (stopl)."""
+    return SpeedMove(np.zeros(6), deceleration)
 
 
 def approach(now: Array, wanted: Array, step: float) -> Array:
@@ -180,7 +163,6 @@ class SafetyMode(enum.IntEnum):
 SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2}
 ROBOT_RUNNING = 7  # robot_mode
 PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
-COMMAND_REGISTERS = (0, 24)  # input_int registers of the control script: of the lower range, of the upper one
 CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
 POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
 
@@ -395,7 +377,7 @@ class EmulatedRobot:
         self.speed_share = 1.0
         self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
         self.force: Array = np.zeros(6)
-        self.motion: RobotMove = StopMove(HALT)
+        self.motion = stop_move(HALT)
         self.force_mode: ForceMode | None = None
         self._offset: Array = params.force_offset_n * OFFSET_DIRECTION
         self._noise_n = params.force_noise_n
@@ -410,7 +392,7 @@ class EmulatedRobot:
 
     def step(self, step_s: float) -> None:
         """Move for one step."""
-        led = velocity = self.motion.velocity(self.pose, self._unslowed, step_s)
+        led = velocity = self.motion.velocity(self._unslowed, step_s)
         if self.force_mode is not None:
             velocity = self._comply(velocity, self.force_mode, step_s)
             led = _stiff(led, self.force_mode)
@@ -435,7 +417,7 @@ class EmulatedRobot:
     def halt(self) -> None:
         """Stop hard, whatever it was doing."""
         self.end_force_mode()
-        self.motion = StopMove(HALT)
+        self.motion = stop_move(HALT)
 
     def _comply(self, velocity: Array, mode: ForceMode, step_s: float) -> Array:
         """Replace the velocity along yielding axes by one that brings the force to what is wanted."""
@@ -500,71 +482,36 @@ class ControlProgram:
             yield
 
     def _execute(self, number: int) -> Steps:
-        handler = COMMANDS.get(number)
-        if handler is None:
-            if number not in self._unknown:
-                self._unknown.add(number)
-                print(f'emulated UR controller: command {number} does nothing here', file=sys.stderr)
-            return
-        steps = handler(self)
-        if steps is not None:
-            yield from steps
-
-    def _vector(self, start: int) -> Array:
-        return np.array(self._registers.double_in[start : start + 6])
+        """Do one command with the arguments in its registers: d are doubles, i integers."""
+        registers, robot = self._registers, self._robot
+        doubles = registers.double_in.copy()
+        if number == ScriptCommand.SPEED_L:  # d0-5 velocity, d6 acceleration
+            robot.motion = SpeedMove(doubles[:6], doubles[6])
+        elif number == ScriptCommand.SPEED_STOP:  # d0 deceleration
+            yield from self._stop(doubles[0])
+        elif number == ScriptCommand.FORCE_MODE:  # i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; type 2 only
+            axes, selection = rotation_matrix(doubles[3:6]), registers.int_in[2:8].astype(float)
+            robot.force_mode = ForceMode(axes, selection, doubles[6:12], doubles[12:18])
+        elif number == ScriptCommand.FORCE_MODE_STOP:
+            speeding = robot.motion
+            robot.end_force_mode()
+            yield from self._stop(FORCE_MODE_STOP)
+            if not speeding.done:  # a speed goes on afterwards: its thread lives
+                robot.motion = speeding
+        elif number == ScriptCommand.ZERO_FT_SENSOR:
+            robot.zero_force()
+        elif number == ScriptCommand.GET_STEPTIME:
+            registers.double_out[0] = self._step_s
+        elif number == ScriptCommand.SET_WATCHDOG:  # d0 lowest frequency
+            self._host.set_watchdog(doubles[0])
+        elif number not in self._unknown:
+            self._unknown.add(number)
+            print(f'emulated UR controller: command {number} does nothing here', file=sys.stderr)
 
     def _stop(self, deceleration: float) -> Steps:
-        self._robot.motion = motion = StopMove(deceleration)
+        self._robot.motion = motion = stop_move(deceleration)
         while not motion.done:
             yield
-
-    def speed_l(self) -> None:
-        """d0-5 velocity, d6 acceleration."""
-        self._robot.motion = SpeedMove(self._vector(0), self._registers.double_in[6])
-
-    def speed_stop(self) -> Steps:
-        """d0 deceleration."""
-        return self._stop(self._registers.double_in[0])
-
-    def force_mode(self) -> None:
-        """i1 type, i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; only type 2, the frame as it is."""
-        self._robot.force_mode = ForceMode(
-            axes=rotation_matrix(self._vector(0)[3:]),
-            selection=np.array(self._registers.int_in[2:8]),
-            wrench=self._vector(6),
-            limits=self._vector(12),
-        )
-
-    def force_mode_stop(self) -> Steps:
-        """End yielding, then stop. What speedl was told goes on afterwards: its thread lives."""
-        speeding = self._robot.motion
-        self._robot.end_force_mode()
-        yield from self._stop(FORCE_MODE_STOP)
-        if isinstance(speeding, SpeedMove):
-            self._robot.motion = speeding
-
-    def zero_ft_sensor(self) -> None:
-        """Take the present force for nothing."""
-        self._robot.zero_force()
-
-    def get_steptime(self) -> None:
-        """Result d0."""
-        self._registers.double_out[0] = self._step_s
-
-    def set_watchdog(self) -> None:
-        """d0 lowest frequency."""
-        self._host.set_watchdog(self._registers.double_in[0])
-
-
-COMMANDS: Mapping[int, Callable[[ControlProgram], Steps | None]] = {
-    ScriptCommand.FORCE_MODE: ControlProgram.force_mode,
-    ScriptCommand.FORCE_MODE_STOP: ControlProgram.force_mode_stop,
-    ScriptCommand.ZERO_FT_SENSOR: ControlProgram.zero_ft_sensor,
-    ScriptCommand.SPEED_L: ControlProgram.speed_l,
-    ScriptCommand.SPEED_STOP: ControlProgram.speed_stop,
-    ScriptCommand.GET_STEPTIME: ControlProgram.get_steptime,
-    ScriptCommand.SET_WATCHDOG: ControlProgram.set_watchdog,
-}
 
 
 # --------------------
@@ -609,6 +556,11 @@ class EmulatedController:
         """Whether a program runs."""
         return self._program is not None and not self.paused
 
+    @property
+    def state(self) -> str:
+        """State of the program, as the dashboard names it."""
+        return 'PAUSED' if self.paused else 'PLAYING' if self.playing else 'STOPPED'
+
     def tick(self) -> None:
         """Do one cycle."""
         self.ticks += 1
@@ -641,10 +593,17 @@ class EmulatedController:
             first = FIRST_REGISTER.search(script)
             self.first_register = int(first.group(1)) if first else 0
 
-    def play(self, name: str) -> None:
-        """Run a program that somebody else brought; it takes no commands and does nothing."""
-        self.stop_program()
-        self._program, self.program_name = itertools.repeat(None), name
+    def load(self, name: str) -> str:
+        """Take note of what `play` runs, and return the answer of the dashboard."""
+        self.loaded = name
+        return f'Loading program: {name}'
+
+    def play(self) -> bool:
+        """Run the loaded program, which takes no commands and does nothing; return whether there is one."""
+        if self.loaded:
+            self.stop_program()
+            self._program, self.program_name = itertools.repeat(None), self.loaded
+        return bool(self.loaded)
 
     def pause(self) -> None:
         """Let the program wait."""
@@ -661,7 +620,7 @@ class EmulatedController:
         """End the program, and with it every motion and the watchdog."""
         if self._program is not None:
             self.robot.end_force_mode()
-            self.robot.motion = StopMove(STOP_DECELERATION)
+            self.robot.motion = stop_move(STOP_DECELERATION)
         self._program = None
         self.paused = False
         self._starts_s = None
@@ -728,13 +687,7 @@ FIXED_ANSWERS: Mapping[str, str] = {
     'get robot model': 'UR5',
     'is in remote control': 'true',
     'robotmode': 'Robotmode: RUNNING',
-    'isprogramsaved': 'true rtde_control',
     'close safety popup': 'closing safety popup',
-    'close popup': 'closing popup',
-    'popup': 'showing popup',
-    'addtolog': 'Added log message',
-    'power on': 'Powering on',
-    'brake release': 'Brake releasing',
     'quit': 'Disconnected',
 }
 
@@ -749,30 +702,29 @@ class DashboardSession(Session):
         self._received = b''
         robot, plane = controller.robot, controller.robot.surface
         numbers = '.'.join(str(number) for number in controller.version.numbers)
+        # Command: its answer, or what does it and returns the answer.
         self._answers: Mapping[str, str | Callable[[str], str]] = {
             **FIXED_ANSWERS,
             'polyscopeversion': f'URSoftware {numbers} (emulated)',
             'safetystatus': lambda _: f'Safetystatus: {controller.safety.name}',
             'safetymode': lambda _: f'Safetymode: {controller.safety.name}',
             'running': lambda _: f'Program running: {str(controller.playing).lower()}',
-            'programstate': self._state,
-            'get loaded program': self._loaded,
-            'load': self._load,
-            'play': self._play,
-            'stop': self._stop,
-            'pause': self._pause,
+            'programstate': lambda _: f'{controller.state} {controller.program_name}',
+            'load': controller.load,
+            'play': lambda _: 'Starting program' if controller.play() else 'Failed to execute: play',
+            'stop': partial(_do, controller.stop_program, 'Stopped'),
+            'pause': partial(_do, controller.pause, 'Pausing program'),
             'unlock protective stop': lambda _: 'Protective stop releasing' if controller.unlock() else TOO_EARLY,
-            'emulate protective stop': self._emulate_stop,
-            'emulate offline': partial(_set, go_offline, 'seconds', 'Going offline'),
-            'emulate silence': partial(_set, go_silent, 'seconds', 'Falling silent'),
-            'emulate slow': partial(
-                _set, partial(setattr, controller, 'acknowledge_s'), 'seconds', 'Acknowledging late'
-            ),
-            'emulate speed': partial(_set, partial(setattr, robot, 'speed_share'), 'shares', 'The speed was set'),
-            'emulate drop': partial(_set, partial(setattr, plane, 'drop_m'), 'metres', 'The surface was moved'),
-            'emulate friction': partial(
-                _set, partial(setattr, plane, 'friction'), 'newtons per N', 'The friction was set'
-            ),
+            'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
+        }
+        # Fault switch: what takes the number, and its unit.
+        self._switches: Mapping[str, tuple[Callable[[float], None], str]] = {
+            'emulate offline': (go_offline, 'seconds'),
+            'emulate silence': (go_silent, 'seconds'),
+            'emulate slow': (partial(setattr, controller, 'acknowledge_s'), 'seconds'),
+            'emulate speed': (partial(setattr, robot, 'speed_share'), 'shares'),
+            'emulate drop': (partial(setattr, plane, 'drop_m'), 'metres'),
+            'emulate friction': (partial(setattr, plane, 'friction'), 'newtons per N'),
         }
 
     def greeting(self) -> bytes:
@@ -788,41 +740,18 @@ class DashboardSession(Session):
         for command, answer in self._answers.items():
             if line.lower() == command or line.lower().startswith(command + ' '):
                 return answer if isinstance(answer, str) else answer(line[len(command) :].strip())
+        for command, (use, unit) in self._switches.items():
+            if line.lower().startswith(command):
+                return _set(use, unit, line[len(command) :].strip())
         return f'could not understand: {line}'
 
-    def _load(self, argument: str) -> str:
-        self._controller.loaded = argument
-        return f'Loading program: {argument}'
 
-    def _loaded(self, _argument: str) -> str:
-        loaded = self._controller.loaded
-        return f'Loaded program: {loaded}' if loaded else 'No program loaded'
-
-    def _play(self, _argument: str) -> str:
-        if not self._controller.loaded:
-            return 'Failed to execute: play'
-        self._controller.play(self._controller.loaded)
-        return 'Starting program'
-
-    def _pause(self, _argument: str) -> str:
-        self._controller.pause()
-        return 'Pausing program'
-
-    def _state(self, _argument: str) -> str:
-        controller = self._controller
-        state = 'PAUSED' if controller.paused else 'PLAYING' if controller.playing else 'STOPPED'
-        return f'{state} {controller.program_name}'
-
-    def _stop(self, _argument: str) -> str:
-        self._controller.stop_program()
-        return 'Stopped'
-
-    def _emulate_stop(self, _argument: str) -> str:
-        self._controller.protective_stop()
-        return f'Safetystatus: {self._controller.safety.name}'
+def _do(action: Callable[[], None], answer: str, _argument: str) -> str:
+    action()
+    return answer
 
 
-def _set(use: Callable[[float], None], unit: str, done: str, argument: str) -> str:
+def _set(use: Callable[[float], None], unit: str, argument: str) -> str:
     """Set what a fault switch sets by a number, and return the answer."""
     try:
         number = float(argument)
@@ -831,7 +760,7 @@ def _set(use: Callable[[float], None], unit: str, done: str, argument: str) -> s
     if not 0 <= number < math.inf:
         return f"came '{argument}'; a number of {unit} is needed"
     use(number)
-    return done
+    return f'set to {number:g} {unit}'
 
 
 # --------------------
@@ -868,9 +797,37 @@ Variable = tuple[str, Getter]
 
 JOINTS = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 JOINT_RUNNING = 253
+STATES = {'PAUSED': PROGRAM_PAUSED, 'PLAYING': PROGRAM_PLAYING, 'STOPPED': PROGRAM_STOPPED}
+ZEROS = (0.0,) * 6
+# What stands still: type, values, and the names that have them.
+CONSTANTS: Sequence[tuple[str, Sequence[float], str]] = (
+    ('INT32', (ROBOT_RUNNING,), 'robot_mode'),
+    ('VECTOR6INT32', (JOINT_RUNNING,) * 6, 'joint_mode'),
+    ('VECTOR3D', (0.0, 0.0, -9.81), 'actual_tool_accelerometer'),
+    ('VECTOR3D', ZEROS[:3], 'payload_cog'),
+    ('VECTOR6D', JOINTS, 'target_q actual_q'),
+    (
+        'VECTOR6D',
+        ZEROS,
+        'payload_inertia target_qd target_qdd target_current target_moment actual_qd actual_current '
+        'actual_current_as_torque joint_control_output',
+    ),
+    ('VECTOR6D', (30.0,) * 6, 'joint_temperatures'),
+    ('VECTOR6D', (48.0,) * 6, 'actual_joint_voltage'),
+    ('UINT64', (0,), 'actual_digital_input_bits actual_digital_output_bits'),
+    (
+        'DOUBLE',
+        (0.0,),
+        'payload actual_momentum standard_analog_input0 standard_analog_input1 standard_analog_output0 '
+        'standard_analog_output1',
+    ),
+    ('DOUBLE', (1.0,), 'speed_scaling target_speed_fraction actual_robot_current'),
+    ('DOUBLE', (48.0,), 'actual_main_voltage actual_robot_voltage'),
+    ('DOUBLE', (0.1,), 'actual_execution_time'),
+)
 
 
-def _constant(*values: float) -> Getter:
+def _constant(values: Sequence[float]) -> Getter:
     return lambda _controller: values
 
 
@@ -878,64 +835,20 @@ def _register(name: str, index: int) -> Getter:
     return lambda controller: (getattr(controller.registers, name)[index],)
 
 
-def _status_bits(controller: EmulatedController) -> Sequence[int]:
-    return (POWER_ON_BIT | (PROGRAM_RUNNING_BIT if controller.playing else 0),)
-
-
-def _runtime_state(controller: EmulatedController) -> Sequence[int]:
-    if controller.paused:
-        return (PROGRAM_PAUSED,)
-    return (PROGRAM_PLAYING if controller.playing else PROGRAM_STOPPED,)
+def _of_robot(name: str) -> Variable:
+    return 'VECTOR6D', lambda controller: getattr(controller.robot, name).tolist()
 
 
 OUTPUTS: Mapping[str, Variable] = {
+    **{name: (kind, _constant(values)) for kind, values, names in CONSTANTS for name in names.split()},
     'timestamp': ('DOUBLE', lambda controller: (controller.time_s,)),
-    'actual_TCP_pose': ('VECTOR6D', lambda controller: controller.robot.pose.tolist()),
-    'target_TCP_pose': ('VECTOR6D', lambda controller: controller.robot.pose.tolist()),
-    'actual_TCP_speed': ('VECTOR6D', lambda controller: controller.robot.velocity.tolist()),
-    'target_TCP_speed': ('VECTOR6D', lambda controller: controller.robot.velocity.tolist()),
-    'actual_TCP_force': ('VECTOR6D', lambda controller: controller.robot.force.tolist()),
-    'ft_raw_wrench': ('VECTOR6D', lambda controller: controller.robot.force.tolist()),
+    **dict.fromkeys(('actual_TCP_pose', 'target_TCP_pose'), _of_robot('pose')),
+    **dict.fromkeys(('actual_TCP_speed', 'target_TCP_speed'), _of_robot('velocity')),
+    **dict.fromkeys(('actual_TCP_force', 'ft_raw_wrench'), _of_robot('force')),
     'safety_mode': ('INT32', lambda controller: (int(controller.safety),)),
     'safety_status_bits': ('UINT32', lambda controller: (SAFETY_BITS[controller.safety],)),
-    'robot_status_bits': ('UINT32', _status_bits),
-    'runtime_state': ('UINT32', _runtime_state),
-    'robot_mode': ('INT32', _constant(ROBOT_RUNNING)),
-    'joint_mode': ('VECTOR6INT32', _constant(*(JOINT_RUNNING,) * 6)),
-    'actual_tool_accelerometer': ('VECTOR3D', _constant(0.0, 0.0, -9.81)),
-    'payload': ('DOUBLE', _constant(0.0)),
-    'payload_cog': ('VECTOR3D', _constant(0.0, 0.0, 0.0)),
-    'payload_inertia': ('VECTOR6D', _constant(*(0.0,) * 6)),
-    'target_q': ('VECTOR6D', _constant(*JOINTS)),
-    'actual_q': ('VECTOR6D', _constant(*JOINTS)),
-    **{
-        name: ('VECTOR6D', _constant(*(0.0,) * 6))
-        for name in (
-            'target_qd',
-            'target_qdd',
-            'target_current',
-            'target_moment',
-            'actual_qd',
-            'actual_current',
-            'actual_current_as_torque',
-            'joint_control_output',
-        )
-    },
-    'joint_temperatures': ('VECTOR6D', _constant(*(30.0,) * 6)),
-    'actual_joint_voltage': ('VECTOR6D', _constant(*(48.0,) * 6)),
-    'actual_digital_input_bits': ('UINT64', _constant(0)),
-    'actual_digital_output_bits': ('UINT64', _constant(0)),
-    'actual_execution_time': ('DOUBLE', _constant(0.1)),
-    'speed_scaling': ('DOUBLE', _constant(1.0)),
-    'target_speed_fraction': ('DOUBLE', _constant(1.0)),
-    'actual_momentum': ('DOUBLE', _constant(0.0)),
-    'actual_main_voltage': ('DOUBLE', _constant(48.0)),
-    'actual_robot_voltage': ('DOUBLE', _constant(48.0)),
-    'actual_robot_current': ('DOUBLE', _constant(1.0)),
-    'standard_analog_input0': ('DOUBLE', _constant(0.0)),
-    'standard_analog_input1': ('DOUBLE', _constant(0.0)),
-    'standard_analog_output0': ('DOUBLE', _constant(0.0)),
-    'standard_analog_output1': ('DOUBLE', _constant(0.0)),
+    'robot_status_bits': ('UINT32', lambda controller: (POWER_ON_BIT | PROGRAM_RUNNING_BIT * controller.playing,)),
+    'runtime_state': ('UINT32', lambda controller: (STATES[controller.state],)),
     **{f'output_int_register_{index}': ('INT32', _register('int_out', index)) for index in range(COUNT)},
     **{f'output_double_register_{index}': ('DOUBLE', _register('double_out', index)) for index in range(COUNT)},
 }
@@ -946,30 +859,16 @@ Setter = Callable[[EmulatedController, Sequence[Any]], None]
 def _write(name: str, index: int) -> Setter:
     def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
         getattr(controller.registers, name)[index] = values[0]
-
-    return setter
-
-
-def _write_command(index: int) -> Setter:
-    """Write a command register; the watchdog watches that of the program."""
-
-    def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
-        controller.registers.int_in[index] = values[0]
-        if index == controller.first_register:
+        if name == 'int_in' and index == controller.first_register:  # the watchdog watches that of the program
             controller.registers.heard(controller.time_s)
 
     return setter
 
 
-def _ignore(_controller: EmulatedController, _values: Sequence[Any]) -> None:
-    return
-
-
 INPUTS: Mapping[str, tuple[str, Setter]] = {
     **{f'input_int_register_{index}': ('INT32', _write('int_in', index)) for index in range(COUNT)},
     **{f'input_double_register_{index}': ('DOUBLE', _write('double_in', index)) for index in range(COUNT)},
-    **{f'input_int_register_{index}': ('INT32', _write_command(index)) for index in COMMAND_REGISTERS},
-    'external_force_torque': ('VECTOR6D', _ignore),
+    'external_force_torque': ('VECTOR6D', lambda _controller, _values: None),
 }
 
 
@@ -993,7 +892,7 @@ class RtdeSession(Session):
         self._every_s = controller.step_s
         self._due_s = 0.0
         self._started = False
-        self._inputs: list[InputRecipe] = []
+        self._inputs: list[list[str]] = []
 
     def receive(self, data: bytes) -> bytes:
         """Take over what came; return the answers."""
@@ -1001,8 +900,7 @@ class RtdeSession(Session):
         answers = b''
         while (packet := self._take_packet()) is not None:
             kind, payload = packet
-            handler = HANDLERS.get(kind)
-            answer = handler(self, payload) if handler is not None else None
+            answer = self._answer(kind, payload)
             answers += _message(kind, answer) if answer is not None else b''
         return answers
 
@@ -1032,11 +930,21 @@ class RtdeSession(Session):
         values = [value for getter in self._getters for value in getter(controller)]
         return _message(RtdeMessage.DATA, bytes([OUTPUT_RECIPE]) + self._output_format.pack(*values))
 
-    def _on_request_version(self, payload: bytes) -> bytes:
-        return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
-
-    def _on_controller_version(self, _payload: bytes) -> bytes:
-        return struct.pack('>4I', *self._controller.version.numbers)
+    def _answer(self, kind: int, payload: bytes) -> bytes | None:
+        if kind == RtdeMessage.REQUEST_VERSION:
+            return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
+        if kind == RtdeMessage.CONTROLLER_VERSION:
+            return struct.pack('>4I', *self._controller.version.numbers)
+        if kind == RtdeMessage.SETUP_OUTPUTS:
+            return self._on_setup_outputs(payload)
+        if kind == RtdeMessage.SETUP_INPUTS:
+            return self._on_setup_inputs(payload)
+        if kind in (RtdeMessage.START, RtdeMessage.PAUSE):
+            self._started = kind == RtdeMessage.START
+            return b'\x01'
+        if kind == RtdeMessage.DATA and payload and 1 <= payload[0] <= len(self._inputs):
+            write_inputs(self._controller, self._inputs[payload[0] - 1], payload[1:])
+        return None
 
     def _on_setup_outputs(self, payload: bytes) -> bytes | None:
         if len(payload) < 8:
@@ -1055,7 +963,7 @@ class RtdeSession(Session):
         types = [self._input_type(name) for name in names]
         if not {'NOT_FOUND', 'IN_USE'} & set(types):
             self._claims.update(dict.fromkeys(names, self))
-            self._inputs.append(InputRecipe(names))
+            self._inputs.append(names)
         return bytes([len(self._inputs)]) + ','.join(types).encode()
 
     def _input_type(self, name: str) -> str:
@@ -1063,50 +971,17 @@ class RtdeSession(Session):
             return 'NOT_FOUND'
         return INPUTS[name][0] if self._claims.get(name, self) is self else 'IN_USE'
 
-    def _on_start(self, _payload: bytes) -> bytes:
-        self._started = True
-        return b'\x01'
 
-    def _on_pause(self, _payload: bytes) -> bytes:
-        self._started = False
-        return b'\x01'
-
-    def _on_data(self, payload: bytes) -> None:
-        if payload and 1 <= payload[0] <= len(self._inputs):
-            self._inputs[payload[0] - 1].write(self._controller, payload[1:])
-
-
-class InputRecipe:
-    """A list of inputs that are written together."""
-
-    def __init__(self, names: list[str]) -> None:
-        self._format = _format([INPUTS[name][0] for name in names])
-        self._setters: list[tuple[Setter, int]] = [
-            (INPUTS[name][1], len(struct.unpack(fields, bytes(struct.calcsize(fields)))))
-            for name in names
-            for fields in ['>' + FORMATS[INPUTS[name][0]]]
-        ]
-
-    def write(self, controller: EmulatedController, data: bytes) -> None:
-        """Write the values in `data`; what has another length is not taken."""
-        if len(data) != self._format.size:
-            return
-        values = self._format.unpack(data)
-        start = 0
-        for setter, count in self._setters:
-            setter(controller, values[start : start + count])
-            start += count
-
-
-HANDLERS: Mapping[int, Callable[[RtdeSession, bytes], bytes | None]] = {
-    RtdeMessage.REQUEST_VERSION: RtdeSession._on_request_version,
-    RtdeMessage.CONTROLLER_VERSION: RtdeSession._on_controller_version,
-    RtdeMessage.SETUP_OUTPUTS: RtdeSession._on_setup_outputs,
-    RtdeMessage.SETUP_INPUTS: RtdeSession._on_setup_inputs,
-    RtdeMessage.START: RtdeSession._on_start,
-    RtdeMessage.PAUSE: RtdeSession._on_pause,
-    RtdeMessage.DATA: RtdeSession._on_data,
-}
+def write_inputs(controller: EmulatedController, names: Sequence[str], data: bytes) -> None:
+    """Write the values in `data` to inputs; what has another length is not taken."""
+    if len(data) != _format([INPUTS[name][0] for name in names]).size:
+        return
+    start = 0
+    for name in names:
+        kind, setter = INPUTS[name]
+        fields = struct.Struct('>' + FORMATS[kind])
+        setter(controller, fields.unpack_from(data, start))
+        start += fields.size
 
 
 def _message(kind: int, payload: bytes) -> bytes:

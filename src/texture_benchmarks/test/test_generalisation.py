@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_benchmarks import generalisation
+from texture_benchmarks.generalisation import (
+    CONTROLS,
+    DECIDED,
+    DISTANCE,
+    END,
+    SPACING,
+    Answer,
+    Trial,
+    TrialSet,
+    answers_of,
+    figures,
+    names_of,
+)
+from texture_benchmarks.peers import SVC, recipe_of
+from texture_benchmarks.study import BenchmarkOptions
+from texture_recordings.dataset import SlideDataset
+
+RATE_HZ = 100.0
+
+
+def slides(seconds: float = 4.0, topic: str = 'signal', count: int = 4, **given: object) -> SlideDataset:
+    time_s = np.arange(round(seconds * RATE_HZ))[:, None] / RATE_HZ
+    labels = (['cork', 'felt'] * count)[:count]
+    return SlideDataset.from_arrays({topic: [time_s] * count}, labels, {topic: RATE_HZ}, **given)  # type: ignore[arg-type]
+
+
+def ended(surface: str, label: str, *, accepted: bool, cluster: str, decided: str = '') -> Answer:
+    ends = {END: (label, accepted)} | ({DECIDED: (decided, True)} if decided else {})
+    return Answer(cluster, surface, ends, '' if accepted else 'novel')
+
+
+def test_of_a_long_slide_the_middle_is_kept() -> None:
+    [one, *_] = generalisation._middles(slides(20.0)).samples('signal')
+    assert (one.samples[0, 0], len(one.samples)) == (6.0, 800)
+    [whole, *_] = generalisation._middles(slides(4.0)).samples('signal')
+    assert len(whole.samples) == 400
+
+
+def test_adjacent_parts_are_joined_to_one_stretch_of_the_slide() -> None:
+    [stretch, *_] = generalisation._joined(slides(4.0).in_parts(10), (2, 5))
+    [samples] = SlideDataset((stretch,)).samples('signal')
+    np.testing.assert_allclose(samples.samples[[0, -1], 0], [0.8, 1.99], atol=1e-6)
+
+
+def test_each_cell_is_trained_once_and_tested_at_every_distance() -> None:
+    cells = generalisation._cells(slides(8.0, count=80, speed_m_s=0.02).in_parts(8))
+    alone = [one for one in cells if (DISTANCE, '0') in one.tested]
+    assert len(alone) == 8 * len(generalisation.DRAWS)
+    # From the end of the track there is one cell seven cells away; from inside there are two at most distances.
+    counts = [sum(len(one.tested.get((DISTANCE, str(cells)), ())) for one in alone[:8]) for cells in range(8)]
+    assert [count / counts[7] for count in counts] == [4, 7, 6, 5, 4, 3, 2, 1]
+    assert not any(set(one.trained) & {name for names in one.tested.values() for name in names} for one in cells)
+    assert {row for one in cells for table, row in one.tested if table == SPACING} >= {'2, 6: between'}
+
+
+def test_slides_of_one_track_count_once_for_the_interval() -> None:
+    tested = [ended('cork', 'cork', accepted=True, cluster='cork 1/2')] * 50
+    tested += [ended('felt', 'cork', accepted=True, cluster='felt 1/2')] * 50
+    found = figures(tested)
+    assert (found['slides'], found['clusters'], found['accuracy'], found['accepted_wrong']) == (100, 2, 0.5, 0.5)
+    assert found['interval']['accuracy'] == [0.0, 1.0]
+
+
+def test_the_worst_time_counts_for_accepted_but_wrong() -> None:
+    tested = [ended('cork', 'cork', accepted=True, cluster='a', decided='felt')]
+    tested += [ended('felt', 'cork', accepted=False, cluster='b')] * 3
+    found = figures(tested)
+    assert (found['accepted_correct'], found['accepted_wrong'], found['most_accepted_wrong']) == (0.25, 0.0, 0.25)
+    assert found['rejections'] == {'novel': 3}
+
+
+def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() -> None:
+    made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
+    names = made.names.tolist()
+    trials = TrialSet('t', tuple(CONTROLS), made, [Trial('', names, {('halves', 'same'): names})])
+    [(cell, answers)] = answers_of(trials, 0, recipe_of, 'direction alone')
+    assert cell == ('halves', 'same', 'direction alone', '')
+    assert all(one.ends[END][0] == one.surface for one in answers)
+
+
+def test_names_are_of_the_places_asked_for() -> None:
+    assert names_of(slides().in_parts(2), '2', '2/2') == ['cork/2 part 2/2', 'felt/2 part 2/2']
+
+
+def test_a_reduced_run_tests_recipe_and_peer_near_and_far(tmp_path: Path) -> None:
+    result = generalisation.run(BenchmarkOptions(tmp_path, quick=True))
+    for row in ('0', '1'):
+        assert set(result.numbers[DISTANCE][row]) == {'fast', SVC}
+    assert (tmp_path / 'generalisation.png').exists()
+    near, far = (result.numbers[DISTANCE][row]['fast'] for row in ('0', '1'))
+    assert near['accuracy'] > 0.8
+    assert near['accepted_correct'] + near['accepted_wrong'] + sum(near['rejections'].values()) / near['slides'] == (
+        pytest.approx(1.0)
+    )
+    assert far['slides'] == near['slides']

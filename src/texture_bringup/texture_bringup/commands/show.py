@@ -1,0 +1,252 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The sub-commands of `texture` that look at what there is: catalogues, a bag or a model, this machine."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes.util
+import grp
+import inspect
+import os
+import platform
+import re
+import socket
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from texture_core.cli import Command
+from texture_core.config import find, shipped
+from texture_core.types import NANOSECONDS
+
+# What a command needs is imported when it runs: each looks at other packages.
+# ruff: noqa: PLC0415
+
+Row = tuple[str, str]
+
+
+def table(rows: Iterable[Row]) -> str:
+    """Return rows of a name and a text as lines, the texts below each other."""
+    rows = list(rows)
+    width = max((len(name) for name, _ in rows), default=0)
+    return '\n'.join(f'{name:<{width}}  {text}'.rstrip() for name, text in rows)
+
+
+# --------------------
+# List what can be chosen.
+
+
+def _first_line(entry: Any) -> str:
+    """Return the first line of the docstring of a class or of the module of a function, and which fingers it is for."""
+    if isinstance(entry, partial):
+        return f'{_first_line(entry.func)} {", ".join(f"{name} {value}" for name, value in _shown(entry))}'.strip()
+    documented = entry if inspect.isclass(entry) else inspect.getmodule(entry)
+    line = (inspect.getdoc(documented) or '').partition('\n')[0]
+    return re.split(r'[;.] [Ss]ee `', line)[0]
+
+
+def _shown(entry: partial[Any]) -> Iterator[tuple[str, Any]]:
+    return ((name, value) for name, value in entry.keywords.items() if isinstance(value, tuple))
+
+
+def _catalogue(entries: Mapping[str, Any]) -> Iterator[Row]:
+    return ((name, _first_line(entry)) for name, entry in entries.items())
+
+
+def _sensors() -> Iterator[Row]:
+    from texture_drivers.catalogue import SENSORS
+
+    return _catalogue(SENSORS)
+
+
+def _arms() -> Iterator[Row]:
+    from texture_exploration.arms.catalogue import ARMS
+
+    return _catalogue(ARMS)
+
+
+def _motions() -> Iterator[Row]:
+    from texture_exploration.motions import DEFAULTS
+    from texture_exploration.safety import SafetyLimits
+
+    for motion, defaults in DEFAULTS.items():
+        ranges = {name: (value, *SafetyLimits().range(name)) for name, value in defaults.items()}
+        yield (
+            motion,
+            ', '.join(
+                f'{name} {value:g} ({low:g} to {high:g} {unit})' for name, (value, low, high, unit) in ranges.items()
+            ),
+        )
+
+
+def _recipes() -> Iterator[Row]:
+    for folder in ('config/recipes', 'config/roughness'):
+        for name, path in shipped('texture_estimation', folder).items():
+            yield name, str(yaml.safe_load(path.read_text(encoding='utf-8')).get('description', ''))
+
+
+def _surfaces() -> Iterator[Row]:
+    from texture_simulation.scene import load_scene
+
+    for name in shipped('texture_simulation', 'config/scenes'):
+        scene = load_scene(name)
+        yield name, f'{scene.sensor}: {", ".join(scene.surfaces)}'
+
+
+LISTS: Mapping[str, tuple[str, Callable[[], Iterator[Row]]]] = {
+    'sensors': ('what `sensor:=` of a launch takes', _sensors),
+    'motions': ('what `texture explore` takes, with default and range of each number', _motions),
+    'arms': ('what the parameter `arm` of the explorer takes', _arms),
+    'recipes': ('what `texture train` takes', _recipes),
+    'surfaces': ('what the emulator simulates, by scene', _surfaces),
+}
+
+
+def _configure_list(parser: argparse.ArgumentParser) -> None:
+    about = '; '.join(f'{name}: {meaning}' for name, (meaning, _) in LISTS.items())
+    parser.add_argument('what', metavar='{' + ','.join(LISTS) + '}', help=about)
+
+
+def _list(options: argparse.Namespace) -> int:
+    print(table(find(LISTS, options.what, 'list')[1]()))
+    return 0
+
+
+# --------------------
+# What a bag or a model holds.
+
+
+def _configure_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument('path', help='bag, folder of bags, or model')
+    parser.add_argument('--namespace', metavar='NS', help='namespace of the recorded nodes, if there are several')
+
+
+def _info(options: argparse.Namespace) -> int:
+    from texture_recordings.bags import find_bags
+
+    path = Path(options.path)
+    # A model is one of two files that share a name; everything else is looked for as a bag, which says what is wrong.
+    if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
+        print('\n'.join(_model_lines(path)))
+        return 0
+    for bag in find_bags([path]):
+        print(f'{bag}\n{table(_bag_rows(bag, options.namespace))}')
+    return 0
+
+
+def _model_lines(path: Path) -> list[str]:
+    from texture_estimation.model import load_model
+    from texture_evaluation.commands.train import summary
+
+    model = load_model(path)
+    return [f'model {model.name}', *summary(model, path)[:-1], f'topics: {", ".join(model.recipe.feature_set.topics)}']
+
+
+def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
+    """Yield number of messages by topic, length, sensors, and the slides over each surface of a bag."""
+    from texture_core.types import ExplorationState, Phase, TactileSignal
+    from texture_recordings.bags import read_bag
+
+    counts: Counter[str] = Counter()
+    ends: dict[str, tuple[str, Phase]] = {}
+    sensors: dict[str, str] = {}
+    first_ns = last_ns = 0
+    for topic, log_ns, value in read_bag(bag, None, namespace):
+        counts[topic] += 1
+        first_ns, last_ns = first_ns or log_ns, log_ns
+        if isinstance(value, TactileSignal):
+            sensors.setdefault(topic, f'{value.sensor}, {len(value.channels)} × {value.sampling_rate_hz:g} Hz')
+        elif isinstance(value, ExplorationState) and value.exploration_id:
+            ends[value.exploration_id] = value.surface, value.phase
+    yield '  length', f'{(last_ns - first_ns) / NANOSECONDS:.1f} s'
+    for topic, count in sorted(counts.items()):
+        yield f'  {topic}', f'{count} messages{f" of {sensors[topic]}" if topic in sensors else ""}'
+    for surface in sorted({surface for surface, _ in ends.values()}):
+        phases = Counter(phase.value for name, phase in ends.values() if name == surface)
+        yield f'  {surface or "(no surface)"}', ', '.join(f'{count} {phase}' for phase, count in phases.items())
+
+
+# --------------------
+# What of this machine matters, on one screen.
+
+PACKAGES = ('texture_core', 'rclpy', 'numpy', 'scipy', 'scikit-learn', 'rosbags', 'ur-rtde', 'aiohttp')
+GROUPS = {'dialout': 'serial devices', 'audio': 'sound cards', 'realtime': 'real-time priority'}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return 'not installed'
+
+
+def _ports() -> str:
+    from serial.tools import list_ports
+
+    found = [f'{port.device} ({port.description})' for port in list_ports.comports()]
+    return ', '.join(found) or 'none; plug the sensor in, and see whether its kernel driver is loaded'
+
+
+def _groups() -> str:
+    mine = {grp.getgrgid(number).gr_name for number in os.getgroups() if _has_name(number)}
+    rows = [f'{name} {"yes" if name in mine or not os.geteuid() else "no"} ({use})' for name, use in GROUPS.items()]
+    return ', '.join(rows)
+
+
+def _has_name(group: int) -> bool:
+    try:
+        return bool(grp.getgrgid(group))
+    except KeyError:
+        return False
+
+
+def _ros() -> str:
+    distribution = os.environ.get('ROS_DISTRO', '')
+    sourced = [place for place in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if '/opt/ros/' in place]
+    where = f'sourced from {sourced[0]}' if sourced else 'from the Python packages of the set-up, none is sourced'
+    return f'{distribution or "no distribution"}, {where}'
+
+
+def _dds() -> str:
+    try:
+        from texture_bringup.operator import middleware
+
+        name = middleware()
+    except Exception as error:  # whatever a broken installation raises: this command shows it
+        name = f'cannot be loaded: {error}'
+    domain, reach = os.environ.get('ROS_DOMAIN_ID', '0'), os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    return f'{name}, domain {domain}, discovery range {reach}'
+
+
+def _dashboard_port() -> str:
+    with socket.socket() as probe:
+        return '8085 is busy' if probe.connect_ex(('127.0.0.1', 8085)) == 0 else '8085 is free'
+
+
+CHECKS: Mapping[str, Callable[[], str]] = {
+    'system': lambda: f'{platform.platform()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}',
+    'Python': platform.python_version,
+    'ROS': _ros,
+    'DDS': _dds,
+    'serial ports': _ports,
+    'groups': _groups,
+    'PortAudio': lambda: ctypes.util.find_library('portaudio') or "not installed; sensor 'sound_card' needs it",
+    'dashboard': _dashboard_port,
+    'versions': lambda: ', '.join(f'{name} {_version(name)}' for name in PACKAGES),
+}
+
+
+def _doctor(_options: argparse.Namespace) -> int:
+    print(table((name, check()) for name, check in CHECKS.items()))
+    return 0
+
+
+list_ = Command('list what can be chosen: sensors, motions, arms, recipes, surfaces', _configure_list, _list)
+info = Command('show what a bag or a model holds', _configure_info, _info)
+doctor = Command('show what of this machine matters: ports, groups, ROS, versions', lambda _parser: None, _doctor)

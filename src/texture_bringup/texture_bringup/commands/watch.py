@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""`texture watch`: show signal, finger and estimates on the terminal, live or from a bag."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from typing import Any
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from texture_bringup.feed import FRAME_PERIOD_S, Feed
+from texture_core.cli import add_namespace
+from texture_core.errors import InvalidParameter
+from texture_core.types import NANOSECONDS
+
+BAR, LABELS = 30, 5
+LONGEST_PAUSE_S = 1.0  # between two messages of a bag
+Frame = Mapping[str, Any]
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    parser.add_argument('bag', nargs='?', help='bag to show instead of the running nodes')
+    parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded a bag is shown')
+    add_namespace(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show what happens until Ctrl-C or the end of the bag: a picture on a terminal, else a line for each change."""
+    if not options.rate > 0.0:
+        raise InvalidParameter(f'--rate is {options.rate:g}; a number above 0 is needed')
+    feed, console = Feed(), Console()
+    live = Live(console=console, auto_refresh=False) if console.is_terminal else nullcontext()
+    try:
+        with live:
+            show = _picture(feed, live) if isinstance(live, Live) else _lines(feed)
+            if options.bag:
+                _play(options.bag, options.rate, options.namespace, feed, show)
+            else:
+                from texture_bringup.operator import Operator  # noqa: PLC0415 - a bag is shown without ROS
+
+                with Operator(options.namespace) as operator:
+                    operator.watch(feed, show)
+    except KeyboardInterrupt:  # the usual end of it
+        return 0
+    return 0
+
+
+def _play(bag: str, rate: float, namespace: str, feed: Feed, show: Callable[[], None]) -> None:
+    """Give the messages of a bag to the feed at their pace."""
+    from texture_recordings.bags import read_bag  # noqa: PLC0415 - nothing else needs it
+
+    last_ns = None
+    for topic, log_ns, value in read_bag(bag, feed.topics, namespace or None):
+        pause_s = 0.0 if last_ns is None else (log_ns - last_ns) / NANOSECONDS / rate
+        time.sleep(min(max(0.0, pause_s), LONGEST_PAUSE_S))
+        last_ns = log_ns
+        feed.topics[topic][1](value)
+        show()
+
+
+# --------------------
+# On a terminal: one picture, drawn anew.
+
+
+def _picture(feed: Feed, live: Live) -> Callable[[], None]:
+    """Return what draws the newest frame, ten times a second at most."""
+    drawn_s, peak = 0.0, 0.0
+
+    def show() -> None:
+        nonlocal drawn_s, peak
+        now_s = time.monotonic()
+        if now_s - drawn_s >= FRAME_PERIOD_S:
+            frame = feed.frame(now_s)
+            peak = max(peak, frame['signal']['level'] or 0.0)
+            live.update(picture(frame, peak), refresh=True)
+            drawn_s = now_s
+
+    return show
+
+
+def picture(frame: Frame, peak: float) -> Group:
+    """Return a frame as rows of a name, a bar and numbers; `peak` is the level that fills its bar."""
+    signal, state, texture, roughness = (frame[name] for name in ('signal', 'state', 'texture', 'roughness'))
+    rows = Table.grid(padding=(0, 2))
+    rows.add_column(min_width=12)
+    level = signal['level'] or 0.0
+    named = f'{level:.3g} {signal["unit"]}  {signal["sensor"]} {signal["channel"]}'
+    rows.add_row('signal', bar(level / peak if peak else 0.0, 'cyan'), named if signal['sensor'] else 'no samples yet')
+    rows.add_row(Text(state['phase'], style='bold'), bar(state['progress'] or 0.0, 'white'), finger_text(state))
+    rows.add_row()
+    style = 'green' if texture['known'] else 'yellow'
+    for label, probability in list(zip(texture['labels'], texture['probabilities'], strict=True))[:LABELS]:
+        rows.add_row(label, bar(probability, style), f'{probability:.2f}')
+    faults = [light for light in frame['lights'] if light['colour'] not in ('green', 'grey')]
+    return Group(
+        rows,
+        Text(f'texture    {texture_text(texture)}', style=f'bold {style}'),
+        Text(f'roughness  {roughness_text(roughness)}'),
+        *(Text(f'{light["name"]}: {light["message"]}', style=light['colour']) for light in faults),
+    )
+
+
+def bar(share: float, style: str) -> Text:
+    """Return a bar that is filled to a fraction."""
+    full = round(BAR * min(max(share, 0.0), 1.0))
+    return Text.assemble(('█' * full, style), ('─' * (BAR - full), 'dim'))
+
+
+# --------------------
+# Elsewhere: a line for each change.
+
+
+def _lines(feed: Feed) -> Callable[[], None]:
+    """Return what prints the newest frame, if its phase or its estimate is another."""
+    last: tuple[Any, ...] = ()
+
+    def show() -> None:
+        nonlocal last
+        state, texture, grade = feed.newest()
+        key = state.exploration_id, state.phase, texture.label, texture.rejection, texture.final, grade.valid
+        if key != last:
+            last = key
+            print(line(feed.frame(time.monotonic())), flush=True)
+
+    return show
+
+
+def line(frame: Frame) -> str:
+    """Return a frame as one line."""
+    signal, state, texture = frame['signal'], frame['state'], frame['texture']
+    level = f'level {signal["level"]:.3g} {signal["unit"]}' if signal['level'] is not None else 'no samples'
+    words = [f'{state["phase"]:<9}', finger_text(state), level, texture_text(texture)]
+    if frame['roughness']['valid']:
+        words.append(f'roughness {roughness_text(frame["roughness"])}')
+    return ' | '.join(words)
+
+
+def finger_text(state: Mapping[str, Any]) -> str:
+    """Return motion, speed and force of a frame in words."""
+    numbers = [
+        f'{state[name]:.{digits}f} {unit}'
+        for name, digits, unit in (('speed_m_s', 3, 'm/s'), ('force_n', 2, 'N'))
+        if state[name] is not None
+    ]
+    return '  '.join([*numbers, *filter(None, [state['motion']])]) or 'no exploration'
+
+
+def texture_text(texture: Mapping[str, Any]) -> str:
+    """Return the estimate of a frame in words: the label and whether it is accepted, or why there is none."""
+    if not texture['label']:
+        return str(texture['message'] or texture['missing'] or 'none yet')
+    verdict = 'accepted' if texture['known'] else f'rejected: {texture["rejection"]}'
+    sure = '' if texture['confidence'] is None else f', confidence {texture["confidence"]:.2f}'
+    decided = ', decided' if texture['decided'] else ''
+    return f'{texture["label"]}{sure} after {texture["evidence_s"]:.1f} s, {verdict}{decided}'
+
+
+def roughness_text(roughness: Mapping[str, Any]) -> str:
+    """Return the grade of a frame in words."""
+    if not roughness['valid']:
+        return str(roughness['message'] or '–')
+    return f'{roughness["grade"]:.1f} on the scale from 1 (smooth) to 5 (rough)'

@@ -1,0 +1,358 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes publish, the newest of everything in bounded memory: what the dashboard and `texture watch` show."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.types import (
+    ENDED,
+    ExplorationState,
+    ModelInfo,
+    Phase,
+    Rejection,
+    RoughnessEstimate,
+    TactileSignal,
+    TextureEstimate,
+)
+
+# --------------------
+# One light per node: green, yellow or red; a node that has fallen silent is red, one that has ended is grey.
+
+SILENT_S = 5.0  # nodes report once a second
+MAX_LIGHTS = 64
+MAX_CHARACTERS = 300
+ENDED_COLOURS = {'OK': 'grey', 'WARN': 'yellow', 'ERROR': 'red'}
+COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
+
+
+class NodeStatuses:
+    """Keep what each node said last."""
+
+    def __init__(self) -> None:
+        # Level, message, time (of a clock that only rises, s), and whether the node has ended with that.
+        self._lights: dict[str, tuple[str, str, float, bool]] = {}
+
+    def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
+        """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
+        self._lights.pop(name, None)
+        self._lights[name[:MAX_CHARACTERS]] = level, message[:MAX_CHARACTERS], time_s, ended
+        if len(self._lights) > MAX_LIGHTS:
+            del self._lights[next(iter(self._lights))]
+
+    def newest(self, name: str) -> tuple[str, str] | None:
+        """Return level and message of what a node said last; None if it never did."""
+        return self._lights[name][:2] if name in self._lights else None
+
+    def shown(self, time_s: float) -> list[dict[str, str]]:
+        """Return name, colour and sentence of each light, by name."""
+        found = []
+        for name, (level, message, said_s, ended) in sorted(self._lights.items()):
+            colour, text = COLOURS.get(level, 'red'), message
+            if ended:
+                colour, text = ENDED_COLOURS.get(level, 'red'), f'ended: {message}'
+            elif time_s - said_s > SILENT_S:
+                colour, text = 'red', f'silent for {time_s - said_s:.0f} s; it said last: {message}'
+            found.append({'name': name, 'colour': colour, 'message': text})
+        return found
+
+
+# --------------------
+# The newest samples of one stream, and how they are drawn with few numbers.
+
+MAX_SAMPLES = 100_000
+
+
+class Ring:
+    """Keep the newest samples of the first channel of a stream."""
+
+    def __init__(self, length_s: float) -> None:
+        self._length_s = length_s
+        self._samples: NDArray[np.float64] = np.zeros(0)  # of the whole length, NaN where none came yet
+        self._next: int | None = None
+        self.rate_hz = 0.0
+        self.sensor = ''
+        self.channel = ''
+        self.unit = ''
+        self.lost = 0
+
+    def update(self, signal: TactileSignal) -> None:
+        """Append a batch; a stream of another sensor or rate starts again, lost samples leave a gap of NaN."""
+        if (signal.sensor, signal.sampling_rate_hz) != (self.sensor, self.rate_hz):
+            self._begin(signal)
+        gap = 0 if self._next is None else max(0, signal.first_sample - self._next)
+        self._next = signal.next_sample
+        self.lost += gap
+        fresh = signal.samples[:, 0].astype(np.float64)
+        if gap:
+            fresh = np.concatenate([np.full(min(gap, len(self._samples)), np.nan), fresh])
+        self._samples = np.concatenate([self._samples, fresh])[-len(self._samples) :]
+
+    def newest(self, length_s: float) -> NDArray[np.float64]:
+        """Return the newest samples, (n_samples,), oldest first; NaN where none came yet."""
+        count = min(len(self._samples), round(length_s * self.rate_hz))
+        return self._samples[len(self._samples) - count :]
+
+    def _begin(self, signal: TactileSignal) -> None:
+        size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MAX_SAMPLES))
+        self._samples = np.full(size, np.nan)
+        self._next = None
+        self.rate_hz, self.sensor = signal.sampling_rate_hz, signal.sensor
+        self.channel, self.unit = signal.channels[0], signal.common_unit
+
+
+def envelope(samples: NDArray[np.float64], points: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and the greatest sample of `points` stretches: no peak is lost, however few are drawn."""
+    points = min(points, len(samples))
+    if points == 0:
+        return np.zeros(0), np.zeros(0)
+    edges = np.linspace(0, len(samples), points, endpoint=False).astype(int)
+    low = np.fmin.reduceat(samples, edges)
+    high = np.fmax.reduceat(samples, edges)
+    return low, high
+
+
+def spectrum_db(samples: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
+    """Return the amplitude from 0 Hz to half the rate in dB of one unit, the greatest of each bin; empty if gaps.
+
+    A sine of amplitude 1 reads 0 dB (Hann window, its gain taken out).
+    """
+    if len(samples) < 16 or not np.isfinite(samples).all():
+        return np.zeros(0)
+    window = np.hanning(len(samples))
+    amplitude = 2.0 * np.abs(np.fft.rfft(window * (samples - samples.mean()))) / window.sum()
+    bins = min(bins, len(amplitude))
+    edges = np.linspace(0, len(amplitude), bins, endpoint=False).astype(int)
+    levels: NDArray[np.float64] = 20.0 * np.log10(np.maximum(np.maximum.reduceat(amplitude, edges), 1e-6))
+    return levels
+
+
+# --------------------
+# The image of the slow channels: how far each is from where it rested, and where it lies.
+
+PLACE = re.compile(r'.*_(\d+)_(\d+)')  # 'taxel_6_3': row and column
+MAX_CHANNELS = 1024
+RESTING_SHARE = 0.05  # of a batch in the resting value: follows a drift of seconds, not a touch
+LEAST_NOISES = 10.0  # range of the colours in standard deviations of the noisiest channel, so that noise stays pale
+
+
+class Taxels:
+    """Keep the newest image and the resting one."""
+
+    def __init__(self) -> None:
+        self.channels: tuple[str, ...] = ()
+        self.places: list[tuple[int, int]] = []
+        self.unit = ''
+        self._resting: NDArray[np.float64] = np.zeros(0)
+        self._newest: NDArray[np.float64] = np.zeros(0)
+        self._power: NDArray[np.float64] = np.zeros(0)  # of the noise of each channel
+
+    def update(self, signal: TactileSignal, touching: bool) -> None:
+        """Take the newest sample; while nothing is touched it moves the resting image."""
+        newest = signal.samples[-1:, :MAX_CHANNELS].astype(np.float64)
+        if not len(newest):
+            return
+        if signal.channels[:MAX_CHANNELS] != self.channels:
+            self.channels, self.unit = signal.channels[:MAX_CHANNELS], signal.common_unit
+            self.places = places_of(self.channels)
+            self._resting, self._power = newest[0], np.zeros(newest.shape[1])
+        self._newest = newest[0]
+        if not touching:
+            known = np.where(np.isfinite(self._resting), self._resting, self._newest)
+            step = np.nan_to_num(self._newest - known, posinf=0.0, neginf=0.0)
+            self._resting = known + RESTING_SHARE * step
+            self._power += RESTING_SHARE * np.where(np.isfinite(self._newest), step**2 - self._power, 0.0)
+
+    @property
+    def image(self) -> NDArray[np.float64]:
+        """How far each channel is from its resting value, (n_channels,)."""
+        return self._newest - self._resting
+
+    @property
+    def least_range(self) -> float:
+        """Smallest value that has the full colour, in the unit of the channels; 0 while no noise was measured."""
+        return LEAST_NOISES * float(np.sqrt(self._power.max(initial=0.0)))
+
+
+def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Return row and column of each channel: as its name tells, else line by line in a square."""
+    named = [PLACE.fullmatch(channel) for channel in channels]
+    if named and all(named):
+        return [(int(match[1]), int(match[2])) for match in named if match]
+    columns = int(np.ceil(np.sqrt(len(channels)))) or 1
+    return [divmod(number, columns) for number in range(len(channels))]
+
+
+# --------------------
+# What the page shows: the newest of everything, in bounded memory, as one JSON text a frame.
+
+FRAME_PERIOD_S = 0.1
+MAX_EXPLORATIONS = 12  # that are listed; the page itself keeps the frames that it has shown of them, for replay
+SIGNAL_S, SPECTRUM_S, LEVEL_S = 2.0, 0.5, 0.1
+POINTS, BINS = 240, 128
+MAX_LABELS = 200
+DIGITS = 4
+IDLE = ExplorationState(0, '', '', Phase.IDLE)
+
+
+class Feed:
+    """Take what the nodes publish; give frames. Used from one thread at a time."""
+
+    def __init__(self) -> None:
+        self._past: dict[str, dict[str, Any]] = {}  # summaries by exploration, the newest last
+        self.node_statuses = NodeStatuses()
+        self._ring = Ring(SIGNAL_S)
+        self._taxels = Taxels()
+        self._state = IDLE
+        self._texture = TextureEstimate(0, '')
+        self._model = ModelInfo(0)
+        self._roughness = RoughnessEstimate(0, '')
+        self.recording = ''  # folder that is being recorded to
+        self.working = ''  # what a sub-command that the page has started said last
+
+    @property
+    def topics(self) -> Mapping[str, tuple[str, Callable[[Any], None]]]:
+        """The type of each topic that is shown, and what takes its values."""
+        return {
+            'signal': ('TactileSignal', self.on_signal),
+            'signal_static': ('TactileSignal', self.on_static),
+            'exploration': ('ExplorationState', self.on_state),
+            'texture': ('TextureEstimate', self.on_texture),
+            'roughness': ('RoughnessEstimate', self.on_roughness),
+            'model_info': ('ModelInfo', self.on_model),
+        }
+
+    def on_signal(self, signal: TactileSignal) -> None:
+        """Take a batch of the fast stream."""
+        self._ring.update(signal)
+
+    def on_static(self, signal: TactileSignal) -> None:
+        """Take a batch of the slow stream."""
+        self._taxels.update(signal, touching=self._state.phase not in ENDED)
+
+    def on_state(self, state: ExplorationState) -> None:
+        """Take what the finger is doing; a new exploration begins without evidence."""
+        if state.exploration_id and state.exploration_id not in self._past:
+            self._texture = TextureEstimate(state.stamp_ns, state.exploration_id)
+            self._roughness = RoughnessEstimate(state.stamp_ns, state.exploration_id)
+        self._state = state
+        if state.exploration_id:
+            seen = {'motion': state.motion, 'phase': state.phase.value, 'surface': state.surface}
+            self._note(state.exploration_id, seen)
+
+    def on_texture(self, estimate: TextureEstimate) -> None:
+        """Take an estimate; one of an exploration before the present one only enters its summary."""
+        reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'known': estimate.known}
+        if estimate.exploration_id in self._past:
+            self._note(estimate.exploration_id, reported)
+        if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
+            self._texture = estimate
+
+    def on_model(self, model: ModelInfo) -> None:
+        """Take the labels of the classifier's model."""
+        self._model = model
+
+    def on_roughness(self, estimate: RoughnessEstimate) -> None:
+        """Take an estimate; one of an exploration before the present one only enters its summary."""
+        if estimate.exploration_id in self._past:
+            self._note(estimate.exploration_id, {'grade': _number(estimate.grade)})
+        if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
+            self._roughness = estimate
+
+    def _note(self, exploration_id: str, seen: Mapping[str, Any]) -> None:
+        """Add to the summary of an exploration; the oldest is forgotten."""
+        self._past[exploration_id] = {**self._past.get(exploration_id, {}), **seen, 'id': exploration_id}
+        if len(self._past) > MAX_EXPLORATIONS:
+            del self._past[next(iter(self._past))]
+
+    def newest(self) -> tuple[ExplorationState, TextureEstimate, RoughnessEstimate]:
+        """Return what came last of the present exploration."""
+        return self._state, self._texture, self._roughness
+
+    def frame(self, time_s: float) -> dict[str, Any]:
+        """Return everything that is shown at a time of the monotonic clock, s, as JSON can carry it."""
+        return {
+            'signal': self._signal(),
+            'spectrum': self._spectrum(),
+            'taxels': self._image(),
+            'state': self._shown_state(),
+            'texture': self._evidence(),
+            'roughness': {name: _plain(value) for name, value in asdict(self._roughness).items()},
+            'lights': self.node_statuses.shown(time_s),
+            'past': list(reversed(self._past.values())),
+            'recording': self.recording,
+            'working': self.working,
+        }
+
+    def _signal(self) -> dict[str, Any]:
+        ring = self._ring
+        low, high = envelope(ring.newest(SIGNAL_S), POINTS)
+        names = {'sensor': ring.sensor, 'channel': ring.channel, 'unit': ring.unit}
+        level = _number(float(np.std(ring.newest(LEVEL_S)))) if ring.rate_hz else None
+        return {
+            **names,
+            'level': level,
+            'low': _numbers(low),
+            'high': _numbers(high),
+            'length_s': SIGNAL_S,
+            'lost': ring.lost,
+        }
+
+    def _spectrum(self) -> dict[str, Any]:
+        levels = spectrum_db(self._ring.newest(SPECTRUM_S), BINS)
+        return {'db': _numbers(levels), 'high_hz': self._ring.rate_hz / 2}
+
+    def _image(self) -> dict[str, Any]:
+        taxels = self._taxels
+        least = {'least_range': _number(taxels.least_range)}
+        return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit, **least}
+
+    def _missing(self, what: str, name: str) -> str:
+        """Return that there is no estimate yet and what its node says, if that node is not well."""
+        status = self.node_statuses.newest(name)
+        if status is None:
+            return f'no {what} yet, and no {name} reports on /diagnostics'
+        level, message = status
+        return f'no {what} yet' + ('' if level == 'OK' else f': {message}')
+
+    def _shown_state(self) -> dict[str, Any]:
+        return {name: _plain(value) for name, value in asdict(self._state).items()}
+
+    def _evidence(self) -> dict[str, Any]:
+        """Return the estimate with the most probable labels first."""
+        estimate, model = self._texture, self._model
+        fits = (estimate.model, estimate.revision) == (model.model, model.revision)  # else the labels come in a moment
+        labels = model.labels if fits else ()
+        pairs = sorted(zip(estimate.probabilities, labels, strict=False), reverse=True)[:MAX_LABELS]
+        shown = {name: _plain(value) for name, value in asdict(estimate).items()} | {'known': estimate.known}
+        shown['missing'] = '' if estimate.label or estimate.message else self._missing('estimate', 'classifier')
+        shown['labels'] = [label for _, label in pairs]
+        shown['probabilities'] = _numbers(probability for probability, _ in pairs)
+        return shown
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON can carry it exactly: NaN as null, nanoseconds as text."""
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, Phase):
+        return value.value
+    if isinstance(value, Rejection):
+        return value.name.lower().replace('_', ' ')
+    return str(value) if isinstance(value, int) and abs(value) > 2**53 else value
+
+
+def _number(value: float) -> float | None:
+    return float(f'{value:.{DIGITS}g}') if math.isfinite(value) else None
+
+
+def _numbers(values: Iterable[float] | np.ndarray[Any, np.dtype[np.float64]]) -> list[float | None]:
+    return [_number(float(value)) for value in values]

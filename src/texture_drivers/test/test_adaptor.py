@@ -1,0 +1,299 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of other drivers become signals by a mapping; each shipped one is tried with the fields of its vendor."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace as Message
+from typing import Any
+
+import numpy as np
+import pytest
+
+from texture_core.config import shipped
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import NANOSECONDS, TactileSignal
+from texture_drivers.adaptor import SignalAdaptor, SignalMapping, compile_path, load_mapping
+
+START_NS = 1_700_000_000 * NANOSECONDS
+MS = 1_000_000
+Make = Callable[[int, int], Any]  # number of the message and its time, ns
+
+
+def header(stamp_ns: int) -> Message:
+    sec, nanosec = divmod(stamp_ns, NANOSECONDS)
+    return Message(stamp=Message(sec=sec, nanosec=nanosec), frame_id='')
+
+
+def vector(x: float, y: float, z: float) -> Message:
+    return Message(x=x, y=y, z=z)
+
+
+def biotac_hand(n: int, ns: int, **changes: Any) -> Message:
+    """A BioTacHand with BioTacs at positions 1 and 3."""
+    fields = [
+        {
+            'bt_serial': f'BT-{place}', 'bt_position': place, 'tdc_data': 1000 * place, 'tac_data': 2000,
+            'pdc_data': 2200, 'pac_data': list(range(100 * place, 100 * place + 22)),
+            'electrode_data': list(range(1, 20)),
+        }
+        for place in (1, 3)
+    ]  # fmt: skip
+    return Message(header=header(ns), hand_id='left', bt_data=[Message(**{**field, **changes}) for field in fields])
+
+
+def biotac_all(n: int, ns: int) -> Message:
+    finger = Message(pac0=1, pac1=2, pac=[3] * 20, pdc=2200, tac=2000, tdc=1000, electrodes=list(range(1, 20)))
+    return Message(header=header(ns), tactiles=[finger] * 5)
+
+
+def papillarray(n: int, ns: int) -> Message:
+    pillars = [
+        Message(id=i, dx=i, dy=i + 10, dz=i + 20, fx=i + 30, fy=i + 40, fz=i + 50, in_contact=True, slip_state=0)
+        for i in range(9)
+    ]
+    wrench = {'gfx': 1.0, 'gfy': 2.0, 'gfz': 3.0, 'gtx': 4.0, 'gty': 5.0, 'gtz': 6.0}
+    return Message(header=header(ns), tus=n * 2000, pillars=pillars, **wrench)
+
+
+def xela(n: int, ns: int) -> Message:
+    taxels = [Message(x=16_000 + i, y=17_000 + i, z=18_000 + i) for i in range(16)]
+    sensor = Message(message=n, time=ns / 1e9, model='uSPa44', sensor_pos=0, taxels=taxels, forces=[], temperatures=[])
+    return Message(sensors=[sensor])
+
+
+ONE = Message(value=7)
+# Mapping, signal: message, rate of messages, finger, what the last row is.
+CASES: dict[tuple[str, str], tuple[Make, float, int, list[float]]] = {
+    ('robotiq_tsf', 'signal'): (lambda n, ns: Message(data=[Message(value=0), ONE]), 1000, 1, [7]),
+    ('robotiq_tsf', 'signal_static'): (
+        lambda n, ns: Message(taxels=[Message(values=list(range(28))), Message(values=[0] * 28)]), 60, 0, [*range(28)],
+    ),
+    ('tactilesensors4', 'signal'): (lambda n, ns: ONE, 1000, 0, [7]),
+    ('tactilesensors4', 'signal_static'): (lambda n, ns: Message(value=[3] * 28), 60, 0, [3] * 28),
+    ('biotac_sensors', 'signal'): (biotac_hand, 100, 2, [321]),
+    ('biotac_sensors', 'signal_static'): (biotac_hand, 100, 2, [3000, 2000, 2200, *range(1, 20)]),
+    ('sr_robot_msgs', 'signal'): (biotac_all, 100, 4, [3]),
+    ('sr_robot_msgs', 'signal_static'): (biotac_all, 100, 4, [1000, 2000, 2200, *range(1, 20)]),
+    ('papillarray', 'signal'): (papillarray, 500, 0, [*range(30, 39), *range(40, 49), *range(50, 59), *range(9),
+                                                      *range(10, 19), *range(20, 29)]),
+    ('papillarray', 'signal_wrench'): (papillarray, 500, 0, [1, 2, 3, 4, 5, 6]),
+    ('xela', 'signal'): (xela, 100, 0, [*range(16_000, 16_016), *range(17_000, 17_016), *range(18_000, 18_016)]),
+    ('anyskin', 'signal'): (lambda n, ns: Message(layout=None, data=[0.5] * 15), 50, 0, [0.5] * 15),
+    ('tactile_msgs', 'signal'): (
+        lambda n, ns: Message(
+            header=header(ns), sensors=[Message(name='a', values=[0]), Message(name='b', values=[1, 2])]
+        ),
+        200, 1, [1, 2],
+    ),
+    ('imu', 'signal'): (
+        lambda n, ns: Message(header=header(ns), linear_acceleration=vector(1, 2, 3), angular_velocity=vector(4, 5, 6)),
+        400, 0, [1, 2, 3, 4, 5, 6],
+    ),
+    ('wrench', 'signal'): (
+        lambda n, ns: Message(header=header(ns), wrench=Message(force=vector(1, 2, 3), torque=vector(4, 5, 6))),
+        500, 0, [1, 2, 3, 4, 5, 6],
+    ),
+    ('float32_multi_array', 'signal'): (lambda n, ns: Message(layout=None, data=[1.5, 2.5]), 250, 0, [1.5, 2.5]),
+    ('audio', 'signal'): (
+        lambda n, ns: Message(header=header(ns), audio=Message(data=np.full(160, -16384, '<i2').tobytes())),
+        100, 0, [-0.5],
+    ),
+}  # fmt: skip
+
+
+def fed(adaptor: SignalAdaptor, make: Make, numbers: Any, period_ns: float) -> list[TactileSignal]:
+    """Return the batches of some messages; a number follows each where the mapping has one."""
+    batches = []
+    for n in numbers:
+        at_ns = START_NS + round(n * period_ns)
+        adaptor.take(make(n, at_ns), at_ns)
+        if adaptor.mapping.number_topic:
+            adaptor.take_number(Message(values=[n % 2**16] * 2), at_ns + 5000)
+        batches += adaptor.batches()
+    return batches
+
+
+def jumps(batches: list[TactileSignal]) -> int:
+    return sum(b.first_sample - a.next_sample for a, b in itertools.pairwise(batches))
+
+
+def test_every_shipped_mapping_is_tried_with_the_fields_of_its_vendor() -> None:
+    made = {
+        (name, signal)
+        for name in shipped('texture_drivers', 'config/adaptors')
+        for signal in load_mapping(name).signals
+    }
+    assert made == set(CASES)
+
+
+@pytest.mark.parametrize(('mapping', 'signal'), CASES)
+def test_a_shipped_mapping_gives_the_vendors_numbers_at_their_rate_and_times(mapping: str, signal: str) -> None:
+    make, message_hz, finger, row = CASES[mapping, signal]
+    adaptor = SignalAdaptor(signal, load_mapping(mapping, finger).signals[signal], 'tip')
+    batches = fed(adaptor, make, range(round(3 * message_hz)), NANOSECONDS / message_hz)
+    last = batches[-1]
+    assert last.samples[-1] == pytest.approx(row)
+    assert len(last.channels) == len(row)
+    assert len(last.units) in (0, len(row))
+    # The sample after the last of a message comes a period later: both ends of the stream fit the rate.
+    assert last.sampling_rate_hz == pytest.approx(
+        message_hz * (len(last.samples) if adaptor.mapping.consecutive else 1), rel=0.01
+    )
+    end_s = (last.stamp_ns - START_NS) / 1e9 + (len(last.samples) - 1) / last.sampling_rate_hz
+    assert end_s == pytest.approx(3, abs=0.03)
+    assert (jumps(batches), adaptor.lost, adaptor.refused, last.frame_id) == (0, 0, 0, 'tip')
+
+
+def test_the_times_of_a_biotac_are_those_of_its_slots() -> None:
+    signals = load_mapping('biotac_sensors', 2).signals
+    pac, slow = (fed(SignalAdaptor(name, signals[name]), biotac_hand, range(50), 10 * MS)[-1] for name in signals)
+    frame_ns = START_NS + 48 * 10 * MS  # the stamp of the last message is the end of this frame
+    assert abs(slow.stamp_ns - frame_ns) < 1000
+    assert abs(pac.stamp_ns - frame_ns - 227_273) < 1000
+
+
+def test_jitter_of_stamps_makes_no_losses_and_hardly_moves_the_times() -> None:
+    late_ns = np.random.default_rng(0).integers(0, 4 * MS, 300)
+    adaptor = SignalAdaptor('signal', load_mapping('biotac_sensors').signals['signal'])
+    batches = fed(adaptor, lambda n, ns: biotac_hand(n, ns + int(late_ns[n])), range(300), 10 * MS)
+    assert jumps(batches) == adaptor.lost == 0
+    stamps = np.array([batch.stamp_ns for batch in batches][100:])
+    assert np.ptp(stamps - 10 * MS * np.arange(len(stamps))) < MS
+
+
+def test_a_gap_in_the_stamps_is_a_loss() -> None:
+    adaptor = SignalAdaptor('signal', load_mapping('biotac_sensors').signals['signal'])
+    batches = fed(adaptor, biotac_hand, [n for n in range(60) if not 30 <= n < 34], 10 * MS)
+    assert jumps(batches) == adaptor.lost == 4 * 22
+
+
+def test_samples_that_neither_count_nor_stamp_are_missed_by_time_half_a_second_later() -> None:
+    adaptor = SignalAdaptor('signal', load_mapping('anyskin').signals['signal'])
+    batches = fed(adaptor, CASES['anyskin', 'signal'][0], [n for n in range(400) if not 200 <= n < 210], 20 * MS)
+    assert jumps(batches) == adaptor.lost == 10
+
+
+class Driver:
+    """The vendor's TSF-85 driver: a sample, and behind it its stamp, in messages of their own."""
+
+    def __init__(self) -> None:
+        self.adaptor = SignalAdaptor('signal', load_mapping('robotiq_tsf', 1).signals['signal'])
+        self.batches: list[TactileSignal] = []
+        self.stamp, self.now_ns = 65_400, START_NS
+
+    def run(self, packets: int, **faults: Any) -> None:
+        for value in range(packets):
+            lose, step = faults.get(f'at_{value}', ((), 1))
+            self.stamp += step
+            self.now_ns += step * MS or 50_000
+            if 'sample' not in lose:
+                self.adaptor.take(Message(data=[Message(value=0), Message(value=value)]), self.now_ns)
+            if 'stamp' not in lose:
+                self.adaptor.take_number(Message(values=[0, self.stamp % 2**16]), self.now_ns + 5000)
+            if value % 10 == 9:
+                self.batches += self.adaptor.batches()
+
+    def offsets(self) -> set[int]:
+        """By how much values and indices of samples differ."""
+        return {int(v) - b.first_sample - i for b in self.batches for i, v in enumerate(b.samples[:, 0])}
+
+
+def test_a_lost_sample_leaves_a_gap_and_a_lost_number_none() -> None:
+    driver = Driver()
+    driver.run(500, at_200=(('sample',), 1), at_300=(('stamp',), 1))
+    adaptor = driver.adaptor
+    assert len(driver.offsets()) == 1
+    assert (adaptor.lost, adaptor.unpaired, adaptor.unnumbered) == (1, 1, 1)
+    assert driver.batches[-1].end_ns == pytest.approx(driver.now_ns, abs=2 * MS)
+
+
+def test_a_repeated_number_is_no_new_sample() -> None:
+    driver = Driver()
+    driver.run(500, at_200=((), 0))
+    assert driver.adaptor.lost == 0
+    assert sum(len(batch.samples) for batch in driver.batches) >= 390
+
+
+def test_after_a_long_silence_the_gap_is_that_of_the_clock() -> None:
+    driver = Driver()
+    driver.run(500)
+    before = driver.batches[-1]
+    driver.now_ns += 70_000 * MS  # the number of 16 bits has wrapped
+    driver.stamp += 70_000
+    driver.run(500)
+    after = next(batch for batch in driver.batches if batch.first_sample > before.next_sample)
+    gap_s = (after.stamp_ns - before.end_ns) / 1e9
+    assert gap_s > 70
+    assert (after.first_sample - before.next_sample) / 1000 == pytest.approx(gap_s, abs=0.01)
+
+
+def test_a_value_that_is_no_number_is_published_as_unknown_and_counted() -> None:
+    adaptor = SignalAdaptor('signal', load_mapping('float32_multi_array').signals['signal'])
+    batches = fed(adaptor, lambda n, ns: Message(data=[1.0, float('inf')]), range(800), 4 * MS)
+    assert np.isnan(batches[-1].samples[-1, 1])
+    assert adaptor.invalid == 800
+
+
+@pytest.mark.parametrize(
+    ('mapping', 'signal', 'message', 'sentence'),
+    [
+        ('biotac_sensors', 'signal', biotac_hand(0, START_NS, bt_position=2), 'holds nothing at .*check the finger'),
+        ('biotac_sensors', 'signal_static', biotac_hand(0, START_NS, electrode_data=[1] * 24), '27 numbers; 22'),
+        ('biotac_sensors', 'signal', biotac_hand(0, 0), 'stamp of the message is 0'),
+        ('robotiq_tsf', 'signal_static', Message(taxels=[Message(values=[1] * 12)]), '12 numbers; 28'),
+        ('robotiq_tsf', 'signal', Message(value=3), "no field 'data"),
+        ('xela', 'signal', Message(sensors=[]), "no field 'sensors"),
+        ('float32_multi_array', 'signal', Message(data=['much']), 'no numbers'),
+        ('float32_multi_array', 'signal', Message(data=[]), '0 numbers'),
+        ('audio', 'signal', Message(header=header(START_NS), audio=Message(data=b'abc')), 'no numbers'),
+    ],
+)  # fmt: skip
+def test_a_message_that_does_not_fit_is_refused_in_one_sentence_and_counted(
+    mapping: str, signal: str, message: Any, sentence: str
+) -> None:
+    adaptor = SignalAdaptor(signal, load_mapping(mapping).signals[signal])
+    with pytest.raises(InvalidData, match=sentence):
+        adaptor.take(message, START_NS)
+    assert adaptor.refused == 1
+
+
+GOOD = {'topic': 't', 'type': 'p/msg/T', 'values': ['data']}
+
+
+@pytest.mark.parametrize(
+    ('change', 'sentence'),
+    [
+        ({'topic': ''}, "'topic' is missing"),
+        ({'type': 'p/T'}, 'package/msg/Type'),
+        ({'number_topic': 'n'}, 'belong together'),
+        ({'number': 'n', 'consecutive': True}, 'counts single samples'),
+        ({'units': ['N', 'm']}, '2 units came for 0 channels'),
+    ],
+)
+def test_a_mapping_that_cannot_be_is_refused(change: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(InvalidParameter, match=sentence):
+        SignalMapping(**{**GOOD, **change})
+
+
+def test_paths_reach_elements_by_index_by_field_and_all() -> None:
+    message = Message(a=[Message(id=4, b=[1, 2]), Message(id=9, b=[3, 4])])
+    assert compile_path('a[1].b[0]')(message) == [3]
+    assert compile_path('a[*].b')(message) == [[1, 2], [3, 4]]
+    assert compile_path('a[id=9].b')(message) == [[3, 4]]
+    for path in ('a[', 'a..b', '.a', 'a.b()'):
+        with pytest.raises(InvalidParameter, match='unreadable from'):
+            compile_path(path)
+
+
+def test_a_mapping_of_a_user_is_read_and_a_wrong_key_gets_the_nearest(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.yaml'
+    path.write_text('signals: {signal: {topic: t, type: p/msg/T, values: [data], rate: 3}}')
+    with pytest.raises(InvalidParameter, match="did you mean 'rate_hz'"):
+        load_mapping(str(path))
+    path.write_text('about: nothing')
+    with pytest.raises(InvalidParameter, match='no signals'):
+        load_mapping(str(path))

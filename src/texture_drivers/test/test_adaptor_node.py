@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The adaptor in ROS: messages of another driver come in, signals go out, faults are on /diagnostics."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Float32MultiArray
+from texture_msgs import msg
+
+from texture_core.errors import InvalidParameter
+from texture_core.ros import SENSOR_QOS
+from texture_core.ros_testing import LocalGraph
+from texture_drivers.nodes.adaptor import Adaptor
+
+pytestmark = [pytest.mark.ros, pytest.mark.realtime]
+
+
+@pytest.fixture
+def graph() -> Iterator[LocalGraph]:
+    with LocalGraph(65) as graph:
+        yield graph
+
+
+def test_messages_become_signals_and_silence_and_malformed_values_are_reported(graph: LocalGraph, tmp_path) -> None:
+    mapping = tmp_path / 'mine.yaml'
+    mapping.write_text(
+        'signals: {signal: {topic: tactile, type: std_msgs/msg/Float32MultiArray, values: [data], channels: [a, b], '
+        'units: [N], rate_hz: 1000, sensor: mine}}'
+    )
+    graph.add(Adaptor, mapping=str(mapping), frame_id='tip')
+    signals = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
+    reports = graph.listen(DiagnosticArray, '/diagnostics')
+    sender = graph.peer.create_publisher(Float32MultiArray, 'tactile', SENSOR_QOS)
+    graph.until(lambda: any('start the driver' in report.status[0].message for report in reports))
+    numbers = itertools.count()
+
+    def heard() -> bool:
+        sender.publish(Float32MultiArray(data=[float(next(numbers)), 0.5]))
+        return bool(signals)
+
+    graph.until(heard)
+    assert (signals[0].sensor, signals[0].header.frame_id, list(signals[0].units)) == ('mine', 'tip', ['N', 'N'])
+    assert np.array(signals[0].samples)[1] == 0.5
+    reports.clear()
+    sender.publish(Float32MultiArray(data=[1.0]))
+    graph.until(lambda: any('1 numbers; 2 are needed' in report.status[0].message for report in reports))
+    values = {value.key: value.value for value in reports[-1].status[0].values}
+    assert values['refused messages'] == '1'
+    assert 'unknown' in values['losses']
+
+
+def test_a_package_that_is_missing_is_reported_in_one_sentence(graph: LocalGraph) -> None:
+    with pytest.raises(InvalidParameter, match=r'robotiq_tsf/msg/Dynamic.* cannot be imported'):
+        graph.add(Adaptor, mapping='robotiq_tsf')

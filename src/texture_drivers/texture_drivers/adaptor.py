@@ -1,0 +1,370 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of any type made into signals, by a mapping file. Knows no ROS: any objects with the attributes will do."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from texture_core.config import find_file, load_yaml, param, tree_from_mapping
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import NANOSECONDS, Array, TactileSignal
+from texture_drivers.timing import ArrivalNumbering, RateMeter, SampleCounter, StreamClock
+
+# --------------------
+# The mapping file: which fields of which messages become which signal.
+
+ENCODINGS = {'': '', 'int16': '<i2', 'int32': '<i4', 'float32': '<f4'}
+TYPE = re.compile(r'\w+/msg/\w+')
+
+
+@dataclass(frozen=True)
+class SignalMapping:
+    """Where the numbers of one published signal come from."""
+
+    topic: str = param('', 'Topic that is subscribed.')
+    type: str = param('', 'Type of its messages, written as package/msg/Type.')
+    values: list[str] = param(  # noqa: RUF009 – it gives a field
+        [], 'Paths of the fields that hold the numbers, such as data[0].value, pillars[*].fx, or fingers[id=2].counts.'
+    )
+    channels: list[str] = param(  # noqa: RUF009 – it gives a field
+        [], 'Names of the channels; none numbers those of the first message.'
+    )
+    units: list[str] = param(  # noqa: RUF009 – it gives a field
+        [], 'Unit of each channel, or one unit of all; none leaves them unknown.'
+    )
+    gain: float = param(1.0, 'Factor by which the numbers are multiplied; it is signed.')
+    rate_hz: float = param(
+        0.0, 'Samples of a channel in a second; 0 measures it in the first 2 s.', unit='Hz', low=0.0, high=1e6
+    )
+    consecutive: bool = param(False, 'Takes the numbers of a message for consecutive samples and not for one.')
+    encoding: str = param(
+        '', 'How the numbers are packed in a field of bytes; none takes them as they are.', choices=tuple(ENCODINGS)
+    )
+    stamp: str = param('', 'Path of the time of the last sample; none takes the time at which a message was sent.')
+    stamp_after_s: float = param(0.0, 'How much later than the last sample that time is.', unit='s', low=-1.0, high=1.0)
+    number: str = param(
+        '', 'Path of the number of the sample, which tells losses exactly; none estimates them by time.'
+    )
+    number_topic: str = param('', 'Topic of that number, if it is sent in a message of its own behind the sample.')
+    number_type: str = param('', 'Type of the messages on that topic.')
+    sensor: str = param('', "Name of the sensor in the signal; none takes the mapping's name.")
+
+    def __post_init__(self) -> None:
+        for name, needed in (('topic', self.topic), ('type', self.type), ('values', self.values)):
+            if not needed:
+                raise InvalidParameter(f"'{name}' is missing; name it")
+        for kind in filter(None, (self.type, self.number_type)):
+            if not TYPE.fullmatch(kind):
+                raise InvalidParameter(f"type '{kind}' is unknown; write it as package/msg/Type")
+        if bool(self.number_topic) != bool(self.number_type) or (self.number_topic and not self.number):
+            raise InvalidParameter("'number', 'number_topic' and 'number_type' belong together; name all three")
+        if self.number and self.consecutive:
+            raise InvalidParameter("'number' counts single samples; leave it out where messages hold consecutive ones")
+        if len(self.units) > 1 and len(self.units) != len(self.channels):
+            raise InvalidParameter(f'{len(self.units)} units came for {len(self.channels)} channels; name one or each')
+
+
+@dataclass(frozen=True)
+class AdaptorMapping:
+    """The signals that are made of the messages of one driver."""
+
+    about: str = param('', 'What the mapping is for.')
+    signals: Mapping[str, SignalMapping] = field(default_factory=dict)
+
+
+def load_mapping(name_or_path: str, finger: int = 0) -> AdaptorMapping:
+    """Return a mapping that is shipped or written by a user, with {finger} and {place} filled in."""
+    path = find_file(name_or_path, 'texture_drivers', 'config/adaptors', 'mapping')
+    content = _filled(load_yaml(path, 'mapping'), {'{finger}': str(finger), '{place}': str(finger + 1)})
+    mapping = tree_from_mapping(AdaptorMapping, content, f"mapping '{path.stem}'")
+    if not mapping.signals:
+        raise InvalidParameter(f"mapping '{path.stem}' has no signals; name at least one")
+    return mapping
+
+
+def _filled(content: Any, values: Mapping[str, str]) -> Any:
+    """Return a tree with placeholders in its texts replaced."""
+    if isinstance(content, Mapping):
+        return {name: _filled(part, values) for name, part in content.items()}
+    if isinstance(content, list):
+        return [_filled(part, values) for part in content]
+    if isinstance(content, str):
+        for name, value in values.items():
+            content = content.replace(name, value)
+    return content
+
+
+# --------------------
+# Field paths: a.b[0].c, a[*].b for all elements, a[id=2].b for the element whose field id is 2.
+
+STEP = re.compile(r'(\w+)|\[(\d+|\*)\]|\[(\w+)=(-?\d+)\]')
+
+
+def compile_path(path: str) -> Callable[[Any], list[Any]]:
+    """Return what reads the fields at a path of a message, as a list."""
+    steps, at = [], 0
+    while at < len(path):
+        at += path.startswith('.', at) and at > 0
+        match = STEP.match(path, at)
+        if match is None:
+            raise InvalidParameter(f"path '{path}' is unreadable from '{path[at:]}' on; write it as a.b[0].c")
+        steps.append(_step(*match.groups()))
+        at = match.end()
+
+    def read(message: Any) -> list[Any]:
+        found = [message]
+        try:
+            for step in steps:
+                found = [part for one in found for part in step(one)]
+        except (AttributeError, IndexError, TypeError) as error:
+            raise InvalidData(f"the message has no field '{path}': {error}; correct the mapping or its type") from error
+        if not found:
+            raise InvalidData(f"the message holds nothing at '{path}'; check the finger, and that the sensor is there")
+        return found
+
+    return read
+
+
+def _step(name: str | None, index: str | None, key: str | None, value: str | None) -> Callable[[Any], Iterable[Any]]:
+    if name is not None:
+        return lambda one: (getattr(one, name),)
+    if key is not None and value is not None:
+        return lambda one: [part for part in one if getattr(part, key) == int(value)]
+    if index == '*':
+        return iter
+    return lambda one: (one[int(index or 0)],)
+
+
+def read_time_ns(stamp: Any) -> int:
+    """Return the time in a stamp of a header, or in seconds since 1970; InvalidData where it is 0."""
+    time_ns = stamp.sec * NANOSECONDS + stamp.nanosec if hasattr(stamp, 'sec') else round(stamp * NANOSECONDS)
+    if time_ns <= 0:
+        raise InvalidData('the stamp of the message is 0; leave `stamp` out of the mapping to take the time of sending')
+    return int(time_ns)
+
+
+# --------------------
+# One signal: its messages become numbered, timed batches.
+
+LATE_S = 0.015  # stamps jitter by some ms; what is later than that, and than half a message, has gaps before it
+MAX_WAITING = 50  # samples that wait for their number; more, and the number is taken as lost
+SILENCE_NS = NANOSECONDS  # after so long a number of 16 bits at 1 kHz may have wrapped unseen
+SHORTEST_BLOCK_S = 0.007  # of samples without number and stamp: what is late by less than 10 ms is no loss
+MOST_NUMBERS = 100_000  # in a message; more is no tactile signal
+
+
+class Sample(NamedTuple):
+    """What one message holds."""
+
+    rows: Array
+    end_ns: int
+    sent_ns: int
+    number: int | None = None
+
+
+class SignalAdaptor:
+    """Make the messages of one topic into batches: with a number losses are exact, else they are estimated by time."""
+
+    def __init__(self, name: str, mapping: SignalMapping, frame_id: str = '') -> None:
+        self.mapping = mapping
+        self.samples = self.lost = self.refused = self.invalid = self.unnumbered = self.unpaired = 0
+        self.rate_hz = mapping.rate_hz
+        self._sensor, self._frame_id = mapping.sensor or name, frame_id
+        self._channels = tuple(mapping.channels)
+        self._values = [compile_path(path) for path in mapping.values]
+        self._stamp = compile_path(mapping.stamp) if mapping.stamp else None
+        self._number = compile_path(mapping.number) if mapping.number else None
+        self._meter = RateMeter()
+        self._samples: deque[Sample] = deque()  # that wait for their number
+        self._numbers: deque[tuple[int, int]] = deque()  # and when they were sent
+        self._ready: list[Sample] = []
+        self._placed: list[tuple[int, Array]] = []
+        self._last_number: int | None = None
+        self._start()
+
+    def take(self, message: Any, sent_ns: int) -> None:
+        """Take a message; InvalidData, and counted, if it does not fit the mapping."""
+        try:
+            sample = self._read(message, sent_ns)
+        except InvalidData:
+            self.refused += 1
+            raise
+        if not self.rate_hz:
+            self.rate_hz = self._meter.update(len(sample.rows), sample.end_ns)
+            self._start()
+        elif self.mapping.number_topic:
+            self._samples.append(sample)
+        elif self._number is not None:
+            self._ready.append(sample)
+        else:
+            self._place(sample)
+
+    def take_number(self, message: Any, sent_ns: int) -> None:
+        """Take a message with the number of a sample; InvalidData, and counted, if it does not fit."""
+        try:
+            self._numbers.append((self._read_number(message), sent_ns))
+        except InvalidData:
+            self.refused += 1
+            raise
+        if len(self._numbers) > MAX_WAITING and not self._samples:
+            self._numbers.popleft()
+            self.unpaired += 1
+
+    def batches(self) -> list[TactileSignal]:
+        """Return what has come since the last call, in runs without gaps."""
+        if self._number is not None and self.rate_hz:
+            self._join_numbers()
+            self._place_numbered()
+        placed, self._placed = self._placed, []
+        runs: list[tuple[int, list[Array]]] = []
+        end = -1
+        for first, rows in placed:
+            if first != end:
+                runs.append((first, []))
+            runs[-1][1].append(rows)
+            end = first + len(rows)
+        return [self._batch(first, np.concatenate(rows)) for first, rows in runs]
+
+    def _start(self) -> None:
+        """Make clock and numbering, once the rate is known."""
+        rate_hz = self.rate_hz or 1.0
+        self._numbering = ArrivalNumbering(rate_hz, block_s=max(SHORTEST_BLOCK_S, 1 / rate_hz))
+        self._clock = StreamClock(rate_hz) if self._stamp and not self._number else self._numbering.clock
+        self._counter = SampleCounter()
+        self._next_index, self._end_ns = 0, 0
+
+    def _read(self, message: Any, sent_ns: int) -> Sample:
+        rows = self._rows(message)
+        self.invalid += int(np.count_nonzero(~np.isfinite(rows)))
+        rows[~np.isfinite(rows)] = np.nan
+        end_ns = sent_ns if self._stamp is None else read_time_ns(self._stamp(message)[0])
+        own = self._number is not None and not self.mapping.number_topic
+        number = self._read_number(message) if own else None
+        return Sample(
+            rows * self.mapping.gain, end_ns - round(self.mapping.stamp_after_s * NANOSECONDS), sent_ns, number
+        )
+
+    def _rows(self, message: Any) -> Array:
+        """Return the numbers of a message, (n_samples, n_channels)."""
+        try:
+            if self.mapping.encoding:
+                packed = b''.join(bytes(part) for read in self._values for part in read(message))
+                numbers = np.frombuffer(packed, ENCODINGS[self.mapping.encoding]).astype(float)
+            else:
+                parts = [np.ravel(np.asarray(part, dtype=float)) for read in self._values for part in read(message)]
+                numbers = np.concatenate(parts)
+        except (TypeError, ValueError) as error:
+            raise InvalidData(f'{self.mapping.values} are no numbers: {error}; correct the mapping') from error
+        if not 0 < len(numbers) <= MOST_NUMBERS:
+            raise InvalidData(f'the message holds {len(numbers)} numbers; 1 to {MOST_NUMBERS} are allowed')
+        if not self._channels:
+            count = 1 if self.mapping.consecutive else len(numbers)
+            self._channels = tuple(f'channel_{number}' for number in range(count))
+        width = len(self._channels)
+        if len(numbers) % width if self.mapping.consecutive else len(numbers) != width:
+            raise InvalidData(
+                f"the message on '{self.mapping.topic}' holds {len(numbers)} numbers; {width} are needed, one for each "
+                'channel of the mapping'
+            )
+        return numbers.reshape(-1, width)
+
+    def _read_number(self, message: Any) -> int:
+        assert self._number is not None
+        try:
+            return operator.index(self._number(message)[0])
+        except TypeError as error:
+            raise InvalidData(f"'{self.mapping.number}' is no whole number: {error}; correct the mapping") from error
+
+    # Samples with a number.
+
+    def _join_numbers(self) -> None:
+        """Give each sample the number that was sent between it and the next one."""
+        while len(self._samples) > 1:
+            first, following = self._samples[0], self._samples[1]
+            if not (self._numbers and self._numbers[-1][1] >= first.sent_ns) and len(self._samples) <= MAX_WAITING:
+                return
+            self._samples.popleft()
+            number = None
+            while self._numbers and self._numbers[0][1] < following.sent_ns:
+                value, sent_ns = self._numbers.popleft()
+                if number is None and sent_ns >= first.sent_ns:
+                    number = value
+                else:
+                    self.unpaired += 1
+            self.unnumbered += number is None
+            self._ready.append(first._replace(number=number))
+
+    def _place_numbered(self) -> None:
+        """Place the samples that have a number; one that is repeated is no new sample."""
+        fresh = []
+        for sample in self._ready:
+            if sample.number is None or sample.number != self._last_number:
+                fresh.append(sample)
+            self._last_number = sample.number
+        if fresh and self._end_ns and fresh[-1].end_ns - self._end_ns > SILENCE_NS:
+            self._interrupt()
+        self._ready = []
+        indices, restarted = self._counter.place([sample.number for sample in fresh])
+        placed, self._ready = fresh[: len(indices)], fresh[len(indices) :]
+        if self._ready:
+            self._last_number = None if not placed else placed[-1].number
+        if placed:
+            self._end_ns = placed[-1].end_ns
+            counted = any(sample.number is not None for sample in placed)
+            skipped = self._numbering.missing(indices[-1], self._end_ns, counted=counted)
+            self._counter.skip(skipped)
+            if self._clock.settled:
+                self._placed += [(index + skipped, sample.rows) for index, sample in zip(indices, placed, strict=True)]
+        self.lost = self._counter.lost
+        if restarted:
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        self._numbering.interrupt()
+        self._counter.interrupt()
+
+    # Samples without one.
+
+    def _place(self, sample: Sample) -> None:
+        """Place the samples of a message by its stamp, or by when it was sent."""
+        count = len(sample.rows)
+        if self._stamp is None:
+            before = self._numbering.next_index
+            indices = self._numbering.place([(0, count)], sample.end_ns)
+            self.lost += self._numbering.next_index - before - count
+            if indices:
+                self._placed.append((indices[0], sample.rows))
+            return
+        length_ns = count / self.rate_hz * NANOSECONDS
+        late_ns = sample.end_ns - self._end_ns - length_ns if self._end_ns else 0.0
+        if late_ns > max(LATE_S * NANOSECONDS, length_ns / 2):
+            missing = round(late_ns / NANOSECONDS * self.rate_hz)
+            self.lost += missing
+            self._next_index += missing
+        self._end_ns = sample.end_ns
+        first, self._next_index = self._next_index, self._next_index + count
+        self._clock.observe(self._next_index - 1, sample.end_ns)
+        if self._clock.settled:
+            self._placed.append((first, sample.rows))
+
+    def _batch(self, first: int, rows: Array) -> TactileSignal:
+        self.samples += len(rows)
+        units = tuple(self.mapping.units) * (len(self._channels) if len(self.mapping.units) == 1 else 1)
+        return TactileSignal(
+            self._clock.time_ns(first), self._sensor, self._channels, units, self.rate_hz, first,
+            rows.astype(np.float32), self._frame_id,
+        )  # fmt: skip
+
+
+def losses(adaptors: Sequence[SignalAdaptor]) -> str:
+    """Return how sure the losses of some signals are."""
+    exact = all(adaptor.mapping.number for adaptor in adaptors)
+    return 'by number' if exact else 'estimated by time; shorter ones unknown'

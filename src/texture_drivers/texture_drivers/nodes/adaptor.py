@@ -1,0 +1,127 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The node that turns the messages of any other driver into the suite's signals, by a mapping file."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from texture_msgs import msg
+
+from texture_core.config import param
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
+from texture_drivers.adaptor import SignalAdaptor, load_mapping, losses
+from texture_drivers.health import BEFORE_THE_START
+
+
+def import_message(message_type: str) -> Any:
+    """Return the class of 'package/msg/Type', found at run time: the suite does not depend on other drivers."""
+    package, _, name = message_type.partition('/msg/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), name)
+    except (ImportError, AttributeError) as error:
+        raise InvalidParameter(
+            f"the mapping asks for '{message_type}', which cannot be imported ({error}); build the package with these "
+            'messages and source it, or correct the type in the mapping'
+        ) from error
+
+
+@dataclass(frozen=True)
+class AdaptorParams:
+    """Parameters that select which messages are converted."""
+
+    mapping: str = param(
+        'robotiq_tsf', 'Mapping of messages to signals: name of a shipped one, or path of a YAML file.'
+    )
+    finger: int = param(0, 'Index of the finger that is converted; 0 is the first one of the message.', low=0, high=15)
+    batch_s: float = param(
+        0.01,
+        'Duration of one published batch; a longer batch costs less computing time and adds latency.',
+        unit='s',
+        low=0.001,
+        high=0.1,
+    )
+    frame_id: str = param(
+        'fingertip',
+        'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+    )
+
+
+class Adaptor(Node):
+    """Publish one finger out of the messages of another driver."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('adaptor', **kwargs)
+        params = declare(self, AdaptorParams)
+        frame_id = frame_name(self.get_namespace(), params.frame_id)
+        mapping = load_mapping(params.mapping, params.finger)
+        self._adaptors = {
+            name: SignalAdaptor(f'{params.mapping}/{name}', signal, frame_id)
+            for name, signal in mapping.signals.items()
+        }
+        self._publishers_of = {
+            name: self.create_publisher(msg.TactileSignal, name, SENSOR_QOS) for name in self._adaptors
+        }
+        self._received = self._lost = 0
+        self._fault = ''
+        for adaptor in self._adaptors.values():
+            wanted = adaptor.mapping
+            self._listen(wanted.topic, wanted.type, adaptor.take)
+            if wanted.number_topic:
+                self._listen(wanted.number_topic, wanted.number_type, adaptor.take_number)
+        self.create_timer(params.batch_s, self._publish)
+        self._diagnostics = Diagnostics(self, self._report)
+
+    def _listen(self, topic: str, message_type: str, take: Callable[[Any, int], None]) -> None:
+        """Subscribe; a message is handed over with the time at which it was sent."""
+
+        def on_message(message: Any, info: Mapping[str, int]) -> None:
+            self._received += 1
+            try:
+                take(message, info['source_timestamp'])
+            except InvalidData as error:
+                self._fault = str(error)
+
+        self.create_subscription(import_message(message_type), topic, on_message, SENSOR_QOS)
+
+    def _publish(self) -> None:
+        for name, adaptor in self._adaptors.items():
+            for batch in adaptor.batches():
+                self._publishers_of[name].publish(to_msg(batch))
+
+    def _report(self) -> DiagnosticReport:
+        adaptors = list(self._adaptors.values())
+        received, fault = self._received, self._fault
+        self._received, self._fault = 0, ''
+        lost = sum(adaptor.lost for adaptor in adaptors)
+        new, self._lost = lost - self._lost, lost
+        topics = ', '.join(sorted({adaptor.mapping.topic for adaptor in adaptors}))
+        conditions = (
+            (bool(fault), 'ERROR', fault),
+            (received == 0, 'ERROR', f'no message on {topics}; start the driver, or correct the topic in the mapping'),
+            (new > 0, 'WARN', f'{new} samples lost since the last report'),
+            (not any(adaptor.samples for adaptor in adaptors), 'WARN', 'measuring rates and times'),
+        )
+        level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
+        values = {
+            'samples': sum(adaptor.samples for adaptor in adaptors),
+            'lost': lost,
+            'losses': losses(adaptors),
+            **BEFORE_THE_START,
+            'refused messages': sum(adaptor.refused for adaptor in adaptors),
+            'values that are no number': sum(adaptor.invalid for adaptor in adaptors),
+            'samples without number': sum(adaptor.unnumbered for adaptor in adaptors),
+            'numbers without sample': sum(adaptor.unpaired for adaptor in adaptors),
+            **{f'{name} rate [Hz]': adaptor.rate_hz for name, adaptor in self._adaptors.items()},
+        }
+        return level, sentence, values
+
+
+def main() -> None:
+    """Run the node."""
+    run(Adaptor)

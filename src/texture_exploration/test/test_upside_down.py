@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""A surface that is declared upside down: to rise is to press, and the force sensor is not zeroed yet."""
+
+import math
+
+import pytest
+
+from texture_core.types import ExplorationRequest
+
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=5.0, distance_m=0.03)
+
+
+@pytest.mark.parametrize('zero_rise_m', [0.003, 0.01])
+@pytest.mark.parametrize('gap_m', [0.001, 0.003, 0.006, 0.008, 0.012])
+@pytest.mark.parametrize('stiffness_n_m', [500.0, 1000.0, 2000.0])
+def test_a_finger_that_rises_into_the_surface_stops_at_a_small_force(make_robot, stiffness_n_m, gap_m, zero_rise_m):
+    robot = make_robot(
+        {'stiffness_n_m': stiffness_n_m, 'start_height_m': gap_m},
+        surface_rx_rad=math.pi,
+        max_stiffness_n_m=20000.0,
+    )
+    robot.arm._tool.zero.air._rise_m = zero_rise_m
+    outcome = robot.explore(SLIDE)
+    assert not outcome.success
+    assert max(robot.pressed_n) < 2.0
+
+
+@pytest.mark.parametrize('stiffness_n_m', [200.0, 500.0, 2000.0])
+def test_a_finger_that_was_left_pressed_is_lifted_however_soft_the_surface(make_robot, stiffness_n_m):
+    robot = make_robot({'stiffness_n_m': stiffness_n_m, 'start_height_m': 0.0})
+    press(robot, 4.0 / stiffness_n_m)
+    outcome = robot.explore(SLIDE)
+    assert 'met something' not in outcome.message and 'changed by more' not in outcome.message
+    assert outcome.lifted
+
+
+def press(robot, depth_m):
+    """Put the finger below the surface, at rest."""
+    robot.machine.position = robot.machine.position - depth_m * robot.machine._axes[:, 2]
+    for _ in range(20):
+        robot.pace()
+
+
+def test_a_second_rise_counts_the_force_from_the_first(make_robot):
+    """Pressed upside down by 2 N, stopped as it rises."""
+    robot = make_robot({'stiffness_n_m': 2000.0, 'start_height_m': 0.0}, surface_rx_rad=math.pi)
+    press(robot, 0.001)
+    robot.explore(SLIDE, lambda state: robot.exploration.stop('enough') if len(robot.phases) > 60 else None)
+    assert 3.0 < max(robot.pressed_n) < 10.0

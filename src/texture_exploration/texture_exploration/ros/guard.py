@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""The process that brings an arm to rest when the process that commanded it is silent or gone.
+
+A controller may hold the last velocity for ever: the twist controller of `ur_robot_driver` has no timeout. The guard
+hears a heartbeat on a socket whose other end only the commanding process holds. When an arm that may still move is no
+longer spoken for, as when that process hangs, is stopped (SIGSTOP) or frozen, it commands zero velocity, and zero force
+to a compliance controller; the kernel closes the socket however the process ends, also by SIGKILL. It goes on until
+the pose shows rest, and holds the lock of the arm until then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import select
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from texture_core.errors import DeviceError
+from texture_exploration.arms.arm import DONE, LEAVE_S, GuardProcess, RestWatch, guard_socket
+
+# --------------------
+# Messages to the controllers, and who sends them.
+
+MEASURED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # fits every publisher
+MOST = 10  # messages that are taken at once: only the newest counts
+PARTICIPANT = slice(0, 12)  # of the id of an endpoint: the prefix of its GUID, one a process and context
+
+
+def stamped(kind: Any, node: Node, frame_id: str) -> Any:
+    """Return an empty message of now."""
+    message = kind()
+    message.header.stamp, message.header.frame_id = node.get_clock().now().to_msg(), frame_id
+    return message
+
+
+def newest(subscription: Any) -> Any:
+    """Return the newest message that waits, None if there is none; nobody spins."""
+    found = None
+    with subscription.handle:
+        for _ in range(MOST):
+            taken = subscription.handle.take_message(subscription.msg_type, False)
+            if taken is None:
+                break
+            found = taken[0]
+    return found
+
+
+def ignore(_message: Any) -> None:
+    """Nobody spins the node."""
+
+
+def participant(node: Node) -> str:
+    """Return what the ids of all publishers of a node's process and context begin with."""
+    publisher = node.create_publisher(TwistStamped, f'identity_{uuid.uuid4().hex}', 1)
+    end_s = time.monotonic() + LEAVE_S
+    while not (infos := node.get_publishers_info_by_topic(publisher.topic_name)):
+        if time.monotonic() > end_s:
+            raise DeviceError(
+                'the middleware of ROS does not show the publishers of this process; use rmw_fastrtps_cpp'
+            )
+        time.sleep(PERIOD_S)
+    node.destroy_publisher(publisher)
+    return sender(infos[0])
+
+
+def sender(info: Any) -> str:
+    """Return the participant that a publisher belongs to."""
+    return bytes(info.endpoint_gid[PARTICIPANT]).hex()
+
+
+# --------------------
+# The guard as the commanding process sees it.
+
+TWIST_GUARD_NODE = 'arm_guard'
+MOVING, RESTING = b'm', b'r'
+PERIOD_S = 0.01
+ANSWER_S = 0.05
+# So long a guard may say nothing before it counts as hung. Beside two busy processes it was silent for more than 0.5 s
+# in two of eight runs; an explorer that dies in that time, too, is what the timeout of the controller, where there is
+# one, and the limits of the robot are for. A guard that has ended is noticed at once.
+SILENT_S = {True: 3.0, False: 1.5}  # with a controller that stops by itself, and with one that does not
+GIVE_UP_S = 60.0  # without a pose that shows rest
+SCOPE = ('systemd-run', '--user', '--scope', '--quiet', '--collect')
+
+
+@functools.cache
+def scope() -> tuple[str, ...]:
+    """Return what starts a process in a control group of its own, nothing where systemd does not offer that."""
+    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+        if subprocess.run([*SCOPE, 'true'], capture_output=True, timeout=LEAVE_S, check=False).returncode == 0:
+            return SCOPE
+    return ()
+
+
+class TwistGuard(GuardProcess):
+    """The guard of one arm; nothing may be commanded to those whom it does not reach, or once it has ended."""
+
+    def __init__(
+        self, heartbeat_s: float, namespace: str, topics: tuple[str, ...], *, patient: bool = False, lock: int = -1
+    ) -> None:
+        # In a control group of its own, if possible: what ends all processes of a service must not end the guard first.
+        holds = (lock,) if lock >= 0 else ()
+        super().__init__(__name__, str(heartbeat_s), namespace, *topics, start=scope(), holds=holds)
+        self.reached = 0  # how many who listen it has found; that takes a while, which must not come after a death
+        self.participant = ''
+        self.garbled = 0  # answers that could not be read
+        self._silent_s = SILENT_S[patient]
+        self._heard_s = 0.0
+        self._moving = False
+
+    def fault(self) -> str:
+        """Return in a sentence why the guard would not stop the arm, '' if it would or is still starting."""
+        with contextlib.suppress(OSError):
+            while answer := self.line.recv(4096):
+                reached, _, sender_of_guard = answer.decode('ascii', 'replace').partition(' ')
+                if not (reached.isdigit() and sender_of_guard):
+                    self.garbled += 1
+                    continue
+                self.reached, self.participant, self._heard_s = int(reached), sender_of_guard, time.monotonic()
+        if self._process.poll() is not None:
+            return 'the guard process, which would stop the arm if this process dies, has ended'
+        silent_s = time.monotonic() - self._heard_s
+        if self._heard_s and silent_s > self._silent_s:
+            return (
+                f'the guard process, which would stop the arm if this process dies, is silent for {silent_s:.1f} s; '
+                f'{self.garbled} of its answers could not be read'
+            )
+        return ''
+
+    def beat(self, *, moving: bool) -> None:
+        """Tell that the commanding process lives, and whether the arm may still move."""
+        self._moving = moving
+        with contextlib.suppress(OSError):  # a full line or a dead guard, which `fault` tells
+            self.line.send(MOVING if moving else RESTING)
+
+    def leave(self) -> None:
+        """End the guard of an arm that rests; leave it to that of one that may still move."""
+        if self._moving:
+            self.line.close()
+        else:
+            self.dismiss()
+
+
+# --------------------
+# The process of the guard.
+
+
+def main() -> None:
+    """Run as `python -m texture_exploration.ros.guard SOCKET …`, with what `TwistGuard` takes; it starts it."""
+    _, _, heartbeat_s, namespace, topic, frame_id, pose_topic, wrench_topic, wrench_frame_id = sys.argv
+    line = guard_socket()
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(TWIST_GUARD_NODE, namespace=namespace, enable_rosout=False, start_parameter_services=False)
+    identity = participant(node)
+    publisher = node.create_publisher(TwistStamped, topic, 1)
+    wrenches = node.create_publisher(WrenchStamped, wrench_topic, 1) if wrench_topic else None
+    poses = node.create_subscription(PoseStamped, pose_topic, ignore, MEASURED_QOS)
+
+    def command_standstill() -> None:
+        publisher.publish(stamped(TwistStamped, node, frame_id))
+        if wrenches is not None:
+            wrenches.publish(stamped(WrenchStamped, node, wrench_frame_id))
+
+    def take_pose(rest: RestWatch) -> None:
+        pose = newest(poses)
+        if pose is not None:
+            at = pose.pose.position
+            rest.update(time.monotonic_ns(), (at.x, at.y, at.z))
+
+    def answer() -> None:
+        with contextlib.suppress(OSError):
+            line.send(f'{publisher.get_subscription_count()} {identity}'.encode())
+
+    line.setblocking(False)
+    guarded(line, float(heartbeat_s), command_standstill, take_pose, answer)
+    node.destroy_node()  # else ROS shows it for 20 s as another commander
+    rclpy.shutdown()
+
+
+def guarded(
+    line: Any,
+    heartbeat_s: float,
+    command_standstill: Callable[[], None],
+    take_pose: Callable[[RestWatch], None],
+    answer: Callable[[], None],
+) -> None:
+    """Guard until the other end says that it is done, or has closed and the arm rests; tell it how many listen."""
+    rest = RestWatch()
+    moving, heard_s, answered_s = False, time.monotonic(), 0.0
+    while True:
+        waiting = select.select([line], [], [], PERIOD_S)[0]
+        now_s = time.monotonic()
+        if waiting:
+            try:
+                said = line.recv(1)
+            except ConnectionError:  # it ended with an answer unread
+                said = b''
+            if said == DONE:
+                return
+            if not said:
+                break
+            moving, heard_s = said == MOVING, now_s
+            rest.forget()
+        elif moving and now_s - heard_s > heartbeat_s and not rest.at_rest:
+            take_pose(rest)
+            command_standstill()
+        if now_s - answered_s > ANSWER_S:
+            answered_s = now_s
+            answer()
+
+    # Nobody is there any more.
+    rest.forget()
+    end_s = time.monotonic() + GIVE_UP_S
+    while not rest.at_rest and time.monotonic() < end_s:
+        take_pose(rest)
+        command_standstill()
+        time.sleep(PERIOD_S)
+
+
+if __name__ == '__main__':
+    main()
