@@ -16,7 +16,7 @@ import pytest
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo import ATTEMPTS, DemoPlan, ProgressLog, demonstrate, explore_patiently, is_refused
+from texture_bringup.demo import ATTEMPTS, DemoPlan, ProgressLog, Slide, demonstrate, explore_patiently
 from texture_bringup.operator import ExplorationResult
 from texture_core.errors import ExplorationError, MotionAborted
 from texture_core.ros_testing import killed_on_error
@@ -25,7 +25,7 @@ from texture_core.types import ExplorationRequest, Rejection, RoughnessEstimate,
 pytestmark = pytest.mark.realtime
 
 DEADLINE_S = 60.0
-SHORT = DemoPlan(surfaces=('glass', 'ridge_2mm_deep'), learning_slides=2, recognition_slides=1)
+SHORT = DemoPlan(recognised=('glass', 'ridge_2mm_deep'), untrained=('cardboard',))
 
 
 def started(log: Path) -> list[int]:
@@ -34,15 +34,21 @@ def started(log: Path) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ('estimate', 'refused'),
+    ('expected', 'label', 'rejection', 'as_expected'),
     [
-        (TextureEstimate(0, 'a', 'glass', Rejection.OUTSIDE_TRAINING), True),
-        (TextureEstimate(0, 'a', 'glass', Rejection.NONE), False),
-        (TextureEstimate(0, 'a', 'glass'), False),
+        (Rejection.NONE, 'glass', Rejection.NONE, True),
+        (Rejection.NONE, 'leather', Rejection.NONE, False),
+        (Rejection.NONE, 'glass', Rejection.NOVEL, False),
+        (Rejection.NOVEL, 'leather', Rejection.NOVEL, True),
+        (Rejection.NOVEL, 'leather', Rejection.NONE, False),
     ],
 )
-def test_a_refusal_names_the_condition_and_claims_nothing(estimate: TextureEstimate, refused: bool) -> None:
-    assert is_refused(estimate) is refused
+def test_an_answer_is_as_expected_if_label_and_rejection_are(
+    expected: Rejection, label: str, rejection: Rejection, as_expected: bool
+) -> None:
+    estimate = TextureEstimate(0, 'a', label, rejection)
+    answer = ExplorationResult(ExplorationError.NONE, '', 'a', estimate, RoughnessEstimate(0, 'a'))
+    assert Slide('glass', 'glass', expected, answer, []).as_expected is as_expected
 
 
 @pytest.mark.parametrize('aborted', range(ATTEMPTS + 1))
@@ -64,18 +70,19 @@ def test_an_aborted_slide_is_made_again_and_that_is_said(aborted: int) -> None:
 
 
 @pytest.mark.ros
-def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tmp_path) -> None:
+def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answers_and_picture(tmp_path) -> None:
     out = io.StringIO()
     assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, ProgressLog(out=out)), out.getvalue()
-    assert '2 of 2 slides over simulated surfaces recognised' in out.getvalue()
-    figures = json.loads((tmp_path / 'demo/evaluation.json').read_text())
-    assert figures['labels'] == ['glass', 'ridge_2mm_deep']
-    assert (figures['untrained_speed']['known'], figures['untrained_speed']['decided']) == (False, False)
-    message = figures['untrained_speed']['message']
-    slow = re.match(r'outside what was trained: speed ([\d.]+) m/s, trained (?:0\.0[45]\d* to )?0\.05', message)
-    assert slow is not None, message
-    assert float(slow[1]) == pytest.approx(0.02, rel=0.1)
-    assert slow[0] in out.getvalue()
+    slides = {slide['title']: slide for slide in json.loads((tmp_path / 'demo/demo.json').read_text())['slides']}
+    assert {title: slide['rejection'] for title, slide in slides.items() if title != 'finger too high'} == {
+        'glass': 'NONE',
+        'ridge_2mm_deep': 'NONE',
+        'cardboard': 'NOVEL',
+        'ridge_2mm_deep at 0.02 m/s': 'OUTSIDE_TRAINING',
+    }
+    assert slides['glass']['decided']
+    assert slides['finger too high']['outcome'].startswith('no surface within 0.002 m below the start')
+    assert re.search(r'rejected, outside what was trained: speed 0\.0[12]\d* m/s', out.getvalue())
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 
 
@@ -87,7 +94,7 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
         killed_on_error(demo),
     ):
         for line in demo.stdout:
-            if 'Learning' in line:
+            if 'Trained surfaces' in line:
                 break
         pids = [
             int(number) for number in re.findall(r'started \(process (\d+)\)', (tmp_path / 'nodes.log').read_text())
@@ -98,7 +105,7 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
     # A slow start has said what it waits for.
     assert re.fullmatch(r'(waiting; so far [^\n]*\n)*texture: interrupted\n', said), said
     assert 'Traceback' not in said
-    assert len(pids) == 5
+    assert len(pids) == 7
     assert not any(Path(f'/proc/{pid}').exists() for pid in pids)
 
 

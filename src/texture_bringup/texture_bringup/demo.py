@@ -1,51 +1,34 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The demonstration: record, train and recognise on the emulated rig."""
+"""The demonstration: train on slides simulated ahead of time, then recognise and reject on the emulator, live."""
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
 import socket
-import statistics
 import sys
 import tempfile
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from scipy.signal import welch
 
 from texture_bringup.launcher import ChildLauncher
-from texture_bringup.nodes.collector import recorder
 from texture_bringup.operator import ExplorationResult, Operator
 from texture_core.config import write_json
-from texture_core.errors import InvalidData, LaunchFailed, MotionAborted
-from texture_core.types import (
-    NANOSECONDS,
-    Array,
-    ExplorationRequest,
-    ExplorationState,
-    Phase,
-    Rejection,
-    TactileSignal,
-    TextureEstimate,
-)
-from texture_estimation.model import TextureModel, load_model
-from texture_evaluation.charts import COLOURS, chart, draw_confusion
-from texture_evaluation.commands import train as training
-from texture_evaluation.evaluate import EvaluationReport, evaluate, percent
-from texture_evaluation.train import train_from_bags
-from texture_recordings.bags import read_bag
+from texture_core.errors import ExplorationError, InvalidData, LaunchFailed, MotionAborted
+from texture_core.types import ExplorationRequest, Rejection, TextureEstimate
+from texture_evaluation.charts import COLOURS, chart
+from texture_evaluation.train import train_from_bags, train_grades_from_bags
+from texture_simulation.offline import SlidePlan, write_simulated
 
 # --------------------
-# A ROS domain of its own for a demonstration, so that it disturbs nothing that runs already.
+# A ROS domain for the demonstration alone, so that it disturbs nothing that runs already.
 
 # Domains whose ports lie below the ephemeral ports of Linux:
 # https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html The tests of the suite have those above 60.
@@ -84,47 +67,81 @@ def _is_free(port: int) -> bool:
 
 @dataclass(frozen=True)
 class DemoPlan:
-    """Surfaces of the scene `twelve_textures`, slides over each, and the slide itself.
+    """Surfaces of the scene `twelve_textures` with made-up grades of roughness, and the slide over each."""
 
-    The finger touches each time at another place; every second slide goes the other way. A last slide at
-    `untrained_speed_m_s` shows what is said outside the conditions of the training.
-    """
-
-    surfaces: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
-    shown: str = 'ridge_2mm_deep'  # in the picture: its ridges make a line in the spectrum, at speed / pitch
-    learning_slides: int = 3
-    recognition_slides: int = 2
+    trained: Mapping[str, float] = field(
+        default_factory=lambda: {
+            'glass': 1.0,
+            'leather': 2.0,
+            'woven_cloth': 2.5,
+            'grid_2mm': 3.0,
+            'ridge_1mm': 3.0,
+            'sandpaper_fine': 3.5,
+            'ridge_2mm_shallow': 4.0,
+            'ridge_2mm_deep': 4.5,
+        }
+    )
+    recognised: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
+    untrained: tuple[str, ...] = ('cardboard', 'sandpaper_coarse')
+    training_slides: int = 40  # so many that a slide may end early: 299 must be held out to show 1 % wrong decisions
     speed_m_s: float = 0.05
     force_n: float = 1.0
     distance_m: float = 0.06
     untrained_speed_m_s: float = 0.02
 
-    def requests(self, surface: str, slides: int, early_stopping: bool = False) -> Iterator[ExplorationRequest]:
-        """Yield the explorations of one surface."""
-        for number in range(slides):
-            yield ExplorationRequest(
-                'linear_slide',
-                speed_m_s=self.speed_m_s,
-                force_n=self.force_n,
-                distance_m=self.distance_m,
-                direction_rad=math.pi * (number % 2),
-                surface=surface,
-                early_stopping=early_stopping,
-            )
+    def request(self, surface: str, speed_m_s: float = 0.0) -> ExplorationRequest:
+        """Return a slide over a surface, at the speed of the training unless another is given, and as long in time."""
+        speed_m_s = speed_m_s or self.speed_m_s
+        return ExplorationRequest(
+            'linear_slide',
+            speed_m_s=speed_m_s,
+            force_n=self.force_n,
+            distance_m=self.distance_m * speed_m_s / self.speed_m_s,
+            surface=surface,
+            early_stopping=True,
+        )
 
-    def untrained_request(self) -> ExplorationRequest:
-        """Return a slide over the shown surface, as in the training but for its speed, and as long in time."""
-        [usual] = self.requests(self.shown, 1, early_stopping=True)
-        slower = self.untrained_speed_m_s / self.speed_m_s
-        return replace(usual, speed_m_s=self.untrained_speed_m_s, distance_m=slower * self.distance_m)
+
+@dataclass(frozen=True)
+class Slide:
+    """What came of one slide: the surface, what was expected, the answer, and the estimates while it lasted."""
+
+    surface: str
+    title: str
+    expected: Rejection | None  # None for no contact
+    answer: ExplorationResult
+    estimates: Sequence[TextureEstimate]
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether the answer is the right one."""
+        if self.expected is None:
+            return self.answer.error is ExplorationError.NO_SURFACE
+        accepted = self.answer.texture.label == self.surface
+        right = accepted or self.expected is not Rejection.NONE
+        return self.answer.success and self.answer.texture.rejection is self.expected and right
+
+    @property
+    def outcome(self) -> str:
+        """What was answered, in a few words."""
+        estimate, roughness = self.answer.texture, self.answer.roughness
+        if self.expected is None:
+            return self.answer.message
+        if estimate.rejection is not Rejection.NONE:
+            if estimate.rejection is Rejection.OUTSIDE_TRAINING:
+                return f'rejected, {estimate.message}'
+            return f'rejected, {estimate.rejection.name.lower().replace("_", " ")} (nearest: {estimate.label})'
+        grade = f'; roughness {roughness.grade:.1f} of 5' if roughness.valid else ''
+        early = ', ended early' if estimate.decided else ''
+        return f'accepted as {estimate.label} after {estimate.evidence_s:.1f} s{early}{grade}'
 
 
 # --------------------
-# What the demonstration says while it runs, for a reader who sees the suite for the first time.
+# What the demonstration prints while it runs, for a reader who sees the suite for the first time.
 
 
 class ProgressLog:
-    """Tell what happens, each chapter with the time since the start."""
+    """Tell what happens, each section with the time since the start."""
 
     def __init__(self, out: TextIO = sys.stdout) -> None:
         self._out = out
@@ -135,51 +152,24 @@ class ProgressLog:
         print(f'\n[{time.monotonic() - self._start_s:3.0f} s]  {text}', file=self._out, flush=True)
 
     def line(self, text: str) -> None:
-        """Say something within the chapter."""
+        """Print a line within the section."""
         print(f'{" " * 8}{text}', file=self._out, flush=True)
-
-
-# --------------------
-# What came out of the recognising slides.
-
-
-Row = tuple[str, TextureEstimate]  # what lay under the finger, and what was said of it
-
-
-def is_right(row: Row) -> bool:
-    """Return whether the surface was recognised."""
-    surface, estimate = row
-    return estimate.known and estimate.label == surface
-
-
-def is_refused(estimate: TextureEstimate) -> bool:
-    """Return whether an estimate says that its exploration is outside what was trained, and claims nothing."""
-    return estimate.rejection is Rejection.OUTSIDE_TRAINING and not estimate.decided
-
-
-def latencies_s(bag: Path) -> Mapping[str, float]:
-    """Return for each exploration in a bag the median time from the end of a window to the arrival of its estimate."""
-    found: defaultdict[str, list[float]] = defaultdict(list)
-    for _, log_ns, estimate in read_bag(bag, ('texture',)):
-        if estimate.windows and not estimate.final:
-            found[estimate.exploration_id].append((log_ns - estimate.stamp_ns) / NANOSECONDS)
-    return {name: statistics.median(values) for name, values in found.items()}
 
 
 # --------------------
 # The emulator of the demonstration: its processes, and what the operator does with it.
 
 START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first time
+ATTEMPTS = 3  # a machine that is busy with something else delays the emulated arm, and the explorer aborts
 
 
 class DemoRig:
-    """Run the bench in a ROS domain of its own; use it in a `with` block."""
+    """Run the emulator and the real nodes in a ROS domain of their own; use it in a `with` block."""
 
-    def __init__(self, folder: Path, log: Path, recipe: str, seed: int) -> None:
+    def __init__(self, folder: Path, log: Path, arguments: Mapping[str, Any]) -> None:
         domain_id = free_domain()
-        self._environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
-        arguments = {'devices': folder, 'recipe': recipe, 'seed': seed}
-        self._launcher = ChildLauncher('emulator', arguments, self._environment, log)
+        environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
+        self._launcher = ChildLauncher('emulator', {'devices': folder, **arguments}, environment, log)
         self._operator = Operator(domain_id=domain_id, guard=self._launcher.check)
         self._open = ExitStack()
 
@@ -195,36 +185,34 @@ class DemoRig:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    @contextmanager
-    def recording(self, bag: Path) -> Iterator[None]:
-        """Record the topics into a new bag for the length of a `with` block."""
-        with recorder(self._operator, bag, '', self._environment) as check:
-            yield
-            check()
+    def set_parameters(self, node: str, **values: object) -> None:
+        """Set parameters of a node."""
+        self._operator.set_parameters(node, values)
 
     def explore(
-        self, surface: str, requests: Iterator[ExplorationRequest], tell: Callable[[str], None]
-    ) -> Iterator[ExplorationResult]:
-        """Lay a surface under the finger and explore it; see `explore_patiently`."""
-        self._operator.set_parameters('emulator', {'surface': surface})
-        for request in requests:
-            yield explore_patiently(self._operator.explore, request, tell)
+        self, request: ExplorationRequest, tell: Callable[[str], None], ends: ExplorationError = ExplorationError.NONE
+    ) -> tuple[ExplorationResult, list[TextureEstimate]]:
+        """Put the surface of a request under the finger and slide; return the answer and the estimates on the way."""
+        self.set_parameters('emulator', surface=request.surface)
+        estimates: list[TextureEstimate] = []
 
-    def use_model(self, model: Path) -> None:
-        """Let the running classifier load a model."""
-        self._operator.set_parameters('classifier', {'model': str(model)})
+        def explore(wanted: ExplorationRequest) -> ExplorationResult:
+            estimates.clear()
+            return self._operator.explore(wanted, lambda _state, texture: estimates.append(texture))
 
-
-ATTEMPTS = 3  # a machine that is busy with something else holds the emulated arm up, and the explorer aborts
+        return explore_patiently(explore, request, tell, ends), estimates
 
 
 def explore_patiently(
-    explore: Callable[[ExplorationRequest], ExplorationResult], request: ExplorationRequest, tell: Callable[[str], None]
+    explore: Callable[[ExplorationRequest], ExplorationResult],
+    request: ExplorationRequest,
+    tell: Callable[[str], None],
+    ends: ExplorationError = ExplorationError.NONE,
 ) -> ExplorationResult:
-    """Return the result of an exploration; an aborted one is made again, twice at most."""
+    """Return the result of an exploration; one that ends in another way is made again, twice at most."""
     for left in reversed(range(ATTEMPTS)):
         explored = explore(request)
-        if explored.success:
+        if explored.error is ends:
             break
         if not left:
             raise MotionAborted(f'the exploration of {request.surface} failed: {explored.message}')
@@ -233,184 +221,144 @@ def explore_patiently(
 
 
 # --------------------
-# The picture of the demonstration: one recognised slide from touch to decision.
-
-SHOWN_S = 0.5
-
-
-def recorded(
-    bag: Path,
-) -> tuple[dict[str, list[ExplorationState]], dict[str, list[TextureEstimate]], list[TactileSignal]]:
-    """Return what a bag holds: slide states and estimates of each exploration, all vibration batches."""
-    states: defaultdict[str, list[ExplorationState]] = defaultdict(list)
-    estimates: defaultdict[str, list[TextureEstimate]] = defaultdict(list)
-    batches: list[TactileSignal] = []
-    for _, _, value in read_bag(bag, ('exploration', 'signal', 'texture')):
-        if isinstance(value, TactileSignal):
-            batches.append(value)
-        elif isinstance(value, TextureEstimate) and value.probabilities:
-            estimates[value.exploration_id].append(value)
-        elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
-            states[value.exploration_id].append(value)
-    return states, estimates, batches
-
-
-def sliding_samples(states: Sequence[ExplorationState], batches: Iterable[TactileSignal]) -> Array:
-    """Return the samples of an exploration while the finger slid, (n_samples,)."""
-    start_ns, end_ns = states[0].stamp_ns, states[-1].stamp_ns
-    inside = [batch for batch in batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
-    samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
-    return samples
-
-
-def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> None:
-    """Draw an exploration of a surface, and the confusion of all explorations in the bag."""
-    states, estimates, batches = recorded(bag)
-    surfaces = {name: states[name][0].surface for name in estimates}
-    own = [name for name in surfaces if surfaces[name] == surface]
-    name = min(own, key=lambda each: estimates[each][0].confidence)
-    slides = {label: sliding_samples(states[each], batches) for each, label in {**surfaces, name: surface}.items()}
-    slides[surface] = sliding_samples(states[name], batches)
-    rate_hz, unit = batches[0].sampling_rate_hz, batches[0].common_unit
-    title = f'How a slide over {surface} is recognised (simulated Robotiq TSF-85)'
-    with chart(path, (11.0, 8.8), title, points=11.0) as figure:
-        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
-        shown = slides[surface][: round(SHOWN_S * rate_hz)]
-        signal.plot(np.arange(len(shown)) / rate_hz, shown, color=COLOURS[0], linewidth=0.8)
-        signal.set(xlabel='time since the slide began (s)', ylabel=f'signal ({unit or "no unit"})')
-        signal.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
-        # That of the slide has the first colour, here and in the next panel.
-        colours = dict(zip(sorted(slides, key=lambda label: label != surface), COLOURS, strict=False))
-        for label, colour in colours.items():
-            samples = slides[label]
-            hertz, power = welch(samples, fs=rate_hz, nperseg=min(len(samples), round(rate_hz / 2)))
-            width, above = (1.6, 3) if label == surface else (0.7, 2)
-            spectrum.semilogy(hertz[1:], power[1:], color=colour, linewidth=width, label=label, zorder=above)
-        spectrum.set(xlabel='frequency (Hz)', ylabel=f'power density ({f"{unit}²" if unit else "1"}/Hz)')
-        spectrum.set_title('2. Its spectrum is the mark of the surface')
-        spectrum.legend(loc='upper right')
-        _draw_evidence(evidence, model.labels, estimates[name], colours)
-        draw_confusion(table, report.labels, report.confusion)
-        table.set_title('4. Single windows of all test slides')
-        if note:
-            figure.supxlabel(note, fontsize=9)
-
-
-def _draw_evidence(
-    axes: Any, labels: Sequence[str], estimates: Sequence[TextureEstimate], colours: Mapping[str, str]
-) -> None:
-    """Draw the probability of each surface after each window, in its colour, and the confidence that is reported."""
-    seconds = [estimate.evidence_s for estimate in estimates]
-    for column, label in enumerate(labels):
-        share = [100 * estimate.probabilities[column] for estimate in estimates]
-        axes.plot(seconds, share, marker='.', color=colours.get(label, 'grey'), label=label, alpha=0.7)
-    confidence = [100 * estimate.confidence for estimate in estimates]
-    axes.plot(seconds, confidence, color='black', linestyle='--', label='confidence reported')
-    axes.set(xlabel='sliding time used (s)', ylabel='probability, confidence (%)', ylim=(-4, 104))
-    axes.set_xlim(left=0)
-    axes.set_title(f'3. Confidence after each window; {confidence[-1]:.0f} % at the end')
-    axes.legend(loc='center left')
-
-
-# --------------------
 # The demonstration from beginning to end.
 
-
-LEARNING_BAG, RECOGNITION_BAG, MODEL = 'learning_bag', 'recognition_bag', 'model'  # in the folder of the results
-PICTURE, FIGURES, LOG = 'demo.png', 'evaluation.json', 'nodes.log'
+TRAINING, MODEL, ROUGHNESS = 'training', 'model', 'roughness'  # in the folder of the results
+PICTURE, FIGURES, LOG, GRADES = 'demo.png', 'demo.json', 'nodes.log', 'grades.csv'
 
 
 def _clear(folder: Path) -> None:
     """Make the folder; remove what an earlier demonstration has left there, and nothing else."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for bag in (LEARNING_BAG, RECOGNITION_BAG):
-            shutil.rmtree(folder / bag, ignore_errors=True)
-        for file in (PICTURE, FIGURES, LOG, f'{MODEL}.npz', f'{MODEL}.json'):
+        shutil.rmtree(folder / TRAINING, ignore_errors=True)
+        models = (f'{name}{ending}' for name in (MODEL, ROUGHNESS) for ending in ('.npz', '.json'))
+        for file in (PICTURE, FIGURES, LOG, GRADES, *models):
             (folder / file).unlink(missing_ok=True)
     except OSError as error:
         raise InvalidData(f"'{folder}' cannot be used: {error.strerror}; name another with --out") from error
 
 
-def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
-    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained."""
+def demonstrate(
+    out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog, *, dashboard: bool = False
+) -> bool:
+    """Train, recognise and reject on the emulator, and report; return whether every answer was as expected."""
     _clear(out)
-    progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
+    _train(out, recipe, seed, plan, progress)
+    progress.section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
+    arguments = {
+        'recipe': (out / f'{MODEL}.json').resolve(),
+        'model': (out / f'{MODEL}.npz').resolve(),
+        'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
+        'seed': seed + 1,
+        'dashboard': str(dashboard).lower(),
+    }
     with (
         tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
-        DemoRig(Path(folder), out / LOG, recipe, seed) as rig,
+        DemoRig(Path(folder), out / LOG, arguments) as rig,
     ):
-        progress.line('5 nodes run, and the sensor delivers 1000 samples a second')
-        _learn(rig, out, plan, progress)
-        _train(out, recipe, progress)
-        rig.use_model((out / MODEL).resolve())
-        progress.line('the running classifier has taken the model over')
-        rows = _recognise(rig, out, plan, progress)
-        untrained = _explore_untrained(rig, plan, progress)
-    report = _report(rows, untrained, out, plan, progress)
-    return all(map(is_right, rows)) and len(report.known) >= len(rows) and is_refused(untrained)
+        if dashboard:
+            progress.line('dashboard: http://127.0.0.1:8085 while this runs')
+        slides = _explore(rig, plan, progress)
+    _report(slides, out, progress)
+    return all(slide.as_expected for slide in slides)
 
 
-def _learn(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> None:
-    progress.section(f'Learning: {plan.learning_slides} slides over each of {len(plan.surfaces)} simulated surfaces')
-    with rig.recording(out / LEARNING_BAG):
-        for surface in plan.surfaces:
-            explored = list(rig.explore(surface, plan.requests(surface, plan.learning_slides), progress.line))
-            progress.line(f'{surface:<18}{len(explored)} slides recorded')
+def _train(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> None:
+    """Simulate a session of slides over each surface, and train both models on them."""
+    progress.section(f'Simulating {plan.training_slides} slides over each of {len(plan.trained)} surfaces')
+    slides = SlidePlan(plan.training_slides, plan.speed_m_s, plan.force_n, plan.distance_m / plan.speed_m_s)
+    bags = write_simulated(out / TRAINING, slides, np.random.default_rng(seed), surfaces=tuple(plan.trained))
+    progress.section('Training a texture model and a roughness model (as `texture train` does)')
+    model = train_from_bags(recipe, bags, out=out / MODEL)
+    rows = [f'{surface},{grade}' for surface, grade in plan.trained.items()]
+    (out / GRADES).write_text('\n'.join(['texture,grade', *rows, '']))
+    train_grades_from_bags('roughness', bags, out / GRADES, out=out / ROUGHNESS)
+    reasons = (model.acceptance.reason, model.acceptance.decided_reason)
+    progress.line(f'trained on {len(plan.trained)} surfaces: {", ".join(plan.trained)}')
+    for reason in filter(None, reasons):
+        progress.line(reason)
 
 
-def _train(out: Path, recipe: str, progress: ProgressLog) -> None:
-    progress.section('Training on that recording (the same as `texture train`)')
-    model = train_from_bags(recipe, [out / LEARNING_BAG], out=out / MODEL)
-    for line in training.summary(model, out / MODEL):
-        progress.line(line)
+def _explore(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> list[Slide]:
+    """Make all slides, and print what was answered to each."""
+    slides: list[Slide] = []
+
+    def slide(surface: str, title: str, expected: Rejection | None, speed_m_s: float = 0.0) -> None:
+        ends = ExplorationError.NONE if expected is not None else ExplorationError.NO_SURFACE
+        made = Slide(surface, title, expected, *rig.explore(plan.request(surface, speed_m_s), progress.line, ends))
+        slides.append(made)
+        progress.line(f'{"✓" if made.as_expected else "✗"} {title:<28}{made.outcome}')
+
+    progress.section('Trained surfaces: a slide ends as soon as the evidence is enough')
+    for surface in plan.recognised:
+        slide(surface, surface, Rejection.NONE)
+    progress.section('Surfaces that were never trained')
+    for surface in plan.untrained:
+        slide(surface, surface, Rejection.NOVEL)
+    progress.section('Outside the training, and no contact')
+    shown = plan.recognised[-1]
+    slide(shown, f'{shown} at {plan.untrained_speed_m_s:g} m/s', Rejection.OUTSIDE_TRAINING, plan.untrained_speed_m_s)
+    rig.set_parameters('explorer', approach_travel_m=0.002)
+    slide(shown, 'finger too high', None)
+    return slides
 
 
-def _recognise(rig: DemoRig, out: Path, plan: DemoPlan, progress: ProgressLog) -> list[Row]:
-    progress.section('Recognising: new slides at other places; each may end as soon as its label is decided')
-    rows = []
-    with rig.recording(out / RECOGNITION_BAG):
-        for surface in plan.surfaces:
-            requests = plan.requests(surface, plan.recognition_slides, early_stopping=True)
-            for explored in rig.explore(surface, requests, progress.line):
-                rows.append((surface, explored.texture))
-                progress.line(f'{surface:<18}recognised as {explored.texture.label or "nothing"}')
-    return rows
+def _report(slides: Sequence[Slide], out: Path, progress: ProgressLog) -> None:
+    """Store the answers and draw the picture."""
+    figures = [
+        {
+            'surface': slide.surface,
+            'title': slide.title,
+            'as_expected': slide.as_expected,
+            'outcome': slide.outcome,
+            'label': slide.answer.texture.label,
+            'rejection': slide.answer.texture.rejection.name,
+            'decided': slide.answer.texture.decided,
+            'evidence_s': slide.answer.texture.evidence_s,
+        }
+        for slide in slides
+    ]
+    write_json({'slides': figures}, out / FIGURES)
+    draw([slide for slide in slides if slide.expected is not None], out / PICTURE)
+    right = sum(slide.as_expected for slide in slides)
+    progress.section(f'Done: {right} of {len(slides)} answers as expected. Look at {out / PICTURE}')
+    progress.line(f'training slides, models, answers and the log of the nodes are in {out}/')
 
 
-def _explore_untrained(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> TextureEstimate:
-    speed, usual = plan.untrained_speed_m_s, plan.speed_m_s
-    progress.section(f'Outside the training: {plan.shown} again, at {speed:g} m/s instead of {usual:g} m/s')
-    [explored] = rig.explore(plan.shown, iter([plan.untrained_request()]), progress.line)
-    estimate: TextureEstimate = explored.texture
-    progress.line(f'the estimate says: {estimate.message or "nothing"}')
-    progress.line('the surface counts as unknown, and the slide is not ended early')
-    return estimate
+def draw(slides: Sequence[Slide], path: Path) -> None:
+    """Draw for each slide how the probabilities grew while the finger slid, and how it ended."""
+    columns = 4
+    rows = -(-len(slides) // columns)
+    title = 'Probability of each trained surface while the finger slides (simulated)'
+    with chart(path, (11.0, 2.7 * rows + 0.6), title) as figure:
+        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+        for axis in axes.ravel()[len(slides) :]:
+            axis.set_visible(False)
+        for axis, slide in zip(axes.ravel(), slides, strict=False):
+            _draw_slide(axis, slide)
+        axes[0, 0].set_xlim(0.0, 1.05 * max(slide.answer.texture.evidence_s for slide in slides))
+        for axis in axes[:, 0]:
+            axis.set_ylabel('probability')
+        for axis in axes[-1]:
+            axis.set_xlabel('sliding time (s)')
 
 
-def _report(
-    rows: list[Row], untrained: TextureEstimate, out: Path, plan: DemoPlan, progress: ProgressLog
-) -> EvaluationReport:
-    progress.section('Result')
-    latencies = latencies_s(out / RECOGNITION_BAG)
-    for surface, estimate in rows:
-        progress.line(
-            f'{surface:<18}{"✓" if is_right((surface, estimate)) else "✗"} {estimate.label or "nothing"}, confidence '
-            f'{estimate.confidence:.3f} after {estimate.evidence_s:.1f} s of sliding, latency '
-            f'{1000 * latencies.get(estimate.exploration_id, math.nan):.0f} ms'
-        )
-    progress.line(f'{sum(map(is_right, rows))} of {len(rows)} slides over simulated surfaces recognised')
-    progress.line('latency: from the last sample of a window to its estimate at another process')
-    model = load_model(out / MODEL)
-    report = evaluate(model, [out / RECOGNITION_BAG])
-    said = {name: getattr(untrained, name) for name in ('label', 'known', 'decided', 'message')}
-    figures = {**report.as_json(), 'untrained_speed': {'speed_m_s': plan.untrained_speed_m_s, **said}}
-    write_json(figures, out / FIGURES)
-    windows = percent(report.as_json()['window_accuracy'])
-    progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
-    refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
-    note = '\n'.join(filter(None, [model.acceptance.reason or model.acceptance.decided_reason, refusal]))
-    draw(out / RECOGNITION_BAG, plan.shown, model, report, out / PICTURE, note=note)
-    progress.section(f'Done. Look at {out / PICTURE}')
-    progress.line(f'recordings, model, figures and the log of the nodes are in {out}/')
-    return report
+def _draw_slide(axis: Any, slide: Slide) -> None:
+    estimates = [estimate for estimate in (*slide.estimates, slide.answer.texture) if estimate.probabilities]
+    final = slide.answer.texture
+    accepted = final.rejection is Rejection.NONE
+    # Before the first window all surfaces are equally probable
+    count = len(final.probabilities) or 1
+    seconds = [0.0, *(estimate.evidence_s for estimate in estimates)]
+    best = int(np.argmax(final.probabilities)) if final.probabilities else -1
+    for number in range(count):
+        values = [1.0 / count, *(estimate.probabilities[number] for estimate in estimates)]
+        colour = 'lightgrey' if number != best else COLOURS[2] if accepted else COLOURS[5]
+        width, above = (2.0, 3) if number == best else (1.0, 2)
+        axis.plot(seconds, values, color=colour, marker='.', linewidth=width, zorder=above)
+    verdict = f'accepted: {final.label}' if accepted else f'rejected: {final.rejection.name.lower().replace("_", " ")}'
+    axis.set_title(f'{slide.title}\n{verdict}', color=COLOURS[2] if accepted else COLOURS[5])
+    axis.set_ylim(0.0, 1.05)
+    if not accepted and final.label:
+        axis.annotate(f'nearest: {final.label}', (0.96, 0.22), xycoords='axes fraction', ha='right', color='grey')
