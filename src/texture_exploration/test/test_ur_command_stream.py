@@ -134,7 +134,7 @@ class SteppedLink:
         elif name in ('speedStop', 'forceModeStop'):
             if name == 'forceModeStop':
                 robot.end_force_mode()
-            robot.motion = ur.StopMove(*(given or [ur.FORCE_MODE_STOP]))
+            robot.motion = ur.stop_move(*(given or [ur.FORCE_MODE_STOP]))
             while not robot.motion.done:
                 self._step()
         self.sent.append([name, *shown])

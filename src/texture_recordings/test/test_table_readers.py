@@ -14,7 +14,7 @@ import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData, MissingLibrary
-from texture_recordings.tables import MAPPED, Frame, TableMapping, frames, import_tables, mapping_from, template_fields
+from texture_recordings.tables import MAPPED, TableFrame, TableMapping, frames, import_tables, mapping_from, template_fields
 
 pa = pytest.importorskip('pyarrow')
 parquet = pytest.importorskip('pyarrow.parquet')
@@ -54,7 +54,7 @@ WRITERS: dict[str, Callable[[Path], object]] = {
 }
 
 
-def tables(path: Path, chosen: TableMapping | None = None) -> list[Frame]:
+def tables(path: Path, chosen: TableMapping | None = None) -> list[TableFrame]:
     return list(frames(path, path.name, chosen or mapping()))
 
 

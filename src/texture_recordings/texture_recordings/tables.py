@@ -343,7 +343,7 @@ class Columns:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class TableFrame:
     """Columns that belong together, by name, with what holds for all their rows."""
 
     place: str
@@ -373,7 +373,7 @@ def _meant(name: str, names: Sequence[str]) -> list[str]:
     return [one for one in names if fnmatch.fnmatchcase(one, name)] if len(name) <= 100 else []
 
 
-def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[Frame]:
+def frames(path: Path, place: str, mapping: TableMapping) -> Iterator[TableFrame]:
     """Yield the frames of a file; InvalidData with its place, whatever is wrong with it."""
     kind = _kind(path)
     if kind in OTHER_KINDS:
@@ -427,7 +427,7 @@ Line = tuple[int, str]  # its number in the file, from 1
 BLANK = frozenset(('', 'nan', 'na', 'null', 'none'))
 
 
-def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     form = mapping.format
     with _lines(path, form) as lines:
         _, first = next(lines, (0, ''))
@@ -439,7 +439,7 @@ def _read_csv(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise InvalidData(f"'{place}' has the column '{twice}' twice; give each column a different name")
-    yield Frame(place, names, partial(_csv_columns, path, place, form, names, take))
+    yield TableFrame(place, names, partial(_csv_columns, path, place, form, names, take))
 
 
 def _csv_columns(  # noqa: PLR0917 – bound one after the other
@@ -577,7 +577,7 @@ def _without_gaps(texts: AnyArray) -> AnyArray:
 # ---- files of arrays
 
 
-def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     def declared(file: Any) -> None:
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -602,7 +602,7 @@ def _read_numpy(path: Path, place: str, mapping: TableMapping, take: Take) -> It
         yield from _frames(archive.files, load, place, mapping)
 
 
-def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_mat(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     from scipy.io import loadmat  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened:
@@ -667,7 +667,7 @@ def _record(value: Any) -> dict[str, Any]:
     return {part: value[part] for part in value.dtype.names}
 
 
-def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False) -> Iterator[Frame]:
+def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False) -> Iterator[TableFrame]:
     h5py = library(*HDF5)
     with open_regular(path) as opened, h5py.File(opened, 'r') as file:
         found: dict[str, Any] = {}
@@ -715,7 +715,7 @@ def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, mat
         yield from _frames(list(found), load, place, mapping)
 
 
-def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     from scipy.io import wavfile  # noqa: PLC0415 – recording needs no scipy
 
     with open_regular(path) as opened, warnings.catch_warnings():
@@ -732,7 +732,7 @@ def _read_wav(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
         yield replace(frame, rate_hz=float(rate_hz))
 
 
-def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     types, parquet = library('pyarrow', *PARQUET[1:]).types, library(*PARQUET)
     plain = (types.is_integer, types.is_floating, types.is_boolean, types.is_string, types.is_dictionary,
              types.is_large_string, types.is_timestamp)  # fmt: skip
@@ -762,12 +762,12 @@ def _read_parquet(path: Path, place: str, mapping: TableMapping, take: Take) -> 
         coded = [one.name for one in schema if types.is_string(one.type) or types.is_large_string(one.type)]
         opened.seek(0)
         file = parquet.ParquetFile(opened, read_dictionary=coded)
-        yield Frame(place, names, read)
+        yield TableFrame(place, names, read)
 
 
 def _frames(
     names: Sequence[str], load: Callable[[str], AnyArray], place: str, mapping: TableMapping
-) -> Iterator[Frame]:
+) -> Iterator[TableFrame]:
     """Yield the frames that arrays form.
 
     Without a template all arrays are one frame. With one, an array whose name is of its form is a frame whose columns
@@ -797,7 +797,7 @@ def _frames(
         columns, constants = _unfolded_columns(arrays, within)
         number = int(next(iter(fields.values()))) if listed else 0
         of_list = {name: str(array[number - 1])[:MAX_TEXT] for name, array in listed.items() if number <= len(array)}
-        yield Frame(within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields})
+        yield TableFrame(within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields})
 
 
 def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
@@ -910,7 +910,7 @@ def _rows_of(value: Any, msgtype: str) -> Rows:
     return found
 
 
-def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[Frame]:
+def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iterator[TableFrame]:
     """Yield the one frame of a bag: the topics that the mapping names, each with its time.
 
     Times are those of the headers, or of logging where there are none, from the first message of the bag on.
@@ -943,7 +943,7 @@ def _read_bag(path: Path, place: str, mapping: TableMapping, take: Take) -> Iter
             f"'{place}' has no topic that the mapping names ({', '.join(sorted(wanted))}); it has "
             f"{', '.join(sorted(seen)) or 'none'}; write columns as topic and field, such as '/wrench/wrench.force.x'"
         )
-    yield Frame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
+    yield TableFrame(place, tuple(columns), partial(columns_of, columns, place), clocks=clocks)
 
 
 class _Topic:
@@ -998,7 +998,7 @@ class _Topic:
 # The kinds of files.
 
 BAG = 'bag'
-READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[Frame]]] = {
+READERS: Mapping[str, Callable[[Path, str, TableMapping, Take], Iterator[TableFrame]]] = {
     '.csv': _read_csv,
     '.tsv': _read_csv,
     '.txt': _read_csv,
@@ -1419,7 +1419,7 @@ Conditions = Sequence[tuple[float, float, float, float]]
 class FrameSlides:
     """The slides of one frame."""
 
-    def __init__(self, mapping: TableMapping, frame: Frame, fields: Mapping[str, str], report: ImportReport) -> None:
+    def __init__(self, mapping: TableMapping, frame: TableFrame, fields: Mapping[str, str], report: ImportReport) -> None:
         self._mapping, self._frame, self._report, self._place = mapping, frame, report, frame.place
         self._fields = {**frame.fields, **fields}
         self._chosen = {name: frame.chosen(stream.columns) for name, stream in mapping.streams.items()}
