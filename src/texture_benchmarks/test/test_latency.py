@@ -16,7 +16,7 @@ def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_p
         run_benchmark('latancy', BenchmarkOptions(tmp_path))
     for data, missing in ((None, 'no folder of recorded data was given'), (tmp_path, "there is no 'biotac20' in")):
         with pytest.raises(InvalidData, match=missing):
-            BENCHMARKS['borders'](BenchmarkOptions(tmp_path, data))
+            BENCHMARKS['generalisation'](BenchmarkOptions(tmp_path, data))
 
 
 @pytest.mark.benchmark

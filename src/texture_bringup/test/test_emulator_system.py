@@ -18,7 +18,7 @@ from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core import config as resources
 from texture_core.errors import InvalidParameter, LaunchFailed
-from texture_core.types import ExplorationRequest
+from texture_core.types import ExplorationRequest, Rejection
 from texture_evaluation.train import train_from_bags, train_grades_from_bags
 
 DOMAIN = 61
@@ -117,8 +117,8 @@ def test_a_model_of_simulated_slides_recognises_the_surface_of_the_emulator(oper
     explored = operator.explore(SLIDE)
     assert (explored.texture.label, explored.texture.final) == ('ridge_2mm_deep', True)
     assert explored.texture.confidence == pytest.approx(0.05 ** (1 / 8))  # no more is shown by 8 slides
-    assert explored.texture.known
-    assert 'outside' not in explored.texture.message
+    assert explored.texture.rejection is Rejection.TOO_LITTLE_TRAINING
+    assert '8 slides could be held out' in explored.texture.message
 
 
 def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:

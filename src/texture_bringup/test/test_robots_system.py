@@ -75,7 +75,8 @@ def test_motions_on_an_emulated_robot_end_with_an_estimate(robot, two_surfaces, 
         for motion, label in motions:
             code = command.main(['explore', *motion, *FORCES.get(robot, [])])
             reported = capsys.readouterr().out
-            assert code == 0, reported + launcher.log.read_text()
+            # Eight slides of another direction and force accept nothing; the estimate is there all the same.
+            assert code == 3, reported + launcher.log.read_text()
             found = re.findall(
                 r'the motion ended as asked\ntexture: +(?:unknown \(nearest: )?(\w+), '
                 r'confidence [\d.]+ after ([\d.]+) s',
