@@ -977,6 +977,7 @@ MET_GROWTH = 2.0  # times the change in the first half of the way
 MOST_FORCE_SHARE = 0.65  # of the force limit: no finger that was pressed as asked is left pressed harder
 GO_BACK_S = 0.5
 UNKNOWN_STATE = ArmState(0, (math.inf,) * 3, (0.0,) * 3, math.nan)
+REST_STEP_M = 1e-5  # way between two states of an arm at rest
 PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so where it stands
 
 
@@ -1186,6 +1187,7 @@ class CalmDown(Stage):
         self._rest_ns = 0
         self._start_m = self._rest_m = 0.0
         self._free_n = (0.0, 0.0, 0.0)
+        self._before: ArmState | None = None
 
     def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
         """Go back from what the finger met."""
@@ -1195,10 +1197,16 @@ class CalmDown(Stage):
         """Note when and where the arm came to rest."""
         super().begin(time_ns, arm)
         self._rest_ns, self._start_m, self._rest_m = time_ns, arm.position[2], arm.position[2]
-        self._free_n = arm.force_vector_n
+        self._free_n, self._before = arm.force_vector_n, arm
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
+        # What the force changes by at rest is no contact: the sensor is zeroed before the arm says so
+        before, self._before = self._before or arm, arm
+        if math.dist(before.position, arm.position) < REST_STEP_M:
+            changes = zip(self._free_n, arm.force_vector_n, before.force_vector_n, strict=True)
+            x, y, z = (free + now - then for free, now, then in changes)
+            self._free_n = (x, y, z)
         rested_s = (time_ns - self._rest_ns) * 1e-9
         if rested_s >= CALM_S and self._zeroed():
             if self._believed:
