@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.motion import Trial, explored
+from texture_benchmarks.motion import ForceTrial, explored
 from texture_benchmarks.study import BenchmarkOptions
 
 MOST_N = {
@@ -18,11 +18,11 @@ MOST_N = {
     'surface upside down': 10.0,
 }
 TRIALS = [
-    (Trial('20 kN/m declared', stiffness_n_m=20000.0, delay_s=0.02), 'success'),
-    (Trial('20 kN/m declared', stiffness_n_m=2000.0, delay_s=0.05, noise_n=0.02), 'success'),
-    (Trial('wall of 20 kN/m in the slide', delay_s=0.02, speed_m_s=0.05, wall_m=0.015), 'FORCE_LIMIT'),
-    (Trial('wrong signs and axes', fault='force sign'), 'FORCE_SENSOR'),
-    (Trial('surface upside down', 500.0, delay_s=0.02, height_m=0.001, fault='upside down'), 'MOTION_FAILED'),
+    (ForceTrial('20 kN/m declared', stiffness_n_m=20000.0, delay_s=0.02), 'success'),
+    (ForceTrial('20 kN/m declared', stiffness_n_m=2000.0, delay_s=0.05, noise_n=0.02), 'success'),
+    (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.02, speed_m_s=0.05, wall_m=0.015), 'FORCE_LIMIT'),
+    (ForceTrial('wrong signs and axes', fault='force sign'), 'FORCE_SENSOR'),
+    (ForceTrial('surface upside down', 500.0, delay_s=0.02, height_m=0.001, fault='upside down'), 'MOTION_FAILED'),
 ]
 
 
@@ -34,7 +34,7 @@ def test_a_trial_ends_as_named_within_its_force(trial, end):
 
 
 def test_a_force_100_ms_late_by_stamps_of_arrival_is_named_and_no_success():
-    found = explored(Trial('late', 20000.0, delay_s=0.02, late_force_s=0.1))
+    found = explored(ForceTrial('late', 20000.0, delay_s=0.02, late_force_s=0.1))
     assert found.end == 'ARM_FAULT'
     assert "later than 'loop_delay_s'" in found.message
 

@@ -49,7 +49,7 @@ REST_S = 0.3  # after a break nothing may move
 MOVING_M_S = 0.0005
 
 
-class Trial(NamedTuple):
+class ForceTrial(NamedTuple):
     """One exploration; `bad` is a field of a sample that is no number, `broken_s` a break of the link, in a phase."""
 
     name: str
@@ -92,7 +92,7 @@ class TrialEnd(NamedTuple):
 class VirtualMachine:
     """A robot that holds the last velocity for ever, over a plane at z = 0 of its base."""
 
-    def __init__(self, trial: Trial) -> None:
+    def __init__(self, trial: ForceTrial) -> None:
         self.now_ns = 1_000_000_000
         self.trial = trial
         self.place = [0.0, 0.0, trial.height_m]
@@ -202,7 +202,7 @@ LIMITS = SafetyLimits(approach_timeout_s=60.0, z_low_m=-0.06, surface_tolerance_
 BAD = ('force nan', 'force inf', 'force 1e308', 'place nan', 'place inf', 'rotation nan')
 
 
-def explored(trial: Trial) -> TrialEnd:
+def explored(trial: ForceTrial) -> TrialEnd:
     """Explore once: the exploration and the arm are those of the suite, time and physics are not."""
     machine = VirtualMachine(trial)
     params = RosControllersParams(
@@ -278,29 +278,29 @@ PHASES = ('approach', 'contact', 'slide', 'lift')
 FAULTS = ('velocity sign', 'force sign', 'velocity axes', 'force axes')
 
 
-def sweep(seeds: int, quick: bool = False) -> Iterator[Trial]:
+def sweep(seeds: int, quick: bool = False) -> Iterator[ForceTrial]:
     """Return the trials of the sweep; `seeds` of the noise for each."""
     stiffnesses = STIFFNESSES_N_M[::2] if quick else STIFFNESSES_N_M
     delays, noises = (DELAYS_S[1::2], NOISES_N[::2]) if quick else (DELAYS_S, NOISES_N)
     for k, delay, noise, seed in product(stiffnesses, delays, noises, range(seeds)):
-        yield Trial('stiffness as declared', k, k, delay, noise, seed)
-        yield Trial('20 kN/m declared', k, 20000.0, delay, noise, seed)
+        yield ForceTrial('stiffness as declared', k, k, delay, noise, seed)
+        yield ForceTrial('20 kN/m declared', k, 20000.0, delay, noise, seed)
     for k, seed in product(stiffnesses, range(seeds)):
-        yield Trial('force 100 ms late, stamped on arrival', k, 20000.0, 0.02, seed=seed, late_force_s=0.1)
-        yield Trial('contact four times stiffer than declared', k, k / 4, 0.02, seed=seed)
+        yield ForceTrial('force 100 ms late, stamped on arrival', k, 20000.0, 0.02, seed=seed, late_force_s=0.1)
+        yield ForceTrial('contact four times stiffer than declared', k, k / 4, 0.02, seed=seed)
     for speed, delay, seed in product((0.02, 0.05), delays, range(seeds)):
-        yield Trial('wall of 20 kN/m in the slide', 2000.0, 20000.0, delay, 0.003, seed, 5.0, speed, wall_m=0.015)
+        yield ForceTrial('wall of 20 kN/m in the slide', 2000.0, 20000.0, delay, 0.003, seed, 5.0, speed, wall_m=0.015)
     for fault, k, seed in product(FAULTS, stiffnesses, range(seeds)):
-        yield Trial('wrong signs and axes', k, 20000.0, 0.02, 0.003, seed, fault=fault)
+        yield ForceTrial('wrong signs and axes', k, 20000.0, 0.02, 0.003, seed, fault=fault)
     for k, gap, seed in product((500.0, 1000.0, 2000.0, 20000.0), GAPS_M, range(seeds)):
-        yield Trial('surface upside down', k, 20000.0, 0.02, 0.003, seed, height_m=gap, fault='upside down')
+        yield ForceTrial('surface upside down', k, 20000.0, 0.02, 0.003, seed, height_m=gap, fault='upside down')
     for bad, phase in product(BAD, PHASES):
-        yield Trial('a sample that is no number', bad=bad, phase=phase)
+        yield ForceTrial('a sample that is no number', bad=bad, phase=phase)
     for broken_s, phase in product(BREAKS_S, PHASES):
-        yield Trial('link broken for 0.1 to 5 s', broken_s=broken_s, phase=phase)
+        yield ForceTrial('link broken for 0.1 to 5 s', broken_s=broken_s, phase=phase)
 
 
-def row(trials: Sequence[tuple[Trial, TrialEnd]]) -> dict[str, Any]:
+def row(trials: Sequence[tuple[ForceTrial, TrialEnd]]) -> dict[str, Any]:
     """Return the figures of one row of the table."""
     ends = [end for _, end in trials]
     good = [(trial, end) for trial, end in trials if end.end == 'success']
@@ -392,7 +392,7 @@ def border_chart(border: Mapping[str, Array], path: Path) -> Path:
     return path
 
 
-def force_chart(rows: Mapping[str, Sequence[tuple[Trial, TrialEnd]]], path: Path) -> Path:
+def force_chart(rows: Mapping[str, Sequence[tuple[ForceTrial, TrialEnd]]], path: Path) -> Path:
     """Draw the largest force of each trial by kind: success, or ended with a reason."""
     with chart(path, (8.5, 4.6), 'Largest true force of each trial, 5 N wanted') as figure:
         axes = figure.subplots()
@@ -425,7 +425,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     trial, the longest time above 10 N, and how the trials ended.
     """
     seeds = 1 if options.quick else SEEDS
-    rows: dict[str, list[tuple[Trial, TrialEnd]]] = {}
+    rows: dict[str, list[tuple[ForceTrial, TrialEnd]]] = {}
     for trial in sweep(seeds, options.quick):
         rows.setdefault(trial.name, []).append((trial, explored(trial)))
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else BORDER_DELAYS_S)

@@ -25,13 +25,14 @@ OF_SHARES = {'taxels': 'signal_static', 'taxels-signal': 'signal'}
 OF_CHANGES = ('taxels-any-day',)
 # The friction of these surfaces is not simulated.
 OF_FRICTION = ('friction-svm',)
-# Variables were searched for each pair of the ten textures of its scene; other pairs share all of its features.
+# Variables, box and kernel were searched for each pair of the four ridges; they hold for no other surfaces.
+OF_RIDGES = ('ets-linear-svm-pairs',)
 # The simulated slides are of one finger and along one axis.
 OF_ONE_FINGER = [
     name
     for name in SHIPPED
     if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names))
-    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION)
+    and name not in (*OF_SHARES, *OF_CHANGES, *OF_FRICTION, *OF_RIDGES)
 ]
 
 

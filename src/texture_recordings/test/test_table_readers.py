@@ -14,7 +14,15 @@ import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData, MissingLibrary
-from texture_recordings.tables import MAPPED, TableFrame, TableMapping, frames, import_tables, mapping_from, template_fields
+from texture_recordings.tables import (
+    MAPPED,
+    TableFrame,
+    TableMapping,
+    frames,
+    import_tables,
+    mapping_from,
+    template_fields,
+)
 
 pa = pytest.importorskip('pyarrow')
 parquet = pytest.importorskip('pyarrow.parquet')

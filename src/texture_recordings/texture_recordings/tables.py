@@ -667,7 +667,9 @@ def _record(value: Any) -> dict[str, Any]:
     return {part: value[part] for part in value.dtype.names}
 
 
-def _read_hdf5(path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False) -> Iterator[TableFrame]:
+def _read_hdf5(
+    path: Path, place: str, mapping: TableMapping, take: Take, *, matlab: bool = False
+) -> Iterator[TableFrame]:
     h5py = library(*HDF5)
     with open_regular(path) as opened, h5py.File(opened, 'r') as file:
         found: dict[str, Any] = {}
@@ -797,7 +799,9 @@ def _frames(
         columns, constants = _unfolded_columns(arrays, within)
         number = int(next(iter(fields.values()))) if listed else 0
         of_list = {name: str(array[number - 1])[:MAX_TEXT] for name, array in listed.items() if number <= len(array)}
-        yield TableFrame(within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields})
+        yield TableFrame(
+            within, tuple(columns), partial(columns_of, columns, within), {**of_list, **constants, **fields}
+        )
 
 
 def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
@@ -1419,7 +1423,9 @@ Conditions = Sequence[tuple[float, float, float, float]]
 class FrameSlides:
     """The slides of one frame."""
 
-    def __init__(self, mapping: TableMapping, frame: TableFrame, fields: Mapping[str, str], report: ImportReport) -> None:
+    def __init__(
+        self, mapping: TableMapping, frame: TableFrame, fields: Mapping[str, str], report: ImportReport
+    ) -> None:
         self._mapping, self._frame, self._report, self._place = mapping, frame, report, frame.place
         self._fields = {**frame.fields, **fields}
         self._chosen = {name: frame.chosen(stream.columns) for name, stream in mapping.streams.items()}

@@ -53,9 +53,13 @@ class TcpConnection:
         try:
             self._socket = socket.create_connection((ip, port), timeout_s)
         except OSError as error:
-            refused = isinstance(error, ConnectionRefusedError)
-            what = f'nothing listens on {self._where}' if refused else f'{self._where} cannot be reached: {error}'
-            raise DeviceError(f"{what}; is the controller on, and is parameter 'ip' its address?") from error
+            if isinstance(error, ConnectionRefusedError):
+                raise DeviceError(
+                    f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address?"
+                ) from error
+            raise DeviceError(
+                f"{self._where} cannot be reached: {error}; is the controller on, and is parameter 'ip' its address?"
+            ) from error
 
     def close(self) -> None:
         """End the conversation."""
