@@ -35,7 +35,8 @@ PATIENT = RosControllersParams(
     accept_no_timeout=True,
     accept_shared_group=True,
 )
-TOUCH = TouchParams(peak_speed_fraction=3.4)  # it makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast
+# It makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast. Other tests ask how exactly 1 N is kept.
+TOUCH = TouchParams(peak_speed_fraction=3.4, force_tolerance=0.5)
 # Each slide begins where the last one ended.
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0, x_high_m=2.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
