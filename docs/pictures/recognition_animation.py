@@ -98,7 +98,8 @@ class Panel:
         probability.set_ylabel('probability', fontsize=8)
         colours = dict(zip(shown.labels, COLOURS, strict=False))
         self._lines = {name: probability.plot([], [], color=colours[name], linewidth=1.6)[0] for name in shown.labels}
-        self._names = {name: probability.text(0, 0, '', color=colours[name], fontsize=8, va='center') for name in colours}
+        style = {'fontsize': 8, 'va': 'center'}
+        self._names = {name: probability.text(0, 0, '', color=colours[name], **style) for name in colours}
         self._verdict = scene.text(0.02, 0.6, '', fontsize=12, fontweight='bold', transform=scene.transAxes)
 
     def draw(self, now_s: float) -> None:
