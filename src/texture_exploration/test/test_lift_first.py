@@ -7,8 +7,10 @@ from dataclasses import replace
 import pytest
 
 from texture_core.types import ExplorationRequest, Phase
+from texture_exploration.arms.arm import ArmState
 from texture_exploration.motions import MOTIONS
-from texture_exploration.stages import TouchParams
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.stages import CalmDown, TouchParams, WrongWay
 
 TOUCH = TouchParams()
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.03)
@@ -146,3 +148,25 @@ def test_after_an_exploration_that_was_aborted_the_next_one_lifts_first(explorer
     explorer.table.gate.set()
     assert exploration.ended.wait(DEADLINE_S)
     assert lifts_first(explorer)
+
+
+def rested(force_n_at):
+    """Return the command of an arm that stands still for 1 s and has not said that its sensor is zeroed."""
+    stage = CalmDown(lambda: False, 1.0, TOUCH, SafetyLimits())
+    for tick in range(101):
+        state = ArmState(tick * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), force_n_at(0.01 * tick))
+        if not tick:
+            stage.begin(state.time_ns, state)
+        command = stage.step(state.time_ns, state)
+    return command
+
+
+@pytest.mark.parametrize('offset_n', [0.0, 1.5], ids=['no offset', 'an offset'])
+def test_a_contact_that_grows_while_the_finger_stands_still_forbids_the_next_rise(offset_n):
+    with pytest.raises(WrongWay, match=r'the finger met something .*, [0-3]\.\d\d N'):
+        rested(lambda seconds: offset_n + min(3.0, 6.0 * seconds))
+
+
+def test_a_sensor_that_is_zeroed_before_the_arm_says_so_is_no_contact():
+    """A controller may acknowledge its zeroing 0.4 s late: the offset of 1.5 N is gone by then."""
+    assert rested(lambda seconds: 1.5 if seconds < 0.1 else 0.0).normal_m_s > 0.0

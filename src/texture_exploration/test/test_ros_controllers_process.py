@@ -35,8 +35,7 @@ PATIENT = RosControllersParams(
     accept_no_timeout=True,
     accept_shared_group=True,
 )
-# It makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast. Other tests ask how exactly 1 N is kept.
-TOUCH = TouchParams(peak_speed_fraction=3.4, force_tolerance=0.5)
+TOUCH = TouchParams(peak_speed_fraction=3.4)  # it makes up for up to 0.1 s: seen over 30 ms, up to 4.3 times as fast
 # Each slide begins where the last one ended.
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0, x_high_m=2.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
@@ -63,8 +62,8 @@ def make_explorer():
     """Return explorers; one that a failed test leaves behind would command the arm of the next."""
     with ExitStack() as closing:
 
-        def make(params=PATIENT):
-            explorer = Explorer(RosControllersArm(params), TOUCH, LIMITS, lambda state: None)
+        def make(params=PATIENT, touch=TOUCH):
+            explorer = Explorer(RosControllersArm(params), touch, LIMITS, lambda state: None)
             closing.callback(explorer.close)
             return explorer
 
@@ -152,7 +151,8 @@ def test_a_guard_that_is_killed_ends_the_slide_with_the_finger_lifted(controller
 def test_a_finger_that_a_killed_explorer_left_pressed_is_lifted_on_request_before_anything_else(
     controller, make_explorer
 ):
-    killed = make_explorer()
+    # How exactly 1 N is kept on a busy machine is not asked here: the finger only has to press when it is left
+    killed = make_explorer(touch=replace(TOUCH, force_tolerance=0.5))
     killed.connect()
     exploration, since_ns = explored(killed, killed.arm.close)  # stands still and presses, as after SIGKILL
     assert since_ns, exploration.outcome

@@ -1201,12 +1201,13 @@ class CalmDown(Stage):
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
-        # What the force changes by at rest is no contact: the sensor is zeroed before the arm says so
+        # A sensor that reads nothing at rest was zeroed, though the arm may not say so yet; a contact would be read
         before, self._before = self._before or arm, arm
-        if math.dist(before.position, arm.position) < REST_STEP_M:
-            changes = zip(self._free_n, arm.force_vector_n, before.force_vector_n, strict=True)
-            x, y, z = (free + now - then for free, now, then in changes)
-            self._free_n = (x, y, z)
+        if (
+            math.dist(before.position, arm.position) < REST_STEP_M
+            and math.hypot(*arm.force_vector_n) <= self._touch.contact_force_n
+        ):
+            self._free_n = arm.force_vector_n
         rested_s = (time_ns - self._rest_ns) * 1e-9
         if rested_s >= CALM_S and self._zeroed():
             if self._believed:
