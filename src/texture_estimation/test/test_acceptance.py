@@ -58,7 +58,7 @@ def accepted(acceptance, slides, *, unknown=False):
     """Return whether slides are accepted at each length of evidence, (n_slides, n_levels)."""
     rows = [slide.unknown if unknown else slide.scored for slide in slides]
     return np.array([
-        [acceptance.judge(*pair, length).rejection is Rejection.NONE for pair, length in zip(own, LEVELS, strict=True)]
+        [acceptance.assess(*pair, length).rejection is Rejection.NONE for pair, length in zip(own, LEVELS, strict=True)]
         for own in rows
     ])  # fmt: skip
 
@@ -111,15 +111,15 @@ def test_more_margin_and_less_distance_never_turn_acceptance_into_rejection():
     found = fitted(held_out(rng, 500))
     for length in (0.5, 1.2, 4.0, 40.0):
         for margin, distance in rng.exponential(size=(50, 2)):
-            if found.judge(margin, distance, length).rejection is Rejection.NONE:
-                assert found.judge(2.0 * margin, distance, length).rejection is Rejection.NONE
-                assert found.judge(margin, 0.5 * distance, length).rejection is Rejection.NONE
+            if found.assess(margin, distance, length).rejection is Rejection.NONE:
+                assert found.assess(2.0 * margin, distance, length).rejection is Rejection.NONE
+                assert found.assess(margin, 0.5 * distance, length).rejection is Rejection.NONE
 
 
 def test_a_rejected_surface_is_novel_if_it_is_far_and_else_ambiguous():
     found = fitted(held_out(np.random.default_rng(0), 500, others=0.5))
-    assert found.judge(5.0, 1e6, 3.0).rejection is Rejection.NOVEL
-    assert found.judge(0.0, 0.5, 3.0).rejection is Rejection.AMBIGUOUS
+    assert found.assess(5.0, 1e6, 3.0).rejection is Rejection.NOVEL
+    assert found.assess(0.0, 0.5, 3.0).rejection is Rejection.AMBIGUOUS
 
 
 def test_limits_are_linear_between_two_lengths_of_evidence_and_stay_beyond_them():
@@ -136,10 +136,10 @@ def test_slides_end_early_with_as_few_wrong_labels_as_allowed():
     found, new = fitted(held_out(rng, 2000)), held_out(rng, 2000)
     wrong = []
     for slide in new:
-        decided = [found.judge(*pair, length).decided for pair, length in zip(slide.scored, LEVELS, strict=True)]
+        decided = [found.assess(*pair, length).decided for pair, length in zip(slide.scored, LEVELS, strict=True)]
         wrong.append(any(decided) and not slide.right[decided.index(True)])
     assert np.mean(wrong) < 1.5 * RATES.max_error_rate
-    assert fitted(held_out(rng, 100)).judge(9.0, 0.0, 3.0) == (Rejection.NONE, False)  # 100 cannot show 2 %
+    assert fitted(held_out(rng, 100)).assess(9.0, 0.0, 3.0) == (Rejection.NONE, False)  # 100 cannot show 2 %
 
 
 @pytest.mark.parametrize('coverage', [0.8, 0.95])

@@ -271,7 +271,7 @@ class Rates:
     coverage: float = 0.95
 
 
-class Judgement(NamedTuple):
+class Assessment(NamedTuple):
     """What is said of a slide so far."""
 
     rejection: Rejection
@@ -387,16 +387,16 @@ class Acceptance:
         pairs = zip(self._rows[after - 1], self._rows[after], strict=True)
         return Limits(*(one if one == other else one + share * (other - one) for one, other in pairs))
 
-    def judge(self, margin: float, distance: float, effective_windows: float) -> Judgement:
+    def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
         """Return what is said of a slide by the margin of its label and the distance to the slides of it."""
         if self.distance is None:
-            return Judgement(Rejection.TOO_LITTLE_TRAINING, decided=False)
+            return Assessment(Rejection.TOO_LITTLE_TRAINING, decided=False)
         limits = self.limits(effective_windows)
         accepted = distance <= limits.novel if self.by_distance else limits.accepts(margin, distance)
         if not accepted:
-            return Judgement(Rejection.NOVEL if distance > limits.novel else Rejection.AMBIGUOUS, decided=False)
+            return Assessment(Rejection.NOVEL if distance > limits.novel else Rejection.AMBIGUOUS, decided=False)
         decided = not self.decided_reason and limits.score(margin, distance) >= self.decided_score
-        return Judgement(Rejection.NONE, decided)
+        return Assessment(Rejection.NONE, decided)
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
         """Return the numbers of the labels in the prediction set, the most probable first; none if too few slides."""

@@ -167,7 +167,7 @@ class EvidenceAccumulator:
         acceptance = model.acceptance_of(best)
         second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
         distance = self._distance.to(best) if self._distance else math.inf
-        rejection, decided = acceptance.judge(margin_of(first, second), distance, effective_windows)
+        rejection, decided = acceptance.assess(margin_of(first, second), distance, effective_windows)
         if self._deviation:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not single and rejection is Rejection.NONE:

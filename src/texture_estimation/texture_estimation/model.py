@@ -594,7 +594,7 @@ class TextureModel(StoredModel):
         if self.acceptance.distance is not None:
             distance = SlideDistance(self.acceptance.distance)
             distance.add(self.compared(nothing), 1.0)
-            self.acceptance.judge(0.0, distance.to(0), 1.0)
+            self.acceptance.assess(0.0, distance.to(0), 1.0)
             self.acceptance.members(np.exp(answer), 1.0)
         if self.slide_gaussians is not None:
             self.slide_gaussians.check(nothing)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import ctypes.util
 import grp
 import inspect
 import os
@@ -224,6 +223,18 @@ def _dds() -> str:
     return f'{name}, domain {domain}, discovery range {reach}'
 
 
+def _sound() -> str:
+    try:
+        import miniaudio
+
+        cards = [card['name'] for card in miniaudio.Devices().get_captures()]
+    except ImportError:
+        return "miniaudio is not installed; sensor 'sound_card' needs it"
+    except miniaudio.MiniaudioError as error:
+        return f'no sound system: {error}'
+    return ', '.join(cards) or 'no card that records'
+
+
 def _dashboard_port() -> str:
     with socket.socket() as probe:
         return '8085 is busy' if probe.connect_ex(('127.0.0.1', 8085)) == 0 else '8085 is free'
@@ -236,7 +247,7 @@ CHECKS: Mapping[str, Callable[[], str]] = {
     'DDS': _dds,
     'serial ports': _ports,
     'groups': _groups,
-    'PortAudio': lambda: ctypes.util.find_library('portaudio') or "not installed; sensor 'sound_card' needs it",
+    'sound': _sound,
     'dashboard': _dashboard_port,
     'versions': lambda: ', '.join(f'{name} {_version(name)}' for name in PACKAGES),
 }
