@@ -31,7 +31,7 @@ PATIENT = RosControllersParams(
     connect_timeout_s=30.0,
     deadman_s=1.0,
     max_stiffness_n_m=2000.0,
-    max_impact_n=1.0,
+    max_impact_n=0.3,  # of 1 N wanted: more would overshoot at once
     accept_no_timeout=True,
     accept_shared_group=True,
 )

@@ -37,10 +37,9 @@ COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fit
 ARRIVAL_S = 0.2
 LOOKING_S = 0.05
 ANNOUNCED_S = 3.0  # participants announce themselves so often (rmw_fastrtps)
-# So long after the controller was found, no other publisher may show: on this machine participants find each other at
-# once, and the lock knows the explorers; from others two announcements are waited for.
-ALONE_S = {'LOCALHOST': 1.0}
-ALONE_ACROSS_HOSTS_S = 2 * ANNOUNCED_S
+# So long after the controller was found, no other publisher may show, on this machine either: a new participant finds
+# the publishers of another only when that one announces itself again, if the first messages between both were lost.
+ALONE_S = 2 * ANNOUNCED_S
 NO_TIMEOUT = (
     "the controller on '{topic}' declares no timeout ('controller_timeout_s' is 0): it may hold the last velocity for "
     "ever if this machine or its network fails. Set its timeout, or set 'accept_no_timeout: true' once the safety "
@@ -197,7 +196,6 @@ class RosTopics:
         """Return once the controller is there and nobody else commands it; who does must not be disturbed by a look."""
         begin_s, alone_s = time.monotonic(), 0.0
         topic = self._commanded_topics[0]
-        enough_s = ALONE_S.get(os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', ''), ALONE_ACROSS_HOSTS_S)
         while True:
             give_up_when_ending()
             other, now_s = self._other_commander(self._participant), time.monotonic()
@@ -212,7 +210,7 @@ class RosTopics:
                     )
             else:
                 alone_s = alone_s or now_s
-                if now_s - alone_s >= enough_s:
+                if now_s - alone_s >= ALONE_S:
                     return
             time.sleep(LOOKING_S)
 
