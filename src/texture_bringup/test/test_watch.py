@@ -77,7 +77,7 @@ def test_a_catalogue_is_listed(what, named, capsys):
 def test_the_machine_is_shown_on_one_screen(capsys):
     assert main(['doctor']) == 0
     names = [one.split('  ')[0] for one in capsys.readouterr().out.splitlines()]
-    assert names == ['system', 'Python', 'ROS', 'DDS', 'serial ports', 'groups', 'sound', 'dashboard', 'versions']
+    assert names == ['system', 'Python', 'ROS', 'DDS', 'serial ports', 'groups', 'dashboard', 'versions']
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def _bag_rows(bag: Path, namespace: str | None) -> Iterator[Row]:
 # --------------------
 # What of this machine matters, on one screen.
 
-PACKAGES = ('texture_core', 'rclpy', 'numpy', 'scipy', 'scikit-learn', 'rosbags', 'ur-rtde', 'aiohttp')
+PACKAGES = ('texture_core', 'rclpy', 'numpy', 'scipy', 'scikit-learn', 'rosbags', 'ur-rtde', 'miniaudio', 'aiohttp')
 GROUPS = {'dialout': 'serial devices', 'audio': 'sound cards', 'realtime': 'real-time priority'}
 
 
@@ -223,18 +223,6 @@ def _dds() -> str:
     return f'{name}, domain {domain}, discovery range {reach}'
 
 
-def _sound() -> str:
-    try:
-        import miniaudio
-
-        cards = [card['name'] for card in miniaudio.Devices().get_captures()]
-    except ImportError:
-        return "miniaudio is not installed; sensor 'sound_card' needs it"
-    except miniaudio.MiniaudioError as error:
-        return f'no sound system: {error}'
-    return ', '.join(cards) or 'no card that records'
-
-
 def _dashboard_port() -> str:
     with socket.socket() as probe:
         return '8085 is busy' if probe.connect_ex(('127.0.0.1', 8085)) == 0 else '8085 is free'
@@ -247,7 +235,6 @@ CHECKS: Mapping[str, Callable[[], str]] = {
     'DDS': _dds,
     'serial ports': _ports,
     'groups': _groups,
-    'sound': _sound,
     'dashboard': _dashboard_port,
     'versions': lambda: ', '.join(f'{name} {_version(name)}' for name in PACKAGES),
 }
