@@ -78,7 +78,7 @@ class EarlyStoppingParams:
 
     def may_stop(self, estimate: TextureEstimate) -> bool:
         """Return whether the texture estimate may end the slide."""
-        return estimate.known and estimate.decided and estimate.confidence >= self.min_confidence
+        return estimate.accepted and estimate.decided and estimate.confidence >= self.min_confidence
 
 
 class ExplorationEstimates:
