@@ -12,16 +12,16 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array, FingerState, rotation_matrix
+from texture_simulation.devices.rails import TouchParams
 
 # --------------------
 # The surface under the finger of an emulated arm, and a wall.
 
 
 @dataclass(frozen=True)
-class TouchedSurfaceParams:
-    """Where the surface lies, and how finger and force sensor begin."""
+class TouchedSurfaceParams(TouchParams):
+    """Where the surface lies, and what else is there."""
 
-    start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
     surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
     surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')
     surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
@@ -31,13 +31,6 @@ class TouchedSurfaceParams:
         unit='m',
         low=-2.0,
         high=2.0,
-    )
-    stiffness_n_m: float = param(
-        2000.0,
-        'Stiffness of finger and surface in contact; 0 removes the surface.',
-        unit='N/m',
-        low=0.0,
-        high=200000.0,
     )
     wall_stiffness_n_m: float = param(20000.0, 'Stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0)
     force_offset_n: float = param(1.5, 'Offset of the force sensor until it is zeroed.', unit='N')
