@@ -14,7 +14,7 @@ from texture_core.errors import InvalidData
 MOST_N = {
     'stiffness as declared': 6.0,
     '20 kN/m declared': 6.0,
-    'wall of 20 kN/m in the slide': 70.0,  # of an arm 50 ms late; 45 N up to 20 ms
+    'wall of 20 kN/m in the slide': 45.0,
     'wrong signs and axes': 10.0,
     'surface upside down': 10.0,
 }
@@ -22,6 +22,8 @@ TRIALS = [
     (ForceTrial('20 kN/m declared', stiffness_n_m=20000.0, delay_s=0.02), 'success'),
     (ForceTrial('20 kN/m declared', stiffness_n_m=2000.0, delay_s=0.05, noise_n=0.02), 'success'),
     (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.02, speed_m_s=0.05, wall_m=0.015), 'FORCE_LIMIT'),
+    (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.05, speed_m_s=0.02, wall_m=0.015), 'FORCE_LIMIT'),
+    (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.05, speed_m_s=0.05, wall_m=0.015), 'refused'),
     (ForceTrial('wrong signs and axes', fault='force sign'), 'FORCE_SENSOR'),
     (ForceTrial('surface upside down', 500.0, delay_s=0.02, height_m=0.001, fault='upside down'), 'MOTION_FAILED'),
     (ForceTrial('a sample that is no number', bad='rotation 2 nan', phase='slide'), 'ARM_FAULT'),

@@ -200,6 +200,7 @@ class Exploration:
         on_state: Callable[[ExplorationState], None],
         signal_fault: Callable[[Listening], str] = no_signal_watch,
     ) -> None:
+        motion.refuse_too_fast(request.motion, arm.state())
         self.exploration_id = exploration_id
         self.request = request
         self.outcome = ExplorationOutcome(

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from texture_core.config import param
-from texture_core.errors import ExplorationError, MotionAborted
+from texture_core.errors import ExplorationError, MotionAborted, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, FreeAir, Vector
+from texture_exploration.force_control import stopping_m_s
 from texture_exploration.safety import SafetyLimits
 
 # --------------------
@@ -157,8 +158,15 @@ def ramps_m(speed_m_s: float, gaining_s: float) -> float:
 # How the finger comes to the surface, presses and leaves: the same for every motion.
 
 REACTION_S = 0.03  # from contact to standstill: two states of the arm, two steps of the exploration
+STEP_S = 0.014  # of exploration and arm, that an arm stands later than by its delay
+WALL_SHARE = 4.5  # times the force limit, with which a wall as stiff as declared may press until the arm stands
 IMPACT = 0.8  # of the wanted force
 HARMLESS_N = 0.5  # a smaller force is not approached more slowly for what an arm does that hears nothing
+
+
+def stop_s(delay_s: float) -> float:
+    """Return how long after a contact an arm stands."""
+    return max(REACTION_S, delay_s + STEP_S)
 
 
 @dataclass(frozen=True)
@@ -181,8 +189,8 @@ class TouchParams:
     )
     approach_stiffness_n_m: float = param(
         2000.0,
-        'Stiffest contact that is expected; larger values lower the approach speed, so that the '
-        'impact stays below the wanted force.',
+        'Stiffest contact that is expected, also from the side; larger values lower the approach speed, so that the '
+        'impact stays below the wanted force, and the highest speed of a slide.',
         unit='N/m',
         low=10.0,
         high=200000.0,
@@ -279,7 +287,7 @@ class TouchParams:
     )
     clearance_m = 0.005  # least rise after a contact
 
-    def approach_m_s(self, force_n: float, watchdog_s: float = 0.0) -> float:
+    def approach_m_s(self, force_n: float, watchdog_s: float = 0.0, delay_s: float = 0.0) -> float:
         """Return how fast the finger may come down to press with a force.
 
         An arm that loses its commands just as it reacts to the contact goes on for the time of its watchdog. Until then
@@ -289,17 +297,21 @@ class TouchParams:
         ----------
         force_n
             The wanted force.
-        watchdog_s
+        watchdog_s, delay_s
             See `texture_exploration.arms.arm.ArmState`.
         """
-        heard_m_s = IMPACT * force_n / (self.approach_stiffness_n_m * REACTION_S)
-        allowed_n = max(self.unheard_force_fraction * force_n, HARMLESS_N)
-        unheard_m_s = allowed_n / (self.approach_stiffness_n_m * (watchdog_s + REACTION_S)) if watchdog_s else math.inf
+        heard_m_s = stopping_m_s(IMPACT * force_n, self.approach_stiffness_n_m, stop_s(delay_s))
+        allowed_n, unheard_s = max(self.unheard_force_fraction * force_n, HARMLESS_N), watchdog_s + REACTION_S
+        unheard_m_s = stopping_m_s(allowed_n, self.approach_stiffness_n_m, unheard_s) if watchdog_s else math.inf
         return min(self.approach_speed_m_s, heard_m_s, unheard_m_s)
 
-    def travel_m_s(self, limit_n: float) -> float:
+    def travel_m_s(self, limit_n: float, delay_s: float) -> float:
         """Return how fast the finger may go where something may stand in its way, for an impact below a force."""
-        return min(self.travel_speed_m_s, limit_n / (self.approach_stiffness_n_m * REACTION_S))
+        return min(self.travel_speed_m_s, stopping_m_s(limit_n, self.approach_stiffness_n_m, stop_s(delay_s)))
+
+    def slide_m_s(self, limit_n: float, delay_s: float) -> float:
+        """Return how fast the finger may slide: from the force limit on, a wall presses on until the arm stands."""
+        return stopping_m_s((WALL_SHARE - 1.0) * limit_n, self.approach_stiffness_n_m, delay_s + STEP_S)
 
     def ramp_s(self, speed_m_s: float) -> float:
         """Return how long it takes to gain or lose a speed."""
@@ -610,14 +622,15 @@ class GoHomeStage(Stage):
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
         self._home = home
         self._touch = touch
-        self._base_timeout_s = limits.approach_timeout_s
-        self._speed_m_s = touch.travel_m_s(limits.force_limit_n)
+        self._limits = limits
+        self._speed_m_s = touch.travel_speed_m_s
         self._free_n: Vector | None = None
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Allow the time that the way needs."""
         super().begin(time_ns, arm)
-        self.timeout_s = self._base_timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
+        self._speed_m_s = self._touch.travel_m_s(self._limits.force_limit_n, arm.delay_s)
+        self.timeout_s = self._limits.approach_timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Rise first; then speed up and slow down at half the allowed acceleration."""
@@ -668,10 +681,11 @@ class ApproachStage(Stage):
                 "bring the finger closer or raise 'approach_travel_m'",
                 ExplorationError.NO_SURFACE,
             )
-        speed_m_s = self._touch.approach_m_s(self._force_n, arm.watchdog_s)
+        speed_m_s = self._touch.approach_m_s(self._force_n, arm.watchdog_s, arm.delay_s)
         if arm.watchdog_s:
             # The same way may be gone, however much slower the arm has to be.
-            self.timeout_s = self._limits.approach_timeout_s * self._touch.approach_m_s(self._force_n) / speed_m_s
+            heard_m_s = self._touch.approach_m_s(self._force_n, delay_s=arm.delay_s)
+            self.timeout_s = self._limits.approach_timeout_s * heard_m_s / speed_m_s
             self.goal = (
                 f'the finger to meet the surface at {speed_m_s * 1e3:.2g} mm/s, as the arm goes on for '
                 f'{arm.watchdog_s * 1e3:.0f} ms when it hears nothing'
@@ -1076,7 +1090,7 @@ class Rise(Stage):
         stiffness_n_m = self._watch_growth(arm)
         if risen_m < PROBE_M:
             return ArmCommand(normal_m_s=PROBE_M_S)
-        gentle_m_s = self._impact_n / (stiffness_n_m * REACTION_S) if stiffness_n_m else math.inf
+        gentle_m_s = stopping_m_s(self._impact_n, stiffness_n_m, REACTION_S) if stiffness_n_m else math.inf
         return ArmCommand(normal_m_s=max(PROBE_M_S, min(self._speed_m_s, gentle_m_s)))
 
     def _rests(self, time_ns: int, arm: ArmState) -> bool:
@@ -1281,6 +1295,20 @@ class Motion:
         self._remaining_stages[:0] = [self._rise, CalmDown(zeroed, along.force_n, along.touch, along.limits)]
         return self
 
+    def refuse_too_fast(self, motion: str, arm: ArmState) -> None:
+        """Refuse a slide that would press too hard on a wall, as stiff and with an arm as late as declared."""
+        along = self._slide.along
+        limit_n, stiffness_n_m = along.limits.force_limit_n, along.touch.approach_stiffness_n_m
+        allowed_m_s = along.touch.slide_m_s(limit_n, arm.delay_s)
+        if along.speed_m_s > allowed_m_s:
+            raise MotionRefused(
+                f'{motion}: speed_m_s is {along.speed_m_s:g}; a wall of {stiffness_n_m:g} N/m '
+                f"('approach_stiffness_n_m') could press with more than {WALL_SHARE * limit_n:g} N, {WALL_SHARE:g} "
+                f"times 'force_limit_n', until an arm that is {1e3 * arm.delay_s:.0f} ms late stands; allowed is at "
+                f'most {math.floor(allowed_m_s * 1e4) / 1e4:g} m/s',
+                field='speed_m_s',
+            )
+
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
         """Return what to do at `time_ns` (CLOCK_MONOTONIC), until the phase is DONE or ABORTED.
 
@@ -1424,6 +1452,9 @@ LIMITS: tuple[Limit, ...] = (
         'MOST_FORCE_N, MOST_M', 'number of a sample', 'finite, 10 kN, 100 m', 'arm and Exploration', 'at once', 'lift'
     ),
     Limit('force_limit_n', 'force in any direction', '10 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit(
+        'WALL_SHARE', 'force at a wall, foreseen', '4.5 × force_limit_n', 'Exploration', 'before it moves', 'refused'
+    ),
     Limit('friction_limit', 'force along the surface', '2 × normal + 1 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
     Limit('x_low_m to z_high_m', 'place', '±0.2 m; −0.02 to 0.2 m', 'Exploration', EVERY_STEP, 'lift'),
     Limit('surface_tolerance_m', 'height of the contact', '20 mm', 'Exploration', EVERY_STEP, 'lift'),

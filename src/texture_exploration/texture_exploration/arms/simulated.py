@@ -197,7 +197,9 @@ class SimulatedArm(Arm):
         self._clock = clock
         self._own_thread = own_thread
         self._last_command = (STANDSTILL, clock())  # the command, and when it came
-        self._state = ArmState(clock(), (0.0, 0.0, params.start_height_m), (0.0, 0.0, 0.0), 0.0)
+        self._delay_s = 0.0 if params.force_mode else params.loop_delay_s
+        start: Vector = (0.0, 0.0, params.start_height_m)
+        self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0, delay_s=self._delay_s)
         self._frozen = self._jammed = False
         self._fault = ''
         self._push_n = 0.0
@@ -320,7 +322,16 @@ class SimulatedArm(Arm):
             self._last_command = (STANDSTILL, now_ns)
         self._true_n = self._surface.force_n(x, z) + self._push_n
         along_n = (self._surface.wall_n(x), 0.0)
-        self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault, along_n=along_n)
+        force_n = self._measured_n(dt_s)
+        self._state = replace(
+            self._state,
+            time_ns=now_ns,
+            position=(x, y, z),
+            velocity=velocity,
+            force_n=force_n,
+            along_n=along_n,
+            fault=self._fault,
+        )
         if self._velocity:
             self._delayed.ask(now_ns, self._velocity.choose(command, self._state, min(dt_s, HOLDS_S)))
         self._emulator.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))

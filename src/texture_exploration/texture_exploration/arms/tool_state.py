@@ -284,6 +284,7 @@ class ToolState:
             fault,
             tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
             along_n=self._force_vector_n[:2],
+            delay_s=self._params.loop_delay_s + self._params.force_smoothing_s,
         )
 
     @property

@@ -191,6 +191,7 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
 
 
 RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
+DELAY_S = 0.02  # from a force to the motion that answers it: walls were pressed with 26 to 40 N at 50 mm/s
 ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
 ACKNOWLEDGE_S = (
     1.0  # so long a controller may take to stop, to end force control and to zero; its watchdog waits as long
@@ -621,6 +622,7 @@ class UrArm(SurfaceArm):
             watchdog_s=report.watchdog_s,
             tangential_force_n=tangential_force_n(force, velocity),
             along_n=force[:2],
+            delay_s=DELAY_S,
         )
 
     def command(self, command: ArmCommand) -> None:
