@@ -37,6 +37,16 @@ def test_a_finger_that_stands_still_counts_as_stalled_once_three_quarters_of_the
     )
 
 
+@pytest.mark.parametrize('ahead_s', [0.05, -0.05])
+def test_stamps_that_jump_by_50_ms_in_a_slide_are_no_speed(ahead_s):
+    watch = SlideWatch(SPEED_M_S, 1.0, TouchParams())
+    for number in range(100):
+        now_s = number * STEP_S
+        stamp_s = 1.0 + now_s + ahead_s * (now_s > 0.5)
+        watch.update(ArmState(round(stamp_s * 1e9), (SPEED_M_S * now_s, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0), True)
+    assert watch.flaw() == ''
+
+
 @pytest.mark.parametrize(('share', 'stalls'), [(0.3, False), (0.2, True), (-1.0, True)])
 def test_a_finger_counts_as_stalled_below_its_share_of_the_commanded_speed(share, stalls):
     assert (watched(lambda s: share * SPEED_M_S * s, 1.0) is not None) is stalls

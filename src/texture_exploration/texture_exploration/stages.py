@@ -474,7 +474,7 @@ class SlideWatch:
         if math.isfinite(arm.tangential_force_n):
             self._tangential_states += 1
             self._tangential_sum_n += abs(arm.tangential_force_n)
-        if not constant or arm.time_ns - last_ns > LONGEST_STEP_NS:
+        if not (constant and 0 <= arm.time_ns - last_ns <= LONGEST_STEP_NS):  # below 0: a clock was set back
             self._recent.clear()
             self._chunk = None
         if not self._recent or arm.time_ns > last_ns:
