@@ -31,10 +31,10 @@ from texture_core.types import ExplorationRequest, ExplorationState, Phase
 from texture_exploration.arms.arm import Vector
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
-from texture_exploration.explorer import Exploration
+from texture_exploration.exploration import Exploration
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 # --------------------
 # A trial: what is true, what is declared, and what happens.

@@ -8,10 +8,11 @@ import pytest
 from texture_core.config import shipped
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_exploration.arms.tool_state import RosControllersParams
+from texture_exploration.lift_first import UNKNOWN_STATE
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset, read_preset
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import UNKNOWN_STATE, TouchParams
+from texture_exploration.touch import TouchParams
 
 # A slide is longer than the recording of its paper by so much: an arm that answers late still covers all of that.
 LATE_S = 0.05

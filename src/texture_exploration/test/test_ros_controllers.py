@@ -16,10 +16,11 @@ from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.tool_state import GRAVITY_M_S2, FollowWatch, ForceSample, PoseSample, ToolState
 from texture_exploration.arms.tool_state import RosControllersParams as Params
-from texture_exploration.explorer import Exploration, Explorer
+from texture_exploration.exploration import Exploration
+from texture_exploration.explorer import Explorer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 PERIOD_NS = 4_000_000

@@ -11,7 +11,8 @@ from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest, Phase, TactileSignal
 from texture_exploration.arms.arm import ArmState
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.stages import SlideWatch, StallWatch, TouchParams
+from texture_exploration.touch import TouchParams
+from texture_exploration.watches import SlideWatch, StallWatch
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 SPEED_M_S = 0.02

@@ -9,7 +9,7 @@ import pytest
 from texture_core.errors import MotionRefused
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.stages import REACTION_S, TouchParams
+from texture_exploration.touch import REACTION_S, TouchParams
 
 TOUCH = TouchParams(approach_speed_m_s=0.1, approach_stiffness_n_m=2000.0)
 

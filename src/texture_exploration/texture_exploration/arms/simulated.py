@@ -16,15 +16,7 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
-from texture_exploration.arms.arm import (
-    STANDSTILL,
-    Arm,
-    ArmCommand,
-    ArmState,
-    CommandedVelocity,
-    ForceReading,
-    Vector,
-)
+from texture_exploration.arms.arm import STANDSTILL, Arm, ArmCommand, ArmState, CommandedVelocity, ForceReading, Vector
 from texture_exploration.force_control import ForceLoopParams
 from texture_exploration.safety import CommandLimits
 
@@ -142,9 +134,6 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
     force_mode: bool = param(
         True, 'Lets the arm control forces itself, ideally; false gives a delayed velocity interface.'
     )
-    undeclared_lag_s: float = param(
-        0.0, "Lag of an arm without force mode beyond 'loop_delay_s', not declared.", unit='s', low=0.0, high=0.2
-    )
     force_noise_n: float = param(
         0.001, 'Standard deviation of the force noise of an arm without force mode.', unit='N', low=0.0, high=1.0
     )
@@ -214,9 +203,8 @@ class SimulatedArm(Arm):
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_pipe)
         self._surface = SimulatedSurface(shape, params.stiffness_n_m)
-        # The force control is told `loop_delay_s` alone; the rest it has to find out.
         self._velocity = None if params.force_mode else CommandedVelocity(params, 1 / RATE_HZ)
-        self._delayed = DelayedVelocity(params.loop_delay_s + params.undeclared_lag_s, clock())
+        self._delayed = DelayedVelocity(params.loop_delay_s, clock())
 
     def connect(self) -> None:
         """Start to move in time; clears what was injected."""

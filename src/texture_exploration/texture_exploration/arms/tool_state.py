@@ -25,7 +25,8 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
-from texture_exploration.safety import WITHOUT_GAPS, CommandLimits
+from texture_exploration.guards import WITHOUT_GAPS
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # What can be chosen about an arm that is driven by ROS controllers.
