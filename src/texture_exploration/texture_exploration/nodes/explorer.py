@@ -150,9 +150,9 @@ LOGGED: dict[str, Callable[[Any, str], Any]] = {
     'warning': lambda logger, text: logger.warning(text),
     'error': lambda logger, text: logger.error(text),
 }
-NOT_KNOWN = (
-    'whether the finger presses is not known, as after an explorer that was killed: the service ~/lift lifts it now, '
-    "and the first exploration does so; 'lift_at_start: true' does so at every start"
+PRESSED = (
+    'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
+    "lifts it now, and the first exploration does so; 'lift_at_start: true' does so at every start"
 )
 RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
@@ -243,12 +243,18 @@ class ExplorerNode(PatientLifecycleNode):
         if connected and self._lift_at_start:
             self._tried(self._explorer.lift)
         elif connected:
-            self.get_logger().info(NOT_KNOWN)
+            self._tried(self._name_pressed)
         if not (connected and self._tried(self._explorer.check_start)) and not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
         return super().on_activate(state)
+
+    def _name_pressed(self) -> None:
+        """Log that the finger may press, if the force sensor shows that."""
+        force_n = self._explorer.arm.state().force_n
+        if force_n > self._explorer.touch.contact_force_n:
+            self.get_logger().warning(PRESSED.format(force_n))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lift the finger and let go of the arm."""
