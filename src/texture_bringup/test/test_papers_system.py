@@ -5,8 +5,6 @@
 import os
 import re
 import shlex
-import shutil
-import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -22,11 +20,11 @@ import yaml
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from ament_index_python import get_package_prefix
 from rclpy.parameter import Parameter
 from texture_msgs import msg
 
 from texture_bringup.command import main
+from texture_bringup.commands.explore import REJECTED
 from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
 from texture_core import config as resources
@@ -379,7 +377,6 @@ def test_the_running_classifier_learns_a_new_object_online_slide_by_slide_as_kab
 
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'papers.md'
-EXPLORATION = str(Path(get_package_prefix('texture_exploration')) / 'lib' / 'texture_exploration')
 LIVE = re.findall(r'^ {4}texture launch \w+ sensor:=.*(?:\n {4}.*)+', PAGE.read_text(), re.MULTILINE)
 
 
@@ -398,19 +395,10 @@ def test_the_live_lines_of_the_page_record_two_surfaces_and_train_a_model_as_pri
         operator.wait_for_explorer(DEADLINE_S)
         operator.wait_for_listeners(('features', 'exploration'), 1, launcher.check)
         for order in orders[:-1]:
-            if order[1] == 'param':
-                operator.set_parameters(order[3].removeprefix('/'), {order[4]: order[5]})
-            else:
-                presets = subprocess.run(
-                    [shutil.which(order[3], path=EXPLORATION), *order[4:]],
-                    capture_output=True,
-                    text=True,
-                    check=False,
-                    timeout=300,
-                )
-                assert presets.returncode == 0, presets.stdout + presets.stderr
+            # No label is accepted without a model.
+            assert main(order[1:]) == (REJECTED if order[1] == 'explore' else 0)
     assert main(orders[-1][1:]) == 0
-    surfaces = {word.removeprefix('surface:=') for order in orders for word in order if word.startswith('surface:=')}
+    surfaces = {order[order.index('--surface') + 1] for order in orders if '--surface' in order}
     assert load_model(tmp_path / orders[-1][-1]).labels == tuple(sorted(surfaces))
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import socket
@@ -59,6 +60,15 @@ def _is_free(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def _free_port() -> int:
+    """Return the usual port of the dashboard, or one that is free."""
+    for port in (8085, 0):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(('127.0.0.1', port))
+            return int(probe.getsockname()[1])
+    raise LaunchFailed('no TCP port is free; stop something first')
 
 
 # --------------------
@@ -252,13 +262,14 @@ def demonstrate(
         'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
         'seed': seed + 1,
         'dashboard': str(dashboard).lower(),
+        'dashboard_port': (port := _free_port()),
     }
     with (
         tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
         DemoRig(Path(folder), out / LOG, arguments) as rig,
     ):
         if dashboard:
-            progress.line('dashboard: http://127.0.0.1:8085 while this runs')
+            progress.line(f'dashboard: http://127.0.0.1:{port} while this runs')
         slides = _explore(rig, plan, progress)
     _report(slides, out, progress)
     return all(slide.as_expected for slide in slides)

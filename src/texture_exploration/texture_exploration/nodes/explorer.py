@@ -199,6 +199,10 @@ class ExplorerNode(PatientLifecycleNode):
         self._infos = self.create_publisher(msg.ExplorerInfo, 'explorer_info', quality_of_service('explorer_info'))
         self._info, self._last_error, self._active = msg.ExplorerInfo(), ExplorationError.NONE, False
         self.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
+        self._model = msg.ModelInfo()
+        self.create_subscription(
+            msg.ModelInfo, 'model_info', partial(setattr, self, '_model'), quality_of_service('model_info')
+        )
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
@@ -381,6 +385,8 @@ class ExplorerNode(PatientLifecycleNode):
         result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
+        of_model = (result.texture.model, result.texture.revision) == (self._model.model, self._model.revision)
+        result.labels = self._model.labels if of_model and result.texture.probabilities else []
         self._last_end = outcome.sentence(exploration.exploration_id)
         self._not_lifted = '' if outcome.lifted else self._last_end
         self._last_error = outcome.error

@@ -77,8 +77,8 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
     stems = Counter(re.sub(r'[ _-]?\d+$', '', name) for name in report.slides)
     if numbered := [name for name in report.slides if stems[re.sub(r'[ _-]?\d+$', '', name)] > 1]:
         print(
-            f'surfaces that differ by a number alone: {", ".join(numbered)}; if it belongs to no label, give it a field of '
-            'its own in `files` of the mapping, such as {material}_{run:d}'
+            f'surfaces that differ by a number alone: {", ".join(numbered)}; if it belongs to no label, give it a '
+            'field of its own in `files` of the mapping, such as {material}_{run:d}'
         )
     return report.bags
 
