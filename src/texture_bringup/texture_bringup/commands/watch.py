@@ -96,7 +96,7 @@ def picture(frame: Frame, peak: float) -> Group:
     rows.add_row('signal', bar(level / peak if peak else 0.0, 'cyan'), named if signal['sensor'] else 'no samples yet')
     rows.add_row(Text(state['phase'], style='bold'), bar(state['progress'] or 0.0, 'white'), finger_text(state))
     rows.add_row()
-    style = 'green' if texture['known'] else 'yellow'
+    style = 'green' if texture['accepted'] else 'yellow'
     for label, probability in list(zip(texture['labels'], texture['probabilities'], strict=True))[:LABELS]:
         rows.add_row(label, bar(probability, style), f'{probability:.2f}')
     faults = [light for light in frame['lights'] if light['colour'] not in ('green', 'grey')]
@@ -158,7 +158,7 @@ def texture_text(texture: Mapping[str, Any]) -> str:
     """Return the estimate of a frame in words: the label and whether it is accepted, or why there is none."""
     if not texture['label']:
         return str(texture['message'] or texture['missing'] or 'none yet')
-    verdict = 'accepted' if texture['known'] else f'rejected: {texture["rejection"]}'
+    verdict = 'accepted' if texture['accepted'] else f'rejected: {texture["rejection"]}'
     sure = '' if texture['confidence'] is None else f', confidence {texture["confidence"]:.2f}'
     decided = ', decided' if texture['decided'] else ''
     return f'{texture["label"]}{sure} after {texture["evidence_s"]:.1f} s, {verdict}{decided}'

@@ -49,7 +49,7 @@ from texture_evaluation.collection import (
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
-RECIPE = 'fast'  # whose features tell the places apart
+RECIPE = 'default'  # whose features tell the places apart
 RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
