@@ -32,7 +32,6 @@ from texture_papers.protocol import (
     share,
     versions,
 )
-from texture_papers.search import QUICK
 from texture_simulation.scene import load_scene
 
 Pair = tuple[str, str]
@@ -163,8 +162,7 @@ SEARCHED = '; the first alone, whose slides for training the search was given'
 def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
     """Rebuild a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
     scene = load_scene(protocol.scene)
-    size = experiment.search or (QUICK if experiment.quick else None)
-    tuned = searched(protocol, scene, replace(experiment, search=size)) if experiment.tune else NONE
+    tuned = searched(protocol, experiment) if experiment.tune else NONE
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
     name = f'{protocol.name}{TUNED if tuned else ""}'
     methods = {task.name: [m for m in task.methods if (task.name, m.name) in found] for task in protocol.tasks}
@@ -200,7 +198,7 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
 def digests(protocol: PaperProtocol, *, tuned: bool = False) -> dict[str, str]:
     """Return the digest of each row of figures, by task and method, as it is now, and the versions of the libraries."""
     rows = {
-        f'{task.name}, {m.name}': digest_of_row(protocol, task, m)
+        f'{task.name}, {m.name}': digest_of_row(protocol, task, m, tuned=tuned)
         for task in protocol.tasks
         for m in task.methods
         if m.search or not tuned
