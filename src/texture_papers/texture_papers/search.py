@@ -232,7 +232,7 @@ def search(
 ) -> Found:
     """Return the best individual by the mean of learning and test score over the halves.
 
-    Individuals of another search may be the first. TimeoutError is raised where the clock, `time.time`, is beyond a time.
+    Individuals of another search may be the first. TimeoutError is raised after a time of the clock `time.time`.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
     """
