@@ -127,9 +127,6 @@ PAPERS = {
         (
             'jamali-naive-bayes-3',
             'jamali-amplitude',
-            'jamali-stft',
-            'jamali-wavelets',
-            'jamali-symbols',
         ),
         slides=5,  # the variances of naive Bayes
         live=3,

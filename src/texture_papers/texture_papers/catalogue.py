@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -118,6 +119,8 @@ def run_searches(
 
 
 def _searched(wanted: PairSearch, start: Sequence[Individual], until_s: float) -> tuple[PairSearch, Found | None]:
+    if time.time() > until_s:
+        return wanted, None
     try:
         return wanted, search_pair(PROTOCOLS[wanted.protocol], wanted, start, until_s)
     except TimeoutError:
@@ -138,4 +141,6 @@ def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[Exper
     result = over_seeds(run_of, name, experiment, count, DIGESTS[f'{name}{"-tuned" if experiment.tune else ""}']())
     if name in PROTOCOLS and not experiment.tune:
         result = replace(result, charts=charts_of(PROTOCOLS[name], result.numbers, name, experiment.out))
+    elif name == 'roughness' and not experiment.tune:
+        result = replace(result, charts=(rispal_experiment.errors_chart(result.numbers, experiment.out),))
     return result, result.write(experiment.out)

@@ -33,13 +33,14 @@ from texture_papers.protocol import (
     Experiment,
     ExperimentResult,
     Finding,
+    Interval,
     hash_of,
     mean,
     mean_over_seeds,
     strength,
     versions,
 )
-from texture_papers.report import finding_as_json
+from texture_papers.report import ERRORS, drawn, figures_chart, finding_as_json
 from texture_papers.search import QUICK, SearchParams, Tuned, grading, search, varied
 from texture_papers.slides import ArrayStream, Mask, SlideArrays
 from texture_simulation.offline import simulate_slides
@@ -180,6 +181,19 @@ class SimulatedTextures:
         """Return what a model says of the textures that it was trained on ('seen'), and of the others ('unseen')."""
         parts = {'seen': self.grades.used_for(TRAIN), 'unseen': self.grades.used_for(TEST)}
         return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
+
+
+def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
+    """Draw the error of each regressor, the means over seeds, beside the paper's."""
+    panels = {
+        f'{part} textures': {
+            name: (paper[part], Interval(*numbers['regressors'][name][part]['over_seeds']))
+            for name, paper in numbers['paper'].items()
+        }
+        for part in ('seen', 'unseen')
+    }
+    title = 'roughness: errors of grades, paper and simulation'
+    return figures_chart(panels, title, out / 'experiment_roughness.png', drawn(numbers), ERRORS)
 
 
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
