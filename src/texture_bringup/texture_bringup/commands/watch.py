@@ -125,7 +125,7 @@ def _lines(feed: Feed) -> Callable[[], None]:
     def show() -> None:
         nonlocal last
         state, texture, grade = feed.newest()
-        key = state.exploration_id, state.phase, texture.label, texture.rejection, texture.final, grade.valid
+        key = state.exploration_id, state.phase, texture.label, texture.rejection, grade.valid
         if key != last:
             last = key
             print(line(feed.frame(time.monotonic())), flush=True)
