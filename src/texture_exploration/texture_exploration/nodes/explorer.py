@@ -49,20 +49,21 @@ from texture_core.ros import (
 from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate, quaternion
 from texture_exploration.arms.arm import ENDING
 from texture_exploration.arms.catalogue import ARMS
-from texture_exploration.explorer import (
+from texture_exploration.exploration import (
     STILL_MOVING,
-    EarlyStoppingParams,
     Exploration,
     ExplorationEstimates,
     ExplorationOutcome,
-    Explorer,
+    may_stop,
     new_id,
     no_signal_watch,
     refusal,
 )
+from texture_exploration.explorer import Explorer
+from texture_exploration.guards import Listening, SignalWatch, SignalWatchParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
-from texture_exploration.safety import Listening, SafetyLimits, SignalWatch, SignalWatchParams, SurfacePatch
-from texture_exploration.stages import TouchParams
+from texture_exploration.safety import SafetyLimits, SurfacePatch
+from texture_exploration.touch import TouchParams
 
 # --------------------
 # Frames of surface and fingertip on tf, where tf2_msgs is installed.
@@ -174,6 +175,9 @@ class ExplorerParams:
         'Lifts the finger until nothing touches it whenever the node takes control of the arm, as an explorer that was '
         'killed leaves it pressed.',
     )
+    estimate_timeout_s: float = param(
+        1.0, 'How long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
+    )
 
 
 class ExplorerNode(PatientLifecycleNode):
@@ -184,8 +188,8 @@ class ExplorerNode(PatientLifecycleNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
-        self._early_stopping = declare(self, EarlyStoppingParams, changeable=True)
         params = declare(self, ExplorerParams)
+        self._estimate_timeout_s = params.estimate_timeout_s
         self._explorer = self._make_explorer(params.arm)
         self._frames = FrameBroadcaster(self, declare(self, FrameParams))
         self._broadcast_surface()
@@ -341,7 +345,6 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _follow_parameters(self) -> None:
         """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
-        on_change(self, EarlyStoppingParams, partial(setattr, self, '_early_stopping'))
         on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
         on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
         on_change(self, SurfacePatch, partial(setattr, self._explorer, 'patch'))
@@ -417,7 +420,7 @@ class ExplorerNode(PatientLifecycleNode):
     def _wait_for_final_estimates(self, exploration: Exploration, estimates: ExplorationEstimates) -> None:
         if exploration.outcome.slid and not self._closing:
             kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
-            estimates.wait_until_final(kinds, self._early_stopping.estimate_timeout_s)
+            estimates.wait_until_final(kinds, self._estimate_timeout_s)
 
     def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
         """Offer a service without numbers; `work` returns what was done, or raises why not."""
@@ -464,7 +467,7 @@ class ExplorerNode(PatientLifecycleNode):
         current = self._explorer.current
         wanted = current is not None and current.request.early_stopping
         ours = current is not None and current.exploration_id == estimate.exploration_id
-        if wanted and ours and isinstance(estimate, TextureEstimate) and self._early_stopping.may_stop(estimate):
+        if wanted and ours and isinstance(estimate, TextureEstimate) and may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
                 f'after {estimate.windows} windows'
