@@ -30,7 +30,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_bringup.feed import Feed
-from texture_core.cli import QUIET_S, task
+from texture_core.cli import task
 from texture_core.config import unknown_name
 from texture_core.errors import (
     ExplorationError,
@@ -463,7 +463,7 @@ class Operator:
         deadline_s: float,
         complaint: str,
         error: type[TextureError] = LaunchFailed,
-        quiet_s: float = QUIET_S,
+        quiet_s: float | None = None,
     ) -> None:
         deadline = time.monotonic() + deadline_s
         with task(f'waiting; so far {complaint}', quiet_s=quiet_s):
