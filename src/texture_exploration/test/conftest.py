@@ -22,7 +22,6 @@ from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwist
 # The pure tests run where there is no ROS.
 ROS_TESTS = [
     'test_explorer_node.py',
-    'test_explore_preset.py',
     'test_interrupted_controller.py',
     'test_ros_controllers_hand_over.py',
     'test_ros_controllers_process.py',

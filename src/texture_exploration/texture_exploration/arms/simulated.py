@@ -140,6 +140,7 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
     stiffness_n_m: float = param(
         2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
     )
+    edge_m: float = param(0.0, 'Place along x where the surface ends; 0: nowhere.', unit='m', low=0.0, high=1.0)
     admittance_m_s_n = 0.01  # normal speed per force error of the arm's force mode
     start_height_m: float = param(
         0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
@@ -198,6 +199,7 @@ class SimulatedArm(Arm):
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_pipe)
+        shape = replace(shape, edge_m=params.edge_m) if params.edge_m else shape
         self._surface = SimulatedSurface(shape, params.stiffness_n_m)
         self._velocity = None if params.force_mode else CommandedVelocity(params, 1 / RATE_HZ)
         self._delayed = DelayedVelocity(params.loop_delay_s, clock())

@@ -151,9 +151,9 @@ LOGGED: dict[str, Callable[[Any, str], Any]] = {
     'warning': lambda logger, text: logger.warning(text),
     'error': lambda logger, text: logger.error(text),
 }
-NOT_KNOWN = (
-    'whether the finger presses is not known, as after an explorer that was killed: the service ~/lift lifts it now, '
-    "and the first exploration does so; 'lift_at_start: true' does so at every start"
+PRESSED = (
+    'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
+    "lifts it now, and the first exploration does so; 'lift_at_start: true' does so at every start"
 )
 RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
@@ -203,6 +203,10 @@ class ExplorerNode(PatientLifecycleNode):
         self._infos = self.create_publisher(msg.ExplorerInfo, 'explorer_info', quality_of_service('explorer_info'))
         self._info, self._last_error, self._active = msg.ExplorerInfo(), ExplorationError.NONE, False
         self.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
+        self._model = msg.ModelInfo()
+        self.create_subscription(
+            msg.ModelInfo, 'model_info', partial(setattr, self, '_model'), quality_of_service('model_info')
+        )
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
@@ -247,12 +251,18 @@ class ExplorerNode(PatientLifecycleNode):
         if connected and self._lift_at_start:
             self._tried(self._explorer.lift)
         elif connected:
-            self.get_logger().info(NOT_KNOWN)
+            self._tried(self._name_pressed)
         if not (connected and self._tried(self._explorer.check_start)) and not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
         return super().on_activate(state)
+
+    def _name_pressed(self) -> None:
+        """Log that the finger may press, if the force sensor shows that."""
+        force_n = self._explorer.arm.state().force_n
+        if force_n > self._explorer.touch.contact_force_n:
+            self.get_logger().warning(PRESSED.format(force_n))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lift the finger and let go of the arm."""
@@ -378,6 +388,8 @@ class ExplorerNode(PatientLifecycleNode):
         result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
+        of_model = (result.texture.model, result.texture.revision) == (self._model.model, self._model.revision)
+        result.labels = self._model.labels if of_model and result.texture.probabilities else []
         self._last_end = outcome.sentence(exploration.exploration_id)
         self._not_lifted = '' if outcome.lifted else self._last_end
         self._last_error = outcome.error
