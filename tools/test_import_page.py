@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from texture_bringup.command import main
-from texture_recordings.tables import mapping_from
+from texture_recordings.mapping import mapping_from
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / 'docs' / 'recordings.md').read_text()

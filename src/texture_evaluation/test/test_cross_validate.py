@@ -36,7 +36,8 @@ from texture_evaluation.evaluate import evaluate_dataset, sentence, table
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.tables import import_tables, load_mapping
+from texture_recordings.mapping import load_mapping
+from texture_recordings.tables import import_tables
 
 
 @pytest.fixture

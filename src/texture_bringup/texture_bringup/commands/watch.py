@@ -64,6 +64,8 @@ def _play(bag: str, rate: float, namespace: str, feed: Feed, show: Callable[[], 
         last_ns = log_ns
         feed.topics[topic][1](value)
         show()
+    time.sleep(FRAME_PERIOD_S)
+    show()  # the end, which came too soon after the frame before
 
 
 # --------------------
@@ -103,7 +105,7 @@ def picture(frame: Frame, peak: float) -> Group:
     return Group(
         rows,
         Text(f'texture    {texture_text(texture)}', style=f'bold {style}'),
-        Text(f'roughness  {roughness_text(roughness)}'),
+        *([Text(f'roughness  {grade}')] if (grade := roughness_text(roughness)) else []),
         *(Text(f'{light["name"]}: {light["message"]}', style=light['colour']) for light in faults),
     )
 
@@ -125,7 +127,7 @@ def _lines(feed: Feed) -> Callable[[], None]:
     def show() -> None:
         nonlocal last
         state, texture, grade = feed.newest()
-        key = state.exploration_id, state.phase, texture.label, texture.rejection, texture.final, grade.valid
+        key = state.exploration_id, state.phase, texture.label, texture.rejection, grade.valid
         if key != last:
             last = key
             print(line(feed.frame(time.monotonic())), flush=True)
@@ -167,5 +169,5 @@ def texture_text(texture: Mapping[str, Any]) -> str:
 def roughness_text(roughness: Mapping[str, Any]) -> str:
     """Return the grade of a frame in words."""
     if not roughness['valid']:
-        return str(roughness['message'] or '–')
+        return str(roughness['message'])
     return f'{roughness["grade"]:.1f} on the scale from 1 (smooth) to 5 (rough)'
