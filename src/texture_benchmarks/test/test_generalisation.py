@@ -115,6 +115,7 @@ def test_a_reduced_run_tests_recipe_and_peer_near_and_far(tmp_path: Path) -> Non
     for row in ('0', '1'):
         assert set(result.numbers[DISTANCE][row]) == {'default', SVC}
     assert (tmp_path / 'generalisation.png').exists()
+    assert not (tmp_path / generalisation.FINISHED).exists()  # all is in the JSON
     near, far = (result.numbers[DISTANCE][row]['default'] for row in ('0', '1'))
     assert near['accuracy'] > 0.8
     assert near['accepted_correct'] + near['accepted_wrong'] + sum(near['rejections'].values()) / near['slides'] == (

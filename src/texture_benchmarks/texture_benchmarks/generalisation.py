@@ -138,6 +138,8 @@ def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkR
     path = options.out / FINISHED
     options.out.mkdir(parents=True, exist_ok=True)
     found = _finished(path)
+    if found:
+        print(f"{len(found)} pieces are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
     left = [piece for piece in pieces if ', '.join(piece) not in found]
     left.sort(key=lambda piece: (piece[1] == peers.CNN, piece[1] not in SLOW))
     work = partial(_piece, slides, options.seed)
@@ -148,6 +150,8 @@ def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkR
             file.flush()
     missing = [piece for piece in map(', '.join, pieces) if piece not in found]
     missing += [f'{name} (no recordings)' for name, one in sets.items() if one.data not in slides]
+    if not missing:
+        path.unlink()
     return result_of(found, missing, options)
 
 

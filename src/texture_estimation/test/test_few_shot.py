@@ -64,7 +64,7 @@ def test_a_surface_without_a_slide_of_today_moves_with_the_others(model):
     assert right(adapted(model, TRAINING, some), cork) > 0.9
 
 
-def test_an_adapted_model_says_of_no_surface_that_it_is_known_and_is_saved_and_loaded(model, tmp_path):
+def test_an_adapted_model_accepts_no_surface_and_is_saved_and_loaded(model, tmp_path):
     today = adapted(model, TRAINING, slides(TODAY, 1, 2))
     assert (today.name, today.acceptance.distance) == (f'{model.name}-today', None)
     assert 'too little training: 0 slides could be held out' in today.acceptance.reason

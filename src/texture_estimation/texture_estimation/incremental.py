@@ -182,7 +182,7 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     A class of a session is Gaussian about its mean over sessions, and slides are Gaussian about the class of their
     session (two covariances); the slides of today say where the classes are today, and each counts as much as it is
     certain. A surface without a slide of today moves by the mean of those that have some. The answer is a label alone:
-    nothing shows which slides of today would be unknown, so no slide is known.
+    nothing shows which slides of today would be unknown, so none is accepted.
 
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis"; Prince & Elder 2007.
     """

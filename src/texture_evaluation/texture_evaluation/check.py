@@ -144,7 +144,4 @@ def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequenc
     adapted(trained, examples, shots.features(features)).save(out)
     missing = sorted(set(trained.trained_labels) - set(shots.labels.tolist()))
     without = f'; without a slide of today: {", ".join(missing)}' if missing else ''
-    return out, (
-        f"'{out}' is adapted to {len(shots)} slides of today{without}. It names surfaces and says of none that it is "
-        'known'
-    )
+    return out, f"'{out}' is adapted to {len(shots)} slides of today{without}. It names surfaces and accepts none"
