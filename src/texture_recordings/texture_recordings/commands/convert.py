@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections import Counter
 from pathlib import Path
 
 from texture_core.cli import Command, add_parameters, add_slides, parameters_from, task
@@ -13,9 +15,11 @@ from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.export import export_slides
+from texture_recordings.mapping import load_mapping
 from texture_recordings.public_sets import IMPORTS
+from texture_recordings.readers import MAPPED
 from texture_recordings.segment import segment_bags
-from texture_recordings.tables import MAPPED, import_tables, load_mapping
+from texture_recordings.tables import import_tables
 
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 
@@ -36,6 +40,8 @@ def _configure_import(parser: argparse.ArgumentParser) -> None:
 def _import(options: argparse.Namespace) -> int:
     """Import, and name the bags."""
     mapped = options.data_set in MAPPED
+    if not mapped:
+        find({**IMPORTS, **MAPPED}, options.data_set, 'data set or kind of source')
     if options.dry_run and mapped and len(options.places) == 2:
         options.places.append('')
     if len(options.places) != 2 + mapped:
@@ -70,6 +76,12 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
     report = import_tables(load_mapping(mapping), source, out, MAPPED[options.data_set])
     for line in report.lines():
         print(line)
+    stems = Counter(re.sub(r'[ _-]?\d+$', '', name) for name in report.slides)
+    if numbered := [name for name in report.slides if stems[re.sub(r'[ _-]?\d+$', '', name)] > 1]:
+        print(
+            f'surfaces that differ by a number alone: {", ".join(numbered)}; if it belongs to no label, give it a '
+            'field of its own in `files` of the mapping, such as {material}_{run:d}'
+        )
     return report.bags
 
 
