@@ -9,7 +9,7 @@ import pytest
 
 from texture_core.types import NANOSECONDS, ExplorationRequest, Phase, TactileSignal
 from texture_exploration.arms.simulated import SimulatedArmParams, SurfaceShape
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)
@@ -163,8 +163,8 @@ def test_a_force_that_stays_just_above_the_limit_of_contact_is_no_success(make_t
     assert outcome.message.startswith(('the mean force of the slide was 0.', 'the contact with the surface was lost'))
 
 
-def test_a_force_at_the_edge_of_its_tolerance_is_a_success(make_table):
-    table = make_table(SimulatedArmParams(admittance_m_s_n=7e-4, stiffness_n_m=2000.0))
+def test_a_force_at_the_edge_of_its_tolerance_is_a_success(table, monkeypatch):
+    monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 7e-4)
     table.when[Phase.SLIDE] = lambda: table.arm.push(-0.19)
     assert table.explore(REQUEST).success
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import signal
 import subprocess
@@ -48,7 +49,7 @@ from texture_evaluation.collection import (
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
-RECIPE = 'fast'  # whose features tell the places apart
+RECIPE = 'default'  # whose features tell the places apart
 RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
@@ -56,6 +57,7 @@ PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 LEAST_SPEED_M_S = 0.002  # of every explorer
 LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
 Tell = Callable[[str, int], None]
+BAGS_LOG = logging.getLogger('texture_recordings.bags')
 
 
 def collect_surface(
@@ -101,7 +103,11 @@ def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
     deadline_s = time.monotonic() + FLUSHED_S
     while True:
         time.sleep(1.0)
-        dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
+        try:
+            dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        finally:
+            BAGS_LOG.disabled = False
         written = sum(one.bag == bag for one in dataset)
         if written >= slides or time.monotonic() > deadline_s:
             return evaluate_places(dataset.features(feature_set), surface)

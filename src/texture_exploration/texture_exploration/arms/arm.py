@@ -44,7 +44,8 @@ class ArmState:
     of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
     the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
     cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
-    more; 0 if it does not say. `unsafe` says why it must not go on although it obeys: it is to be lifted; '' if it may.
+    more; 0 if it does not say. `delay_s` passes from a force to the motion that answers it. `unsafe` says why it must
+    not go on although it obeys: it is to be lifted; '' if it may.
     """
 
     time_ns: int
@@ -56,6 +57,7 @@ class ArmState:
     tangential_force_n: float = math.nan
     along_n: tuple[float, float] = (math.nan, math.nan)
     unsafe: str = ''
+    delay_s: float = 0.0
 
     @property
     def force_vector_n(self) -> Vector:
@@ -184,22 +186,27 @@ class Arm:
 PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
 
 
+def _place(value: float, axis: str) -> Any:
+    """Declare a coordinate of the surface."""
+    return param(value, f'{axis} of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
+
+
+def _rotation(axis: str) -> Any:
+    """Declare a component of the rotation of the surface."""
+    text = f'{axis} of the rotation vector of the surface frame; its z axis points away from the surface.'
+    return param(0.0, text, unit='rad', low=-7.0, high=7.0)
+
+
 @dataclass(frozen=True)
 class SurfacePoseParams:
     """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
 
-    surface_x_m: float = param(0.4, 'X of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
-    surface_y_m: float = param(0.0, 'Y of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
-    surface_z_m: float = param(0.1, 'Z of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
-    surface_rx_rad: float = param(
-        0.0,
-        'X of the rotation vector of the surface frame; its z axis points away from the surface.',
-        unit='rad',
-        low=-7.0,
-        high=7.0,
-    )
-    surface_ry_rad: float = param(0.0, 'Y of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
-    surface_rz_rad: float = param(0.0, 'Z of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
+    surface_x_m: float = _place(0.4, 'X')
+    surface_y_m: float = _place(0.0, 'Y')
+    surface_z_m: float = _place(0.1, 'Z')
+    surface_rx_rad: float = _rotation('X')
+    surface_ry_rad: float = _rotation('Y')
+    surface_rz_rad: float = _rotation('Z')
 
     def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
         """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""
