@@ -118,7 +118,7 @@ def make_sampler(tmp_path: Path) -> Iterator[Make]:
 
 def test_the_channels_keep_their_order(make_sampler: Make) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
-        device.sample(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
+        device.measure(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
 
     last = make_sampler(feed=feed).signal_s(0.5)[-1]
     assert last.samples[0, 0] > 0
@@ -139,7 +139,7 @@ def swing(device: Any, first: int, ticks: int) -> None:
     """Feed a film that swings at 50 Hz, and a force that rises."""
     numbers = np.arange(first, first + ticks)
     film = 1000 * np.sin(2 * np.pi * 50 / 4096 * numbers)
-    device.sample(film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16))
+    device.measure((film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16)))
 
 
 SWING: dict[str, Feed] = {'feed': swing}
@@ -189,20 +189,20 @@ def host(tmp_path: Path, device: EmulatedTsf85) -> Iterator[Host]:
 
 
 def test_it_streams_from_start_to_stop_only(device: EmulatedTsf85, host: Host) -> None:
-    device.advance(TEN_MS, NO_IMAGE)
+    device.measure((TEN_MS, NO_IMAGE))
     assert host.read() == b''
     os.write(host.end, START)
-    device.advance(TEN_MS, NO_IMAGE)
+    device.measure((TEN_MS, NO_IMAGE))
     assert host.read().count(b'\x9a\x00\x58') == 10
     os.write(host.end, STOP)
-    device.advance(TEN_MS, NO_IMAGE)
+    device.measure((TEN_MS, NO_IMAGE))
     assert host.read() == b''
 
 
 def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, host: Host) -> None:
     os.write(host.end, START)
     for _ in range(200):
-        device.advance(TEN_MS, NO_IMAGE)
+        device.measure((TEN_MS, NO_IMAGE))
     assert device.dropped_bytes > 50_000
 
 
