@@ -31,7 +31,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, TextureError
 from texture_core.types import Array, FingerSender, FingerState, loopback_address, rotation_matrix
 from texture_simulation.devices.rails import FingerPipeParams
-from texture_simulation.devices.twist_controller import TouchedSurfaceParams, touch_force_n
+from texture_simulation.devices.twist_controller import TouchedSurfaceParams, approach, touch_force_n
 
 # --------------------
 # Facts about UR controllers and about the control script of ur-rtde.
@@ -165,9 +165,7 @@ class SpeedMove:
 
     def velocity(self, velocity: Array, step_s: float) -> Array:
         """Return the velocity of the next step, (6,)."""
-        change, most = self._wanted - velocity, self._acceleration * step_s
-        size = math.sqrt(change @ change)
-        led = self._wanted if size <= most else velocity + most / size * change
+        led = approach(velocity, self._wanted, self._acceleration * step_s)
         self.done = not led.any() and not self._wanted.any()
         return led
 
