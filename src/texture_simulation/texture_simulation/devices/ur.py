@@ -151,7 +151,7 @@ FRICTION = 0.5  # of the surface, until `emulate friction` sets another
 ADMITTANCE_M_S_N = 0.01
 LAG_S = 0.01
 HALT = 20.0  # deceleration of a protective stop, m/s²
-# The sensor drifts apart on all axes when it is not zeroed.
+# The sensor has an offset on all axes until it is zeroed.
 OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
 
 
@@ -262,7 +262,7 @@ STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
 ENDED = object()
 MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
-# So the control script of ur-rtde says it; the client puts the number behind a comment.
+# As it stands in the control script of ur-rtde; the client puts the number behind a comment.
 FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
 Steps = Iterator[None]
 
@@ -382,7 +382,7 @@ class EmulatedController:
     # client has written 0 in between. A command that is overwritten within a cycle is lost, as on the real controller.
 
     def _control_script(self) -> Steps:
-        """Obey until told to end; one item per cycle."""
+        """Obey until the command to end; one item per cycle."""
         whole_in, real_in, whole_out, real_out = self.registers
         here = slice(self.first_register, None)
         registers = Registers(whole_in[here], real_in[here], whole_out[here], real_out[here])
@@ -733,7 +733,7 @@ class Server:
             self._listen(ip, DASHBOARD_PORT, partial(DashboardSession, controller, self._go_silent))
 
     def run(self, stopped: Callable[[], bool]) -> None:
-        """Serve until told to stop."""
+        """Serve until `stopped`."""
         step_ns = round(self._controller.step_s * 1e9)
         due_ns = time.monotonic_ns()
         while not stopped():
@@ -748,7 +748,7 @@ class Server:
             self._controller.tick()
             for connection, session in [] if silent else list(self._sessions.items()):
                 self._send(connection, session.package())
-            self._tell_emulator()
+            self._send_state()
 
     def _listen(self, ip: str, port: int, make_session: Callable[[], Session]) -> None:
         try:
@@ -801,7 +801,7 @@ class Server:
         self._sessions.pop(connection).close()
         connection.close()
 
-    def _tell_emulator(self) -> None:
+    def _send_state(self) -> None:
         robot = self._controller.robot
         x, y, z = (robot.pose[:3] - robot.origin).tolist()
         vx, vy, vz = robot.velocity[:3].tolist()
