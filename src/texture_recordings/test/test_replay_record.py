@@ -134,7 +134,11 @@ def test_streams_of_other_names_transforms_logs_and_parameters_are_recorded_and_
     [
         ('replay', {}, "parameter 'bag' is ''"),
         ('replay', {'bag': 'nowhere'}, "there is no bag 'nowhere'"),
-        ('replay', {'bag': 'source', 'deadline_s': 0.2}, 'did not get 1 subscription(s); start what shall listen'),
+        (
+            'replay',
+            {'bag': 'source', 'deadline_s': 0.2},
+            "nobody listens to 'signal' (waited 0.2 s)",
+        ),
         ('replay', {'bag': 'source', 'slides': '7-9'}, 'there are 1 to 2'),
         ('record', {}, "parameter 'out' is ''"),
         ('record', {'out': 'source'}, 'exists already'),
@@ -149,3 +153,4 @@ def test_a_mistake_ends_the_node_with_code_2_and_a_sentence(
         assert process.wait(60.0) == 2, process.output
     assert sentence in process.output
     assert 'Traceback' not in process.output
+    assert 'FATAL' not in process.output
