@@ -12,10 +12,9 @@ import rclpy
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 from texture_msgs.action import Explore
-from texture_msgs.msg import ExplorationRequest, ModelInfo
+from texture_msgs.msg import ExplorationRequest
 from texture_msgs.msg import ExplorationResult as Result
 from texture_msgs.msg import TextureEstimate as Estimate
 
@@ -50,13 +49,7 @@ class TextureClient(Node):
         self._spinner.add_node(self)
         self._explore = ActionClient(self, Explore, 'explore')
         self._stop = self.create_client(Trigger, 'explorer/stop')
-        self._labels: dict[tuple[str, int], list[str]] = {}
         self.feedback: Any = None
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.create_subscription(ModelInfo, 'model_info', self._on_model, latched)
-
-    def _on_model(self, info: ModelInfo) -> None:
-        self._labels[info.model, info.revision] = info.labels
 
     def _on_feedback(self, message: Any) -> None:
         self.feedback = message.feedback
@@ -89,10 +82,10 @@ class TextureClient(Node):
         """Return the result of the exploration."""
         return self._ending.result().result.result
 
-    def probabilities(self, estimate: Estimate) -> dict[str, float]:
-        """Return the probability of each texture by its name; empty without a model or evidence."""
-        labels = self._labels.get((estimate.model, estimate.revision), [])
-        return dict(zip(labels, estimate.probabilities, strict=False))
+
+def probabilities(result: Result) -> dict[str, float]:
+    """Return the probability of each texture by its name; empty without a model or evidence."""
+    return dict(zip(result.labels, result.texture.probabilities, strict=True))
 
 
 def next_step(result: Result) -> Next:
@@ -112,7 +105,7 @@ def main() -> None:
     while not client.is_complete():
         pass
     result = client.result()
-    print(next_step(result).name, result.texture.label, client.probabilities(result.texture))
+    print(next_step(result).name, result.texture.label, probabilities(result))
 
 
 if __name__ == '__main__':

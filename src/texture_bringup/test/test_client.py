@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
 from builtin_interfaces.msg import Duration
-from explore_client import Next, TextureClient, next_step
+from explore_client import Next, TextureClient, next_step, probabilities
 from rclpy.parameter import Parameter
 from texture_msgs import msg
 from texture_msgs.msg import ExplorationResult, ExplorationState
@@ -195,6 +195,6 @@ def test_the_client_tells_every_rejection_by_its_code(graph, client, model, tmp_
             assert next_step(result) == step, (name, result.texture)
             assert result.texture.decided <= (step == Next.USE_LABEL)
             if step == Next.USE_LABEL:
-                probabilities = client.probabilities(result.texture)
-                assert set(probabilities) == {'cork', 'felt'}
-                assert result.texture.label == max(probabilities, key=probabilities.get) == 'felt'
+                named = probabilities(result)
+                assert set(named) == {'cork', 'felt'}
+                assert result.texture.label == max(named, key=named.get) == 'felt'
