@@ -75,7 +75,7 @@ def test_every_way_to_choose_is_evaluated_after_every_slide(tmp_path: Path) -> N
 
 
 def test_trials_are_recognised_once_a_motion_reports_the_textures_apart() -> None:
-    scene, features, motions = load_scene('oriented'), load_recipe('fast').feature_set, MOTIONS[:1]
+    scene, features, motions = load_scene('oriented'), load_recipe('default').feature_set, MOTIONS[:1]
     values = np.zeros((1, len(scene.surfaces), 4, 2))
     values[..., 0] = 100.0 * np.arange(len(scene.surfaces))[:, None]
     values += np.random.default_rng(0).standard_normal(values.shape)

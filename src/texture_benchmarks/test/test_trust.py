@@ -178,7 +178,7 @@ def test_outcomes_are_counted_at_the_first_decided_estimate_and_at_the_end() -> 
 @pytest.mark.benchmark
 def test_the_quick_form_on_simulated_slides_gives_figures_of_all_compared(tmp_path: Path) -> None:
     result = run(BenchmarkOptions(out=tmp_path, quick=True))
-    outcomes = result.numbers['fast']['outcomes']
+    outcomes = result.numbers['default']['outcomes']
     assert 'simulated' in result.data
     assert len(outcomes) == 1 + 8 + 3 + 2
     assert len(result.numbers['SVC on log bands']['outcomes']) == 1 + 8 + 3
@@ -189,7 +189,7 @@ def test_the_quick_form_on_simulated_slides_gives_figures_of_all_compared(tmp_pa
         assert outcome['early_right'] + outcome['early_wrong'] <= outcome['slides']
         low, high = outcome['interval']
         assert low <= outcome['label_right'] / outcome['slides'] <= high
-    outside = result.numbers['rejected_as_outside_training']['fast']
+    outside = result.numbers['rejected_as_outside_training']['default']
     assert outside == {'undisturbed, simulated': 0.0, 'circle, simulated': 1.0}
 
 

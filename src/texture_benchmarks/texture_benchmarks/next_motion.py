@@ -137,7 +137,7 @@ def _events(scene: Scene, motion: SlideMotion, samples: Array) -> Iterator[CutWi
         yield CutWindow(0, str(number), length, length, {'signal': window}, speed, force, '')
 
 
-SCENE, RECIPE = 'oriented', 'fast'
+SCENE, RECIPE = 'oriented', 'default'
 SLIDE_S = 0.5
 FORCES_N, SPEEDS_M_S = (2.0, 1.0), (0.1, 0.05)
 DIRECTIONS_RAD = tuple(k * math.pi / 4 for k in range(4))

@@ -87,7 +87,7 @@ def train_grades_from_bags(
 def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
     windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-    examples = dataset.features(windows, recipe.augmentation, recipe.training.touch_s)
+    examples = dataset.features(windows, recipe.augmentation)
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
     if not distances_m:
         return examples
