@@ -26,7 +26,8 @@ from texture_features.correction import (
     file_beside,
     write_reference,
 )
-from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
 UNMEASURED = 'noise and drift were not measured, for too little was recorded before the touch'
@@ -144,4 +145,4 @@ def adapt_to_today(model: str | Path, bags: Sequence[str | Path], today: Sequenc
     adapted(trained, examples, shots.features(features)).save(out)
     missing = sorted(set(trained.trained_labels) - set(shots.labels.tolist()))
     without = f'; without a slide of today: {", ".join(missing)}' if missing else ''
-    return out, f"'{out}' is adapted to {len(shots)} slides of today{without}. It names surfaces and accepts none"
+    return out, f"'{out}' is adapted to {len(shots)} slides of today{without}; it names surfaces and rejects them all"
