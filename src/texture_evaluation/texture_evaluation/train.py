@@ -19,8 +19,6 @@ from texture_features.feature_set import LabelledFeatures
 from texture_recordings.bags import find_bags
 from texture_recordings.dataset import LabelledSlide, SlideDataset
 
-HOPS = 4  # windows of the least distance overlap so often
-
 
 def train_from_bags(
     recipe: str,
@@ -87,11 +85,8 @@ def train_grades_from_bags(
 def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
     windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-    examples = dataset.features(windows, recipe.augmentation, recipe.training.touch_s)
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
-    if not distances_m:
-        return examples
-    return replace(examples, resized=dataset.features_over_distances(windows, distances_m, distances_m[0] / HOPS))
+    return dataset.features(windows, recipe.augmentation, recipe.training.touch_s, distances_m)
 
 
 def slide_digest(slide: LabelledSlide) -> str:
