@@ -84,10 +84,9 @@ def test_trials_are_recognised_once_a_motion_distinguishes_the_textures() -> Non
 
 
 def test_simulated_slides_are_one_window_of_each_texture_with_each_motion() -> None:
-    features = load_recipe('fast').feature_set
-    one = simulated_slides(MOTIONS[:1], features, 1, np.random.default_rng(0))
+    one = simulated_slides(MOTIONS[:1], 1, np.random.default_rng(0))
     assert one.shape[:3] == (1, 8, 1)
-    assert one == pytest.approx(simulated_slides(MOTIONS[:1], features, 1, np.random.default_rng(0)))
+    assert one == pytest.approx(simulated_slides(MOTIONS[:1], 1, np.random.default_rng(0)))
 
 
 recorded = pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')

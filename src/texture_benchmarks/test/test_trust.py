@@ -148,7 +148,7 @@ def test_outcomes_are_counted_at_the_first_decided_estimate_and_at_the_end() -> 
 @pytest.mark.benchmark
 def test_the_quick_form_on_simulated_slides_gives_figures_of_all_compared(tmp_path: Path) -> None:
     result = run(BenchmarkOptions(out=tmp_path, quick=True))
-    outcomes = result.numbers['fast']['outcomes']
+    outcomes = result.numbers['default']['outcomes']
     assert 'simulated' in result.data
     assert len(outcomes) == len(result.numbers['SVC on log bands']['outcomes']) == 1 + 8 + 4
     clean = outcomes[UNDISTURBED]

@@ -177,7 +177,7 @@ SPLIT = (
     f'BioTac, trained on slides {TRAINED_ON}, tested on {TESTED_ON}; disturbed: {DISTURBED}; unknown: {DRAWS} draws of '
     f'{LEFT_OUT} materials that are not trained, slides of {UNKNOWN_S:g} s'
 )
-QUICK_COMPARED, QUICK_ROWS = ('fast', PEER), ('gain', 'hidden losses')
+QUICK_COMPARED, QUICK_ROWS = ('default', PEER), ('gain', 'hidden losses')
 UNDISTURBED = 'undisturbed'
 MAX_ACCEPTED_WRONG = 2 / 60
 KEPT = 0.9  # of the labels that are right without a disturbance: below it, a recipe has broken down
