@@ -49,7 +49,7 @@ from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_recordings.dataset import SlideDataset
 from texture_simulation.devices import dynamixel, rails
 from texture_simulation.offline import SlidePlan, write_simulated

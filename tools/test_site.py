@@ -30,9 +30,9 @@ from texture_estimation.model import load_model
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.explorer import Exploration
+from texture_exploration.exploration import Exploration
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_features.windows import WindowBatch
 from texture_simulation.offline import SlidePlan, write_simulated
 

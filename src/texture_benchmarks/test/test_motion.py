@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.motion import ForceTrial, explored
+from texture_benchmarks.force_trials import ForceTrial, Sweep, explored, ran, read_sweep
 from texture_benchmarks.study import BenchmarkOptions
+from texture_core.errors import InvalidData
 
 MOST_N = {
     'stiffness as declared': 6.0,
     '20 kN/m declared': 6.0,
-    'wall of 20 kN/m in the slide': 70.0,  # of an arm 50 ms late; 45 N up to 20 ms
+    'wall of 20 kN/m in the slide': 45.0,
     'wrong signs and axes': 10.0,
     'surface upside down': 10.0,
 }
@@ -21,8 +22,12 @@ TRIALS = [
     (ForceTrial('20 kN/m declared', stiffness_n_m=20000.0, delay_s=0.02), 'success'),
     (ForceTrial('20 kN/m declared', stiffness_n_m=2000.0, delay_s=0.05, noise_n=0.02), 'success'),
     (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.02, speed_m_s=0.05, wall_m=0.015), 'FORCE_LIMIT'),
+    (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.05, speed_m_s=0.02, wall_m=0.015), 'FORCE_LIMIT'),
+    (ForceTrial('wall of 20 kN/m in the slide', delay_s=0.05, speed_m_s=0.05, wall_m=0.015), 'refused'),
     (ForceTrial('wrong signs and axes', fault='force sign'), 'FORCE_SENSOR'),
     (ForceTrial('surface upside down', 500.0, delay_s=0.02, height_m=0.001, fault='upside down'), 'MOTION_FAILED'),
+    (ForceTrial('a sample that is no number', bad='rotation 2 nan', phase='slide'), 'ARM_FAULT'),
+    (ForceTrial('two explorers', found_s=0.5, phase='contact'), 'ARM_FAULT'),
 ]
 
 
@@ -30,13 +35,25 @@ TRIALS = [
 def test_a_trial_ends_as_named_within_its_force(trial, end):
     found = explored(trial)
     assert found.end == end, found
-    assert max(found.normal_n, found.sideways_n) < MOST_N[trial.name]
+    assert max(found.normal_n, found.sideways_n) < MOST_N.get(trial.name, 10.0)
+    assert found.named
 
 
 def test_a_force_100_ms_late_by_stamps_of_arrival_is_named_and_no_success():
     found = explored(ForceTrial('late', 20000.0, delay_s=0.02, late_force_s=0.1))
     assert found.end == 'ARM_FAULT'
     assert "later than 'loop_delay_s'" in found.message
+
+
+def test_the_trials_of_another_machine_are_read_as_they_were_run_and_what_had_no_time_is_missing(tmp_path):
+    planned = [ForceTrial('two', found_s=0.5, phase='rise'), ForceTrial('one', phase='rise', bad='force 0 nan')]
+    found = ran(planned)
+    assert [trial for trial, _ in found] == planned
+    Sweep(1, 2, found).write(tmp_path)
+    assert read_sweep(tmp_path) == Sweep(1, 2, found)
+    assert ran(planned, budget_s=0.0) == []
+    with pytest.raises(InvalidData, match='holds no trials'):
+        read_sweep(tmp_path / 'nowhere')
 
 
 @pytest.mark.benchmark

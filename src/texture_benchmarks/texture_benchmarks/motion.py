@@ -5,23 +5,27 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
+from texture_benchmarks.force_trials import (
+    LIMIT_N,
+    SEEDS,
+    TRIALS_FILE,
+    Sweep,
+    Trials,
+    by_name,
+    ran,
+    read_sweep,
+    row,
+    sweep,
+)
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
-from texture_core.errors import ExplorationError, InvalidParameter
-from texture_core.types import Array, ExplorationRequest, ExplorationState, Phase
+from texture_core.types import Array
 from texture_evaluation.charts import COLOURS, chart
-from texture_exploration.arms.arm import Vector
-from texture_exploration.arms.ros_controllers import RosControllersArm
-from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
-from texture_exploration.explorer import Exploration, ExplorationOutcome
 from texture_exploration.force_control import (
     ForceController,
     ForceLoopParams,
@@ -29,296 +33,6 @@ from texture_exploration.force_control import (
     lowest_unstable_gain,
     stability_limit_gain,
 )
-from texture_exploration.motions import MOTIONS
-from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
-
-# --------------------
-# A trial: what is true, what is declared, and what happens.
-
-STEP_NS = 1_000_000  # of the physics
-PERIOD_NS = 4_000_000  # of the thread of the arm
-EXPLORER_PERIODS = 2.5
-WALL_N_M = 20_000.0
-FRICTION = 0.3
-OFFSET_N = (0.7, -0.2, 1.1)  # what the sensor shows in free air
-LIMIT_N = 10.0
-TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)  # half a turn about x
-AFTER_S = 1.0  # how long the arm is watched after the end
-REST_S = 0.3  # after a break nothing may move
-MOVING_M_S = 0.0005
-
-
-class ForceTrial(NamedTuple):
-    """One exploration; `bad` is a field of a sample that is no number, `broken_s` a break of the link, in a phase."""
-
-    name: str
-    stiffness_n_m: float = 2000.0
-    declared_n_m: float = 20000.0
-    delay_s: float = 0.008
-    noise_n: float = 0.003
-    seed: int = 0
-    wanted_n: float = 5.0
-    speed_m_s: float = 0.02
-    height_m: float = 0.002
-    wall_m: float = math.inf
-    fault: str = ''  # velocity sign, force sign, velocity axes, force axes, upside down
-    late_force_s: float = 0.0  # with stamps of arrival
-    phase: str = ''
-    bad: str = ''
-    broken_s: float = 0.0
-
-
-class TrialEnd(NamedTuple):
-    """What a trial came to: largest true forces, N, time above the limit, s, and how it ended."""
-
-    normal_n: float
-    sideways_n: float
-    above_s: float
-    end: str
-    message: str
-    moved_after_break: bool = False
-
-    @property
-    def named(self) -> bool:
-        """Whether it succeeded or ended with a reason that is no error of the program."""
-        return self.end != ExplorationError.INTERNAL.name
-
-
-# --------------------
-# The machine at the other end of the topics: a late integrator, a spring, friction, a wall; no code of the suite.
-
-
-class VirtualMachine:
-    """A robot that holds the last velocity for ever, over a plane at z = 0 of its base."""
-
-    def __init__(self, trial: ForceTrial) -> None:
-        self.now_ns = 1_000_000_000
-        self.trial = trial
-        self.place = [0.0, 0.0, trial.height_m]
-        self.velocity = [0.0, 0.0, 0.0]
-        self.normal_n = self.sideways_n = 0.0
-        self.largest_n, self.largest_sideways_n, self.above_s = 0.0, 0.0, 0.0
-        self.broken_until_ns = 0
-        self.spoil = 0  # samples of the field `bad` that are no number
-        self.moved_after_break = False
-        self._coming: deque[tuple[int, list[float]]] = deque()
-        self._forces: deque[tuple[int, Vector]] = deque()
-        self._rng = np.random.default_rng(trial.seed)
-        self._force: ForceSample | None = None
-        self._pose: PoseSample | None = None
-
-    @property
-    def broken(self) -> bool:
-        """Whether nothing goes through the link."""
-        return self.now_ns < self.broken_until_ns
-
-    def advance(self) -> None:
-        """Go on by one step."""
-        self.now_ns += STEP_NS
-        while self._coming and self._coming[0][0] <= self.now_ns:
-            self.velocity = self._coming.popleft()[1]
-        self.place = [at + speed * STEP_NS * 1e-9 for at, speed in zip(self.place, self.velocity, strict=True)]
-        x, _, z = self.place
-        self.normal_n = self.trial.stiffness_n_m * max(0.0, -z)
-        wall_n = WALL_N_M * max(0.0, x - self.trial.wall_m)
-        vx, vy, _ = self.velocity
-        slip = math.hypot(vx, vy)
-        rub = FRICTION * self.normal_n / slip if slip > 1e-6 else 0.0
-        on_finger = (-rub * vx - wall_n, -rub * vy, self.normal_n)
-        self.sideways_n = math.hypot(*on_finger[:2])
-        self.largest_n = max(self.largest_n, self.normal_n)
-        self.largest_sideways_n = max(self.largest_sideways_n, self.sideways_n)
-        self.above_s += STEP_NS * 1e-9 * (math.hypot(*on_finger) > LIMIT_N)
-        self._forces.append((self.now_ns, on_finger))
-        after_s = (self.now_ns - self.broken_until_ns) * 1e-9
-        if self.broken_until_ns and REST_S < after_s < REST_S + 0.1 and max(map(abs, self.velocity)) > MOVING_M_S:
-            self.moved_after_break = True
-
-    def measure(self) -> None:
-        """Publish a pose and a force, as a broadcaster does in each period."""
-        if self.broken:
-            self._pose = self._force = None
-            return
-        due_ns = self.now_ns - round(self.trial.late_force_s * 1e9)
-        while len(self._forces) > 1 and self._forces[1][0] <= due_ns:
-            self._forces.popleft()
-        x, y, z = self._forces[0][1]
-        if self.trial.fault == 'force sign':
-            x, y, z = -x, -y, -z
-        elif self.trial.fault == 'force axes':
-            x, z = z, x
-        noise = self.trial.noise_n * self._rng.standard_normal(3)
-        force = [float(true + off + more) for true, off, more in zip((x, y, z), OFFSET_N, noise, strict=True)]
-        place, rotation = list(self.place), list(TOOL_DOWN)
-        if self.spoil:
-            self.spoil -= 1
-            field, _, value = self.trial.bad.partition(' ')
-            {'force': force, 'place': place, 'rotation': rotation}[field][0] = float(value)
-        self._pose = PoseSample(self.now_ns, 'base', (place[0], place[1], place[2]), tuple(rotation))  # type: ignore[arg-type]
-        self._force = ForceSample(self.now_ns, 'base', (force[0], force[1], force[2]))
-
-    def newest_pose(self) -> PoseSample | None:
-        """Return the pose of this period."""
-        return self._pose
-
-    def newest_force(self) -> ForceSample | None:
-        """Return the force of this period."""
-        return self._force
-
-    def listeners(self) -> int:
-        """Return that the controller listens; discovery does not notice a short break."""
-        return 1
-
-    def unsafe(self) -> str:
-        """Return that nobody else commands."""
-        return ''
-
-    def beat(self, *, moving: bool) -> None:
-        """There is no guard."""
-
-    def send_velocity(self, velocity_m_s: Vector) -> None:
-        """Take a velocity, that comes into effect late."""
-        if self.broken:
-            return
-        x, y, z = velocity_m_s
-        if self.trial.fault == 'velocity sign':
-            x, y, z = -x, -y, -z
-        elif self.trial.fault == 'velocity axes':
-            x, z = z, x
-        self._coming.append((self.now_ns + round(self.trial.delay_s * 1e9), [x, y, z]))
-
-    def send_force(self, force_n: Vector) -> None:
-        """It takes velocities alone."""
-
-    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
-        """There is nothing to switch."""
-
-    def close(self) -> None:
-        """There is nothing to wait for."""
-
-
-LIMITS = SafetyLimits(approach_timeout_s=60.0, z_low_m=-0.06, surface_tolerance_m=0.05)  # 5 N on 0.2 kN/m: 25 mm
-BAD = ('force nan', 'force inf', 'force 1e308', 'place nan', 'place inf', 'rotation nan')
-
-
-def explored(trial: ForceTrial) -> TrialEnd:
-    """Explore once: the exploration and the arm are those of the suite, time and physics are not."""
-    machine = VirtualMachine(trial)
-    params = RosControllersParams(
-        surface_x_m=0.0,
-        surface_z_m=0.0,
-        surface_rx_rad=math.pi if trial.fault == 'upside down' else 0.0,
-        rate_hz=1e9 / PERIOD_NS,
-        loop_delay_s=trial.delay_s,
-        max_stiffness_n_m=trial.declared_n_m,
-        max_impact_n=0.5,
-        touching_n=max(0.03, 6.0 * trial.noise_n),
-        accept_no_timeout=True,
-        accept_shared_group=True,
-    )
-    try:
-        arm = RosControllersArm(params, lambda: machine.now_ns, lambda _params: machine, own_thread=False)
-    except InvalidParameter as error:
-        return TrialEnd(0.0, 0.0, 0.0, 'refused', str(error))
-    touch = TouchParams(approach_stiffness_n_m=trial.declared_n_m)
-    phases: list[Phase] = []
-
-    def on_state(state: ExplorationState) -> None:
-        phases.append(state.phase)
-        if not trial.phase or [phase.value for phase in phases[-3:]] != [trial.phase] * 3:
-            return
-        if trial.bad and phases.count(state.phase) == 3:
-            machine.spoil = 1
-        if trial.broken_s and not machine.broken_until_ns:
-            machine.broken_until_ns = machine.now_ns + round(trial.broken_s * 1e9)
-
-    def pass_time() -> None:
-        for _ in range(round(EXPLORER_PERIODS * PERIOD_NS / STEP_NS)):
-            machine.advance()
-            if machine.now_ns % PERIOD_NS == 0:
-                machine.measure()
-                arm.step()
-
-    machine.advance()
-    machine.measure()
-    arm.connect()
-    for _ in range(30):  # a connection begins at rest
-        pass_time()
-    home = arm.state().position
-    request = ExplorationRequest('linear_slide', speed_m_s=trial.speed_m_s, force_n=trial.wanted_n, distance_m=0.03)
-    motion = MOTIONS[request.motion](request, home, touch, LIMITS).lift_first(lambda: arm.zeroed)
-    exploration = Exploration(
-        'trial', request, arm=arm, motion=motion, limits=LIMITS, clock=lambda: machine.now_ns, on_state=on_state
-    )
-    outcome = exploration.run(pass_time)
-    until_ns = max(machine.now_ns, machine.broken_until_ns) + round(AFTER_S * 1e9)
-    while machine.now_ns < until_ns:
-        pass_time()
-    return ended(machine, outcome)
-
-
-def ended(machine: VirtualMachine, outcome: ExplorationOutcome) -> TrialEnd:
-    """Return what a trial came to."""
-    end = 'success' if outcome.success else outcome.error.name
-    forces = machine.largest_n, machine.largest_sideways_n, machine.above_s
-    return TrialEnd(*forces, end, outcome.message, machine.moved_after_break)
-
-
-# --------------------
-# The sweep.
-
-STIFFNESSES_N_M = (200.0, 600.0, 2000.0, 6000.0, 20000.0)
-DELAYS_S = (0.0, 0.008, 0.02, 0.05)
-NOISES_N = (0.003, 0.01, 0.02)
-SEEDS = 20
-GAPS_M = (0.001, 0.002, 0.004, 0.008, 0.012)
-BREAKS_S = (0.1, 0.3, 0.7, 2.0, 5.0)
-PHASES = ('approach', 'contact', 'slide', 'lift')
-FAULTS = ('velocity sign', 'force sign', 'velocity axes', 'force axes')
-
-
-def sweep(seeds: int, quick: bool = False) -> Iterator[ForceTrial]:
-    """Return the trials of the sweep; `seeds` of the noise for each."""
-    stiffnesses = STIFFNESSES_N_M[::2] if quick else STIFFNESSES_N_M
-    delays, noises = (DELAYS_S[1::2], NOISES_N[::2]) if quick else (DELAYS_S, NOISES_N)
-    for k, delay, noise, seed in product(stiffnesses, delays, noises, range(seeds)):
-        yield ForceTrial('stiffness as declared', k, k, delay, noise, seed)
-        yield ForceTrial('20 kN/m declared', k, 20000.0, delay, noise, seed)
-    for k, seed in product(stiffnesses, range(seeds)):
-        yield ForceTrial('force 100 ms late, stamped on arrival', k, 20000.0, 0.02, seed=seed, late_force_s=0.1)
-        yield ForceTrial('contact four times stiffer than declared', k, k / 4, 0.02, seed=seed)
-    for speed, delay, seed in product((0.02, 0.05), delays, range(seeds)):
-        yield ForceTrial('wall of 20 kN/m in the slide', 2000.0, 20000.0, delay, 0.003, seed, 5.0, speed, wall_m=0.015)
-    for fault, k, seed in product(FAULTS, stiffnesses, range(seeds)):
-        yield ForceTrial('wrong signs and axes', k, 20000.0, 0.02, 0.003, seed, fault=fault)
-    for k, gap, seed in product((500.0, 1000.0, 2000.0, 20000.0), GAPS_M, range(seeds)):
-        yield ForceTrial('surface upside down', k, 20000.0, 0.02, 0.003, seed, height_m=gap, fault='upside down')
-    for bad, phase in product(BAD, PHASES):
-        yield ForceTrial('a sample that is no number', bad=bad, phase=phase)
-    for broken_s, phase in product(BREAKS_S, PHASES):
-        yield ForceTrial('link broken for 0.1 to 5 s', broken_s=broken_s, phase=phase)
-
-
-def row(trials: Sequence[tuple[ForceTrial, TrialEnd]]) -> dict[str, Any]:
-    """Return the figures of one row of the table."""
-    ends = [end for _, end in trials]
-    good = [(trial, end) for trial, end in trials if end.end == 'success']
-    reasons: dict[str, int] = {}
-    for end in ends:
-        reasons[end.end] = reasons.get(end.end, 0) + 1
-    return {
-        'trials': len(ends),
-        'normal_n': max(end.normal_n for end in ends),
-        'sideways_n': max(end.sideways_n for end in ends),
-        'above_s': max(end.above_s for end in ends),
-        'success': len(good),
-        'overshoot_of_success': max((end.normal_n / trial.wanted_n - 1.0 for trial, end in good), default=0.0),
-        'internal': sum(not end.named for end in ends),
-        'moved_after_break': sum(end.moved_after_break for end in ends),
-        'ends': dict(sorted(reasons.items(), key=lambda reason: -reason[1])),
-    }
-
 
 # --------------------
 # The stability limit: predicted by eigenvalues, and that of the running controller.
@@ -392,7 +106,7 @@ def border_chart(border: Mapping[str, Array], path: Path) -> Path:
     return path
 
 
-def force_chart(rows: Mapping[str, Sequence[tuple[ForceTrial, TrialEnd]]], path: Path) -> Path:
+def force_chart(rows: Mapping[str, Trials], path: Path) -> Path:
     """Draw the largest force of each trial by kind: success, or ended with a reason."""
     with chart(path, (8.5, 4.6), 'Largest true force of each trial, 5 N wanted') as figure:
         axes = figure.subplots()
@@ -421,13 +135,17 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     A late integrator on a spring with friction, by an arm of ROS controllers that holds the last velocity: stiffness
     of 0.2 to 20 kN/m, delay of 0 to 50 ms, noise of 3 to 20 mN; a wall, wrong signs and axes, a surface upside down 1
-    to 12 mm away, samples that are no numbers and broken links in each phase. Largest true forces of each kind of
-    trial, the longest time above 10 N, and how the trials ended.
+    to 12 mm away; in each phase samples that are no numbers, broken links and a second explorer. Largest true forces of
+    each kind of trial, the longest time above 10 N, and how the trials ended. Trials that `force_trials` has written
+    into the folder of recorded data are taken from there.
     """
-    seeds = 1 if options.quick else SEEDS
-    rows: dict[str, list[tuple[ForceTrial, TrialEnd]]] = {}
-    for trial in sweep(seeds, options.quick):
-        rows.setdefault(trial.name, []).append((trial, explored(trial)))
+    if options.data is not None and (options.data / TRIALS_FILE).is_file():
+        result = read_sweep(options.data)
+    else:
+        seeds = 1 if options.quick else SEEDS
+        planned = list(sweep(seeds, options.quick))
+        result = Sweep(seeds, len(planned), ran(planned))
+    rows = by_name(result.trials)
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else BORDER_DELAYS_S)
     return BenchmarkResult(
         name='motion',
@@ -435,7 +153,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         data='virtual arm and surface, in virtual time',
         split='none: nothing is trained',
         numbers={
-            'seeds': seeds,
+            'seeds': result.seeds,
+            'planned': result.planned,
             'rows': {name: row(trials) for name, trials in rows.items()},
             'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
         },

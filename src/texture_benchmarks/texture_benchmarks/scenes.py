@@ -98,7 +98,7 @@ REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
 }
 # Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
 HOST = 'twelve_textures'
-ADDED = ('skids', 'skin', 'dropouts')
+ADDED = ('skids', 'dropouts')
 
 
 def completed(scene: Scene, touch_protocol: TouchProtocol) -> Scene:
@@ -400,7 +400,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     size, costs = QUICK if options.quick else _Size(), {}
     for name in size.scenes:
         scene = load_scene(name)
-        sticks = {own: hasattr(surface.friction, 'bristle_1_m') for own, surface in scene.surfaces.items()}
+        sticks = {own: hasattr(surface.friction, 'BRISTLE_1_M') for own, surface in scene.surfaces.items()}
         for kind in sorted(set(sticks.values())):
             surfaces = [own for own in sticks if sticks[own] is kind]
             costs[name, kind] = scan_cost(scene, surfaces, size.scan_repeats, size.many)

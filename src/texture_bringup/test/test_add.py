@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from texture_msgs import msg
 
-from texture_bringup.command import main
 from texture_core.ros import FEATURE_QOS, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FeatureVector
@@ -91,9 +90,3 @@ def test_parameters_of_a_running_node_are_set_from_the_command_line(graph, class
     assert classifier._evidence.model is not None
     assert asked(graph, 'set', 'classifier', 'model:=') == 0
     assert classifier._evidence.model is None
-
-
-@pytest.mark.parametrize('arguments', [['add'], ['add', 'silk', '--undo']])
-def test_what_to_add_must_be_given(arguments, capsys):
-    assert main(arguments) == 2
-    assert 'label of the texture' in capsys.readouterr().err

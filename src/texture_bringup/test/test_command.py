@@ -74,38 +74,12 @@ def test_a_reader_who_has_seen_enough_ends_the_command_quietly(arguments) -> Non
     assert (ended.returncode, ended.stderr) == (141, b'')
 
 
-def test_an_unknown_sub_command_gets_the_nearest(capsys) -> None:
-    assert main(['trian']) == 2
-    assert "did you mean 'train'?" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize('name', installed())
 def test_every_sub_command_explains_itself(name, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
         main([name, '--help'])
     assert ended.value.code == 0
     assert summary(installed()[name]) in ' '.join(capsys.readouterr().out.split())
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'sentence'),
-    [
-        (['launch', 'emulatr'], "no launch file 'emulatr'; did you mean 'emulator'?"),
-        (['launch', 'emulator', 'surfcae:=glass'], "did you mean 'surface'?"),
-        (['launch', 'emulator', 'surface'], 'write NAME:=VALUE'),
-        (['launch', 'replay'], 'give bag:=VALUE'),
-        (['replay', 'my_bag', '--rate', 'nan'], '--rate is nan; allowed is 0.01 to 1000.0'),
-        (['identify', 'm', '--most', '0'], '--most is 0'),
-        (['identify', '/nowhere'], "there is no model '/nowhere'"),
-        (['identify', '/nowhere.npz'], "there is no model '/nowhere.npz'"),
-    ],
-)
-def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
-    monkeypatch.delenv('TEXTURE_DATA', raising=False)
-    assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count('\n') == 1
 
 
 def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:
@@ -130,11 +104,6 @@ def test_a_shell_completes_sub_commands_and_options(line, wanted):
         ['bash', '-c', shell], env={**os.environ, **asking}, capture_output=True, text=True, check=True
     )
     assert wanted in done.stdout.split()
-
-
-def test_an_unknown_motion_is_refused_before_an_explorer_is_waited_for(capsys):
-    assert main(['explore', 'linear_slid']) == 2
-    assert "did you mean 'linear_slide'" in capsys.readouterr().err
 
 
 class Answering:

@@ -28,7 +28,7 @@ from texture_core.types import (
 )
 from texture_exploration.motions import DEFAULTS, MOTIONS
 from texture_exploration.safety import RANGES, SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 
 def batch(first, samples, rate_hz=1000.0, channels=('dynamic',)):

@@ -3,18 +3,20 @@
 import asyncio
 import json
 import re
+import socket
 from pathlib import Path
-from socket import gethostname
 
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
 
-from texture_bringup.dashboard import BUTTONS, MAX_BODY_BYTES, VIEWERS, Access, Serving, make_app
+from texture_bringup import dashboard
+from texture_bringup.dashboard import BUTTONS, MAX_BODY_BYTES, VIEWERS, Access, Guesses, Serving, make_app
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
 
 PAGE = Path(__file__).parents[1] / 'config' / 'dashboard'
 TOKEN = 'a-secret-of-24-characters'
-DEADLINE_S = 30.0
+DEADLINE_S = 10.0
+POST = b'POST /api/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n'
 
 
 class Nodes:
@@ -120,9 +122,9 @@ def test_a_request_that_is_too_large_broken_or_of_another_page_is_refused_and_re
 
 def test_the_web_socket_sends_the_newest_frame_and_is_closed_to_other_pages() -> None:
     async def story(client, _nodes):
-        async with client.ws_connect('/ws') as socket:
+        async with client.ws_connect('/ws') as page:
             client.app[VIEWERS].show('{"number": 1}')
-            assert await socket.receive_json() == {'number': 1}
+            assert await page.receive_json() == {'number': 1}
         answer = await client.get('/ws', headers={'Origin': 'http://evil.example', 'Upgrade': 'websocket'})
         assert answer.status == 403
 
@@ -166,7 +168,7 @@ def test_the_address_of_the_page_carries_the_token_where_one_is_needed(monkeypat
     assert Access.to_this_machine('::1').url(8085) == 'http://[::1]:8085/'
     access = Access.to_this_machine('0.0.0.0')
     assert access.url(8085).endswith(f':8085/?token={access.token}')
-    assert access.is_our_host(gethostname())
+    assert access.is_our_host(socket.gethostname())
     monkeypatch.setenv('TEXTURE_DASHBOARD_TOKEN', TOKEN)
     assert Access.to_this_machine('0.0.0.0').token == TOKEN
 
@@ -175,6 +177,50 @@ def test_the_address_of_the_page_carries_the_token_where_one_is_needed(monkeypat
 def test_beyond_loopback_there_is_no_page_without_a_good_token(token) -> None:
     with pytest.raises(InvalidParameter, match='at least 16'):
         Access('0.0.0.0', token)
+
+
+def test_an_address_that_sends_wrong_tokens_waits_longer_after_each_and_one_and_the_same_counts_once() -> None:
+    now = [0.0]
+    guesses = Guesses(lambda: now[0])
+    for number in range(9):
+        for _ in range(100):  # an open page asks with the token of yesterday
+            guesses.note('a', f'guess {number}')
+    assert guesses.wait_s('a') == 16.0
+    assert guesses.wait_s('b') == 0.0
+    now[0] = 16.0
+    assert guesses.wait_s('a') == 0.0
+
+    async def story(client, nodes):
+        for number in range(6):
+            assert (await post(client, Authorization=f'Bearer {number}'))[0] == 401
+        status, text = await post(client, Authorization=f'Bearer {TOKEN}')
+        assert (status, nodes.asked) == (429, [])
+        assert 'too many wrong tokens came from 127.0.0.1; the next is looked at in 2 s' in text
+
+    with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
+
+
+@pytest.mark.parametrize(
+    ('sent', 'answer'),
+    [
+        (b'', b''),
+        (b'GET / HTTP/1.1\r\nHost: localho', b''),
+        (b'GET / HTTP/1.1\r\nHost: localhost\r\n\r\nGET / HT', b'HTTP/1.1 200 OK'),
+        (POST + b'Content-Length: 9\r\n\r\n{"on"', b'HTTP/1.1 408 Request Timeout'),
+    ],
+    ids=['nothing', 'half a head', 'half a second request', 'half a body'],
+)
+def test_a_connection_whose_request_does_not_come_to_its_end_is_closed(sent, answer, monkeypatch) -> None:
+    monkeypatch.setattr(dashboard, 'REQUEST_S', 0.2)
+    monkeypatch.setattr(dashboard, 'LOOK_S', 0.05)
+    serving = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
+    try:
+        with socket.create_connection(('127.0.0.1', serving.port), timeout=DEADLINE_S) as line:
+            line.sendall(sent)
+            received = b''.join(iter(lambda: line.recv(4096), b''))
+    finally:
+        serving.close()
+    assert received.partition(b'\r\n')[0] == answer
 
 
 def test_a_port_in_use_is_reported_and_nothing_is_left_running() -> None:

@@ -74,14 +74,14 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answer
     out = io.StringIO()
     assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, ProgressLog(out=out)), out.getvalue()
     slides = {slide['title']: slide for slide in json.loads((tmp_path / 'demo/demo.json').read_text())['slides']}
-    assert {title: slide['rejection'] for title, slide in slides.items() if title != 'finger too high'} == {
+    assert {title: slide['rejection'] for title, slide in slides.items() if title != 'over the edge'} == {
         'glass': 'NONE',
         'ridge_2mm_deep': 'NONE',
         'cardboard': 'NOVEL',
         'ridge_2mm_deep at 0.02 m/s': 'OUTSIDE_TRAINING',
     }
     assert slides['glass']['decided']
-    assert slides['finger too high']['outcome'].startswith('no surface within 0.002 m below the start')
+    assert slides['over the edge']['outcome'].startswith('the contact with the surface was lost')
     assert re.search(r'rejected, outside what was trained: speed 0\.0[12]\d* m/s', out.getvalue())
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 

@@ -104,12 +104,6 @@ def test_the_help_lists_the_motions(capsys):
     assert 'linear_slide, ' in ' '.join(capsys.readouterr().out.split())
 
 
-def test_a_check_without_its_model_is_refused_before_an_explorer_is_waited_for(monkeypatch, capsys):
-    monkeypatch.setattr('texture_bringup.commands.explore.slide_over_plate', lambda *_: pytest.fail('the robot moved'))
-    assert main(['check', 'absent']) != 0
-    assert 'absent' in capsys.readouterr().err
-
-
 USUAL = {'speed_m_s': 0.05, 'force_n': 0.0, 'distance_m': 0.15, 'direction_rad': 0.0}
 STORED = {'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': math.pi / 2}
 

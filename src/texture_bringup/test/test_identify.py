@@ -65,8 +65,3 @@ def test_the_slide_that_reports_the_textures_apart_is_made_and_recognises_them(m
     said = capsys.readouterr().out
     assert 'slide 1: linear_slide, direction 0°, 0.1 m/s, 2 N' in said
     assert 'texture: ridges_x, probability' in said
-
-
-def test_a_model_that_knows_one_motion_alone_leaves_nothing_to_choose(tmp_path, capsys) -> None:
-    assert main(['identify', trained(tmp_path, (0.0,))]) == 2
-    assert 'knows no motions to choose from' in capsys.readouterr().err

@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a user gets who gives `texture` the wrong thing: exit code 2 and one sentence that says what to do."""
 
+import os
 import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
+
+pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
 from texture_bringup.command import main
 from texture_core.types import ExplorationState, TactileSignal
@@ -24,6 +27,7 @@ def data(tmp_path_factory):
     bags = [str(folder / 'glass'), str(folder / 'leather')]
     assert main(['train', 'default', *bags, '-o', str(folder / 'fast')]) == 0
     assert main(['train', 'vibration-and-taxels', *bags, '-o', str(folder / 'all')]) == 0
+    os.mkfifo(folder / 'pipe')
     return folder
 
 
@@ -95,6 +99,33 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
         ('cross-validate stratified:x fast glass', 'write stratified:FOLDS (2 or more)'),
         ('cross-validate stratified:1 fast glass', 'write stratified:FOLDS (2 or more)'),
         ('cross-validate leave-one-out:speed fast glass leather', "all are of one group, '0.05'"),
+        ('train default glass leather -o fast', "'fast.npz' exists; give another name, or --force to replace it"),
+        ('train default glass leather -o no/x', "there is no folder 'no' for the model"),
+        ('check fast', 'store that slide by `texture check fast --store`'),
+        ('trian', "did you mean 'train'?"),
+        ('add', 'label of the texture'),
+        ('add silk --undo', 'label of the texture'),
+        ('explore linear_slid', "did you mean 'linear_slide'"),
+        ('explore --preset jamali --repeats -1', '--repeats is -1'),
+        ('explore', 'give the motion, such as linear_slide, or --preset NAME'),
+        ('collect cork out --force 6 3', "'force_low_n' is 6; it must not be above 'force_high_n', 3"),
+        ('identify fast --most 0', '--most is 0'),
+        ('identify /nowhere', "there is no model '/nowhere'"),
+        ('identify /nowhere.npz', "there is no model '/nowhere.npz'"),
+        ('identify fast', 'knows no motions to choose from'),
+        ('launch emulatr', "no launch file 'emulatr'; did you mean 'emulator'?"),
+        ('launch emulator surfcae:=glass', "did you mean 'surface'?"),
+        ('launch emulator surface', 'write NAME:=VALUE'),
+        ('launch emulator surface:=glas', "no surface 'glas'; did you mean 'glass'?"),
+        ('launch emulator model:=nowhere', "there is no model 'nowhere'"),
+        ('launch emulator model:=pipe', "argument 'model' is 'pipe', which is no regular file"),
+        ('launch replay', 'give bag:=VALUE'),
+        ('launch replay bag:=nowhere', "there is no bag 'nowhere'"),
+        ('replay glass --rate nan', '--rate is nan; allowed is 0.01 to 1000.0'),
+        ('list sensor', "did you mean 'sensors'?"),
+        ('info nowhere', "there is no bag 'nowhere'"),
+        ('watch glass --rate 0', '--rate is 0; a number above 0 is needed'),
+        ('import tabel map.yaml . out', "did you mean 'table'?"),
         ('demo --recipe defualt', "did you mean 'default'?"),
         ('dashboard --port 99999', 'allowed is 0 to 65535'),
         ('import biotac . .', 'biotac20'),
@@ -103,4 +134,5 @@ def test_a_model_that_needs_the_slow_channels_refuses_a_bag_without_them(data, c
 )
 def test_what_is_missing_or_mistyped_is_named(command, sentence, data, capsys, monkeypatch) -> None:
     monkeypatch.chdir(data)
+    monkeypatch.delenv('TEXTURE_DATA', raising=False)
     assert sentence in refused(command.split(), capsys)

@@ -12,11 +12,11 @@ from texture_core.types import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import load_roughness_recipe
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.explorer import Exploration, no_signal_watch
+from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_features.windows import CutWindow, cut_recording
 
 START_NS = NANOSECONDS

@@ -19,8 +19,9 @@ from texture_exploration.arms.in_hand import InHandParams
 from texture_exploration.arms.rails import RailsParams
 from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.arms.ur import UrArmParams
-from texture_exploration.safety import SafetyLimits, SignalWatchParams
-from texture_exploration.stages import TouchParams
+from texture_exploration.guards import SignalWatchParams
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.twist_controller import TwistControllerParams
 from texture_simulation.devices.ur import UrControllerParams
 from texture_simulation.emulator import EmulatorParams

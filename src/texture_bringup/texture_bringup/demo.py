@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import socket
@@ -12,7 +13,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -61,6 +62,15 @@ def _is_free(port: int) -> bool:
     return True
 
 
+def _free_port() -> int:
+    """Return the usual port of the dashboard, or one that is free."""
+    for port in (8085, 0):
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(('127.0.0.1', port))
+            return int(probe.getsockname()[1])
+    raise LaunchFailed('no TCP port is free; stop something first')
+
+
 # --------------------
 # What the demonstration explores, and how.
 
@@ -88,6 +98,7 @@ class DemoPlan:
     force_n: float = 1.0
     distance_m: float = 0.06
     untrained_speed_m_s: float = 0.02
+    edge_m: float = 0.08  # where the sample ends
 
     def request(self, surface: str, speed_m_s: float = 0.0) -> ExplorationRequest:
         """Return a slide over a surface, at the speed of the training unless another is given, and as long in time."""
@@ -101,6 +112,10 @@ class DemoPlan:
             early_stopping=True,
         )
 
+    def over_the_edge(self, surface: str) -> ExplorationRequest:
+        """Return a slide that is longer than the sample."""
+        return replace(self.request(surface), distance_m=1.5 * self.edge_m, early_stopping=False)
+
 
 @dataclass(frozen=True)
 class Slide:
@@ -108,7 +123,7 @@ class Slide:
 
     surface: str
     title: str
-    expected: Rejection | None  # None for no contact
+    expected: Rejection | None  # None for a contact that is lost
     answer: ExplorationResult
     estimates: Sequence[TextureEstimate]
 
@@ -116,7 +131,7 @@ class Slide:
     def as_expected(self) -> bool:
         """Whether the answer is the right one."""
         if self.expected is None:
-            return self.answer.error is ExplorationError.NO_SURFACE
+            return self.answer.error is ExplorationError.MOTION_FAILED
         accepted = self.answer.texture.label == self.surface
         right = accepted or self.expected is not Rejection.NONE
         return self.answer.success and self.answer.texture.rejection is self.expected and right
@@ -246,20 +261,22 @@ def demonstrate(
     _clear(out)
     _train(out, recipe, seed, plan, progress)
     progress.section('Starting the emulator: surfaces, arm and sensor are simulated, all other nodes are the real ones')
-    arguments = {
+    arguments: dict[str, Any] = {
         'recipe': (out / f'{MODEL}.json').resolve(),
         'model': (out / f'{MODEL}.npz').resolve(),
         'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
         'seed': seed + 1,
         'dashboard': str(dashboard).lower(),
+        'dashboard_port': (port := _free_port()),
     }
-    with (
-        tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
-        DemoRig(Path(folder), out / LOG, arguments) as rig,
-    ):
-        if dashboard:
-            progress.line('dashboard: http://127.0.0.1:8085 while this runs')
-        slides = _explore(rig, plan, progress)
+    with tempfile.TemporaryDirectory(prefix='texture_demo_') as folder:
+        parameters = Path(folder) / 'explorer.yaml'
+        parameters.write_text(f'/**/explorer: {{ros__parameters: {{edge_m: {plan.edge_m}}}}}\n')
+        arguments['explorer_params'] = parameters
+        with DemoRig(Path(folder), out / LOG, arguments) as rig:
+            if dashboard:
+                progress.line(f'dashboard: http://127.0.0.1:{port} while this runs')
+            slides = _explore(rig, plan, progress)
     _report(slides, out, progress)
     return all(slide.as_expected for slide in slides)
 
@@ -284,23 +301,22 @@ def _explore(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> list[Slide]
     """Make all slides, and print what was answered to each."""
     slides: list[Slide] = []
 
-    def slide(surface: str, title: str, expected: Rejection | None, speed_m_s: float = 0.0) -> None:
-        ends = ExplorationError.NONE if expected is not None else ExplorationError.NO_SURFACE
-        made = Slide(surface, title, expected, *rig.explore(plan.request(surface, speed_m_s), progress.line, ends))
+    def slide(request: ExplorationRequest, title: str, expected: Rejection | None) -> None:
+        ends = ExplorationError.NONE if expected is not None else ExplorationError.MOTION_FAILED
+        made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
         slides.append(made)
         progress.line(f'{"✓" if made.as_expected else "✗"} {title:<28}{made.outcome}')
 
     progress.section('Trained surfaces: a slide ends as soon as the evidence is enough')
     for surface in plan.recognised:
-        slide(surface, surface, Rejection.NONE)
+        slide(plan.request(surface), surface, Rejection.NONE)
     progress.section('Surfaces that were never trained')
     for surface in plan.untrained:
-        slide(surface, surface, Rejection.NOVEL)
-    progress.section('Outside the training, and no contact')
-    shown = plan.recognised[-1]
-    slide(shown, f'{shown} at {plan.untrained_speed_m_s:g} m/s', Rejection.OUTSIDE_TRAINING, plan.untrained_speed_m_s)
-    rig.set_parameters('explorer', approach_travel_m=0.002)
-    slide(shown, 'finger too high', None)
+        slide(plan.request(surface), surface, Rejection.NOVEL)
+    progress.section('A speed that was not trained, and a slide over the edge of the sample')
+    shown, speed_m_s = plan.recognised[-1], plan.untrained_speed_m_s
+    slide(plan.request(shown, speed_m_s), f'{shown} at {speed_m_s:g} m/s', Rejection.OUTSIDE_TRAINING)
+    slide(plan.over_the_edge(shown), 'over the edge', None)
     return slides
 
 

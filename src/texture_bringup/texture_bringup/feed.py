@@ -215,6 +215,7 @@ class Feed:
         self._texture = TextureEstimate(0, '')
         self._model = ModelInfo(0)
         self._roughness = RoughnessEstimate(0, '')
+        self.recorded = False  # what is shown comes from a bag, in which no node can report
         self.recording = ''  # folder that is being recorded to
         self.working = ''  # what a sub-command that the page has started said last
 
@@ -318,6 +319,8 @@ class Feed:
     def _missing(self, what: str, name: str) -> str:
         """Return that there is no estimate yet and what its node says, if that node is not well."""
         status = self.node_statuses.newest(name)
+        if self.recorded:
+            return f'no {what}'
         if status is None:
             return f'no {what} yet, and no {name} reports on /diagnostics'
         level, message = status

@@ -585,7 +585,7 @@ def _refuse_special(given: Mapping[str, str]) -> None:
     """Refuse an argument that names what nodes would wait for or read without end; a device may be given as one."""
     for name, value in given.items():
         path = Path(value).expanduser()
-        if '/' not in value or 'device' in name or not path.exists() or path.is_file() or path.is_dir():
+        if 'device' in name or not path.exists() or path.is_file() or path.is_dir():
             continue
         raise InvalidLaunch(
             f"argument '{name}' is '{value}', which is no regular file and no folder; give the path of one"

@@ -179,6 +179,7 @@ class ExplorationResult:
     exploration_id: str
     texture: TextureEstimate
     roughness: RoughnessEstimate
+    labels: tuple[str, ...] = ()  # of the probabilities
 
     @property
     def success(self) -> bool:
@@ -339,6 +340,7 @@ class Operator:
             result.exploration_id,
             from_msg(result.texture),
             from_msg(result.roughness),
+            tuple(result.labels),
         )
 
     def explore_with_features(

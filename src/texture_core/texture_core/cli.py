@@ -10,9 +10,10 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TypeVar
 
 from texture_core.config import from_mapping, parameters_of
@@ -66,18 +67,24 @@ def core_count(text: str) -> int:
     return count
 
 
-def add_parameters(parser: argparse.ArgumentParser, cls: type) -> None:
-    """Add an option for each parameter of a dataclass: `--speed-low-m-s` for `speed_low_m_s`."""
+METAVARS = {int: 'N', float: 'NUMBER', str: 'TEXT'}
+
+
+def add_parameters(parser: argparse.ArgumentParser, cls: type, without: Sequence[str] = ()) -> None:
+    """Add an option for each parameter of a dataclass but some: `--low-hz` for `low_hz`."""
     for one in parameters_of(cls):
+        if one.name in without:
+            continue
         about = one.description.rstrip('.').replace('%', '%%') + (f', {one.unit}' if one.unit else '')
-        shape = {'choices': one.choices} if one.choices else {'metavar': 'X'}
+        shape = {'choices': one.choices} if one.choices else {'metavar': one.unit.upper() or METAVARS[one.type]}
         option = f'--{one.name.replace("_", "-")}'
         parser.add_argument(option, type=one.type, default=one.default, help=f'{about} (default: %(default)s)', **shape)
 
 
-def parameters_from(options: argparse.Namespace, cls: type[T]) -> T:
-    """Return the dataclass that the options of `add_parameters` stand for; InvalidParameter if one is out of range."""
-    return from_mapping(cls, {one.name: getattr(options, one.name) for one in parameters_of(cls)})
+def parameters_from(options: argparse.Namespace, cls: type[T], more: Mapping[str, object] = MappingProxyType({})) -> T:
+    """Return the dataclass that the options of `add_parameters` and `more` stand for, within its ranges."""
+    named = {one.name: getattr(options, one.name) for one in parameters_of(cls) if hasattr(options, one.name)}
+    return from_mapping(cls, {**named, **more})
 
 
 # --------------------
@@ -100,8 +107,8 @@ def show_progress() -> None:
 
 
 @contextmanager
-def task(what: str, total: int = 0) -> Iterator[Callable[[], None]]:
-    """Say, while a `with` block takes longer than 3 s, what it does, how far it is and how long it has taken.
+def task(what: str, total: int = 0, quiet_s: float = QUIET_S) -> Iterator[Callable[[], None]]:
+    """Say, while a `with` block takes longer than `quiet_s`, what it does, how far it is and how long it has taken.
 
     On a terminal one line changes in place and goes at the end; elsewhere a line is written every 10 s. Of nested tasks
     the outermost is shown.
@@ -118,7 +125,7 @@ def task(what: str, total: int = 0) -> Iterator[Callable[[], None]]:
         done += 1
 
     def tell() -> None:
-        waited_s = QUIET_S
+        waited_s = quiet_s
         while not over.wait(waited_s):
             waited_s = TERMINAL_PERIOD_S if terminal else LOG_PERIOD_S
             count = f' {done} of {total}' if total else f' {done}' if done else ''
@@ -137,7 +144,7 @@ def task(what: str, total: int = 0) -> Iterator[Callable[[], None]]:
         over.set()
         teller.join()
         _Shown.busy = False
-        if terminal and time.monotonic() - began_s > QUIET_S:
+        if terminal and time.monotonic() - began_s > quiet_s:
             print('\r\x1b[2K', end='', file=sys.stderr, flush=True)
 
 

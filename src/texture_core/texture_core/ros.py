@@ -283,7 +283,7 @@ def run(
     """Make the node, spin it until a signal ends it, destroy it; exit with 2 and one sentence on a user's error.
 
     The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
-    threads and closes devices.
+    threads and closes devices. A node that shuts ROS down because of a user's error keeps that as `error`.
 
     Parameters
     ----------
@@ -313,8 +313,11 @@ def run(
         executor = make_executor()
         executor.add_node(node)
         _wake_on_signals(executor)
-        while rclpy.ok() and not stopped.is_set():
-            executor.spin_once(timeout_sec=1.0)
+        with contextlib.suppress(ExternalShutdownException):
+            while rclpy.ok() and not stopped.is_set():
+                executor.spin_once(timeout_sec=1.0)
+        if (error := getattr(node, 'error', None)) is not None:
+            raise error
     except ExternalShutdownException:
         pass
     except TextureError as error:

@@ -105,6 +105,75 @@ CASES: dict[tuple[str, str], tuple[Make, float, int, list[float]]] = {
 }  # fmt: skip
 
 
+HEADER = {'stamp': 'time', 'frame_id': 'string'}
+VECTOR = dict.fromkeys('xyz', 'float64')
+# Fields of the messages as their packages define them: robotiq/ros @73cb1b5, etienne-roberge/tactilesensors4,
+# kth-ros-pkg/biotac_driver, shadow-robot/sr_common, akashsharma02/xela_server_ros2, ubi-agni/tactile_toolbox,
+# ros-drivers/audio_common, and the manual of the PapillArray (its older messages have no header).
+DEFINED: dict[str, dict[str, Any]] = {
+    'robotiq_tsf/msg/Dynamic': {'data[2]': {'value': 'int16'}},
+    'robotiq_tsf/msg/StaticData': {'taxels[2]': {'values': 'uint16[28]'}},
+    'robotiq_tsf/msg/Timestamp': {'values': 'uint64[2]'},
+    'tactilesensors4/msg/Dynamic': {'value': 'int16'},
+    'tactilesensors4/msg/StaticData': {'value': 'uint16[28]'},
+    'biotac_sensors/msg/BioTacHand': {
+        'header': HEADER, 'hand_id': 'string',
+        'bt_data[]': {
+            'bt_serial': 'string', 'bt_position': 'uint16', 'tdc_data': 'uint16', 'tac_data': 'uint16',
+            'pdc_data': 'uint16', 'pac_data': 'uint16[22]', 'electrode_data': 'uint16[19]',
+        },
+    },
+    'sr_robot_msgs/msg/BiotacAll': {
+        'header': HEADER,
+        'tactiles[5]': {
+            **dict.fromkeys(('pac0', 'pac1', 'pdc', 'tac', 'tdc'), 'int16'), 'pac': 'int16[]', 'electrodes': 'int16[]',
+        },
+    },
+    'sensor_interfaces/msg/SensorState': {
+        'header': HEADER, 'tus': 'int64',
+        'pillars[]': {'id': 'int64', **dict.fromkeys(('dx', 'dy', 'dz', 'fx', 'fy', 'fz'), 'float32')},
+        **dict.fromkeys(('gfx', 'gfy', 'gfz', 'gtx', 'gty', 'gtz'), 'float32'),
+    },
+    'xela_server_ros2/msg/SensStream': {
+        'header': HEADER,
+        'sensors[]': {
+            'message': 'uint32', 'time': 'float64', 'model': 'string', 'sensor_pos': 'uint8',
+            'taxels[]': dict.fromkeys('xyz', 'uint16'), 'forces[]': dict.fromkeys('xyz', 'float32'),
+        },
+    },
+    'tactile_msgs/msg/TactileState': {'header': HEADER, 'sensors[]': {'name': 'string', 'values': 'float32[]'}},
+    'audio_common_msgs/msg/AudioDataStamped': {'header': HEADER, 'audio': {'data': 'uint8[]'}},
+    'std_msgs/msg/Float32MultiArray': {'layout': {'data_offset': 'uint32'}, 'data': 'float32[]'},
+    'sensor_msgs/msg/Imu': {'header': HEADER, 'linear_acceleration': VECTOR, 'angular_velocity': VECTOR},
+    'geometry_msgs/msg/WrenchStamped': {'header': HEADER, 'wrench': {'force': VECTOR, 'torque': VECTOR}},
+}  # fmt: skip
+
+
+def leaf(message_type: str, path: str) -> str:
+    """Return the type to which a path leads by the definition: an element's where its last step takes one."""
+    found: Any = DEFINED[message_type]
+    for step in path.split('.'):
+        name, _, index = step.rstrip(']').partition('[')
+        key = next(key for key in found if key.partition('[')[0] == name)
+        kind, _, size = (key if isinstance(found[key], dict) else found[key]).rstrip(']').partition('[')
+        assert not (index.isdigit() and size) or int(index) < int(size), path
+        found = found[key] if isinstance(found[key], dict) or not index else kind
+        assert '=' not in index or index.partition('=')[0] in found, path
+    return str(found)
+
+
+@pytest.mark.parametrize('mapping', shipped('texture_drivers', 'config/adaptors'))
+def test_each_path_leads_to_a_field_of_the_vendors_definition_of_the_right_type(mapping: str) -> None:
+    for signal in load_mapping(mapping, 1).signals.values():
+        leaves = [leaf(signal.type, path) for path in signal.values]
+        assert all(kind.startswith(('int', 'uint', 'float')) for kind in leaves)
+        sizes = [kind.rstrip(']').partition('[')[2] if '[' in kind else '1' for kind in leaves]
+        if all(sizes) and not any('*' in path for path in signal.values) and not signal.consecutive:
+            assert sum(map(int, sizes)) == len(signal.channels)
+        assert not signal.stamp or leaf(signal.type, signal.stamp) in ('time', 'float64')
+        assert not signal.number_topic or 'int' in leaf(signal.number_type, signal.number)
+
+
 def fed(adaptor: SignalAdaptor, make: Make, numbers: Any, period_ns: float) -> list[TactileSignal]:
     """Return the batches of some messages; a number follows each where the mapping has one."""
     batches = []
@@ -180,7 +249,8 @@ def test_samples_that_neither_count_nor_stamp_are_missed_by_time_half_a_second_l
 class Driver:
     """The vendor's TSF-85 driver: a sample, and behind it its stamp, in messages of their own."""
 
-    def __init__(self) -> None:
+    def __init__(self, ticks: int = 1) -> None:
+        self.ticks = ticks
         self.adaptor = SignalAdaptor('signal', load_mapping('robotiq_tsf', 1).signals['signal'])
         self.batches: list[TactileSignal] = []
         self.stamp, self.now_ns = 65_400, START_NS
@@ -193,7 +263,8 @@ class Driver:
             if 'sample' not in lose:
                 self.adaptor.take(Message(data=[Message(value=0), Message(value=value)]), self.now_ns)
             if 'stamp' not in lose:
-                self.adaptor.take_number(Message(values=[0, self.stamp % 2**16]), self.now_ns + 5000)
+                stamp = self.stamp % 2**16 if self.ticks == 1 else self.stamp * self.ticks
+                self.adaptor.take_number(Message(values=[0, stamp]), self.now_ns + 5000)
             if value % 10 == 9:
                 self.batches += self.adaptor.batches()
 
@@ -202,8 +273,9 @@ class Driver:
         return {int(v) - b.first_sample - i for b in self.batches for i, v in enumerate(b.samples[:, 0])}
 
 
-def test_a_lost_sample_leaves_a_gap_and_a_lost_number_none() -> None:
-    driver = Driver()
+@pytest.mark.parametrize('ticks', [1, 1000])  # milliseconds of 16 bits, as it was first, and microseconds of 64 bits
+def test_a_lost_sample_leaves_a_gap_and_a_lost_number_none(ticks: int) -> None:
+    driver = Driver(ticks)
     driver.run(500, at_200=(('sample',), 1), at_300=(('stamp',), 1))
     adaptor = driver.adaptor
     assert len(driver.offsets()) == 1

@@ -15,6 +15,7 @@ from texture_drivers.timing import (
     ArrivalNumbering,
     BlockCounter,
     Decimator,
+    PacketNumbering,
     RateMeter,
     SampleCounter,
     StreamClock,
@@ -322,6 +323,29 @@ def test_a_device_that_counts_from_zero_again_is_noticed() -> None:
     counter.skip(498)
     assert counter.place([0, 1])[0] == [500, 501]
     assert counter.lost == 498
+
+
+@pytest.mark.parametrize(('ticks', 'jitter'), [(1, 0), (1000, 40)])
+def test_the_stamps_themselves_show_how_many_ticks_a_sample_takes(ticks: int, jitter: int) -> None:
+    noise, counter = np.random.default_rng(0), SampleCounter(ticks=0)
+    numbers = [number for number in range(300) if not 100 <= number < 107]
+    indices: list[int] = []
+    waiting: list[int | None] = []
+    for number in numbers:
+        waiting.append(70_500 + number * ticks + int(noise.integers(-jitter, jitter + 1)))
+        placed, _ = counter.place(waiting)
+        indices, waiting = indices + placed, waiting[len(placed) :]
+    assert indices == numbers
+    assert (counter.lost, counter.damaged_stamps) == (7, 0)
+
+
+def test_what_is_less_than_a_packet_adds_up_over_many_interruptions() -> None:
+    numbering, start_ns = PacketNumbering(100.0), 0
+    for _ in range(101):
+        numbering.interrupt()
+        numbering.place(0, 5, start_ns)
+        start_ns += 53 * SECOND // 1000  # five packets, and three tenths of one that is lost
+    assert numbering.lost == pytest.approx(30, abs=1)
 
 
 def test_a_device_that_samples_a_trifle_too_fast_loses_nothing() -> None:

@@ -113,7 +113,7 @@ class Feeder:
         self.signal: list[TactileSignal] = []
         self.static: list[TactileSignal] = []
         self.others: dict[str, list[TactileSignal]] = {}
-        self.stamp_ms = 5000
+        self.stamp_ms, self.ticks = 5000, 1
 
     def run(
         self, milliseconds: int, missing: tuple[int, ...] = (), image: list[int] | None = None, more: bytes = b''
@@ -122,7 +122,7 @@ class Feeder:
             said = 0
             for ms in range(first, min(first + 10, milliseconds)):
                 if ms not in missing:
-                    said += self.wire.say(self.stamp_ms, ms % 1000, image, more)
+                    said += self.wire.say(self.stamp_ms * self.ticks, ms % 1000, image, more)
                 self.stamp_ms += 1
                 self.clock.now_ns += NANOSECONDS // 1000
             self.wire.wait_until_there(said)
@@ -154,7 +154,9 @@ def test_it_starts_the_stream_on_opening_and_stops_it_on_closing(wire: Wire, sen
     assert wire.heard() == bytes.fromhex('9A 00 58 01 00')
 
 
-def test_samples_come_out_in_order_contiguous_and_stamped_by_the_device(feeder: Feeder) -> None:
+@pytest.mark.parametrize('ticks', [1, 1000])
+def test_samples_come_out_in_order_contiguous_and_stamped_by_the_device(feeder: Feeder, ticks: int) -> None:
+    feeder.ticks = ticks
     feeder.run(400)
     numbers = indices(feeder.signal)
     assert numbers == list(range(numbers[0], numbers[-1] + 1))

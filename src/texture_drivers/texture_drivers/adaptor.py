@@ -238,7 +238,7 @@ class SignalAdaptor:
         rate_hz = self.rate_hz or 1.0
         self._numbering = ArrivalNumbering(rate_hz, block_s=max(SHORTEST_BLOCK_S, 1 / rate_hz))
         self._clock = StreamClock(rate_hz) if self._stamp and not self._number else self._numbering.clock
-        self._counter = SampleCounter()
+        self._counter = SampleCounter(ticks=0)
         self._next_index, self._end_ns = 0, 0
 
     def _read(self, message: Any, sent_ns: int) -> Sample:

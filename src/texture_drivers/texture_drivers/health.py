@@ -105,6 +105,8 @@ MOST_KEPT_S = 5.0  # of samples between two reviews
 
 
 NAMED = 3  # channels in a sentence
+# Of an unloaded channel, in standard deviations of its noise: farther off is a drift.
+DRIFT_LIMIT = 10.0
 DRIFT_REVIEWS = 3  # so many in a row show a drift: one may be a touch
 
 
@@ -131,13 +133,6 @@ class TareParams:
         False,
         'Tares by itself while no exploration touches anything, at the start and whenever the level has drifted; it '
         "needs the topic 'exploration'.",
-    )
-    drift_limit: float = param(
-        10.0,
-        'Drift of an unloaded channel, in standard deviations of its noise, from which on it is reported; a '
-        'larger value reports less.',
-        low=1.0,
-        high=1e6,
     )
 
 
@@ -177,7 +172,7 @@ class StreamWatch:
             self.baseline, self.drifted, self.drift, self._drifts = found, False, 0.0, 0
         return found is not None
 
-    def review(self, elapsed_s: float, unloaded: bool | None, drift_limit: float) -> list[str]:
+    def review(self, elapsed_s: float, unloaded: bool | None) -> list[str]:
         """Return sentences on what is wrong with the samples since the last review."""
         batches, self._batches = self._batches, []
         if not batches or len({batch.channels for batch in batches}) > 1:
@@ -189,7 +184,7 @@ class StreamWatch:
             faults += _named(saturated(samples, *self._limits), channels, 'is saturated: less force, or another gain')
         faults += _named(self._dead(samples, elapsed_s), channels, 'is dead: it does not change; check its wiring')
         if unloaded and self.baseline is not None:
-            faults += self._drift_faults(samples, channels, drift_limit)
+            faults += self._drift_faults(samples, channels)
         return faults
 
     def _dead(self, samples: NDArray[np.float32], elapsed_s: float) -> Flags:
@@ -203,15 +198,15 @@ class StreamWatch:
         still: Flags = self._still_s >= DEAD_S
         return invalid | (still & (2 * still.sum() < len(still)))
 
-    def _drift_faults(self, samples: NDArray[np.float32], channels: Sequence[str], limit: float) -> list[str]:
+    def _drift_faults(self, samples: NDArray[np.float32], channels: Sequence[str]) -> list[str]:
         assert self.baseline is not None
         drifts = self.baseline.drift(np.nanmean(samples, axis=0))
         self.drift = float(np.nanmax(drifts))
-        self._drifts = self._drifts + 1 if self.drift > limit else 0
+        self._drifts = self._drifts + 1 if self.drift > DRIFT_LIMIT else 0
         self.drifted = self._drifts >= DRIFT_REVIEWS
         if not self.drifted:
             return []
-        return _named(drifts > limit, channels, 'has drifted off its baseline; tare again without load')
+        return _named(drifts > DRIFT_LIMIT, channels, 'has drifted off its baseline; tare again without load')
 
 
 def _named(found: Flags, channels: Sequence[str], what: str) -> list[str]:
@@ -290,7 +285,7 @@ class ChannelWatch:
         with self._lock:
             faults = [self.refusal] if self.refusal else []
             for topic, stream in self._streams.items():
-                found = stream.review(elapsed_s, self.unloaded, self._params.drift_limit)
+                found = stream.review(elapsed_s, self.unloaded)
                 faults += [f'{topic}: {sentence}' for sentence in found]
             return faults, self._numbers()
 

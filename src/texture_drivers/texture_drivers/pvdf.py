@@ -49,30 +49,14 @@ class PvdfSettings:
     """Parameters of the PVDF film, its amplifier and the force sensor."""
 
     baud: int = baud_param(BAUD)
-    film_rate_hz: float = param(
-        FILM_RATE_HZ,
-        'Nominal sampling rate of the film; it must equal that of the device.',
-        unit='Hz',
-        low=1.0,
-        high=1e5,
-    )
-    force_rate_hz: float = param(
-        FORCE_RATE_HZ,
-        'Nominal sampling rate of the force sensor; it must equal that of the device.',
-        unit='Hz',
-        low=0.1,
-        high=1e4,
-    )
     film_gain_pc: float = param(
         FILM_PC_PER_COUNT, 'Charge of one count of the film; larger values give larger samples.', unit='pC'
     )
-    film_offset_pc: float = param(0.0, 'Charge of the film at 0 counts, which is added to every sample.', unit='pC')
     force_gain_n: float = param(
         FORCE_N_PER_COUNT,
         'Force of one count of the force sensor; larger values give larger samples.',
         unit='N',
     )
-    force_offset_n: float = param(0.0, 'Force at 0 counts, which is added to every sample.', unit='N')
 
     def streams(self) -> list[FramedStream]:
         """Return what the device sends, as the line understands it."""
@@ -81,21 +65,21 @@ class PvdfSettings:
                 topic=FILM_TOPIC,
                 kind=FILM_KIND,
                 sensor=FILM_SENSOR,
-                rate_hz=self.film_rate_hz,
+                rate_hz=FILM_RATE_HZ,
                 channels=FILM_CHANNELS,
                 units=('pC',),
                 gains=np.array([self.film_gain_pc]),
-                offsets=np.array([self.film_offset_pc]),
+                offsets=np.zeros(1),
             ),
             FramedStream(
                 topic=FORCE_TOPIC,
                 kind=FORCE_KIND,
                 sensor=FORCE_SENSOR,
-                rate_hz=self.force_rate_hz,
+                rate_hz=FORCE_RATE_HZ,
                 channels=FORCE_CHANNELS,
                 units=('N',),
                 gains=np.array([self.force_gain_n]),
-                offsets=np.array([self.force_offset_n]),
+                offsets=np.zeros(1),
             ),
         ]
 

@@ -21,17 +21,9 @@ from texture_core.types import Sensor, TactileSignal
 
 
 @dataclass(frozen=True)
-class SensorParams:
-    """Where the sensor is and how its samples are delivered."""
+class BatchParams:
+    """How the samples of a finger are delivered."""
 
-    device: str = param(
-        '/dev/rq_tsf85_0',
-        "Path of the device; a symbolic link is followed at each opening. 'auto' finds the only TSF-85 on USB.",
-    )
-    config: str = param(
-        '',
-        "Settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults.",
-    )
     frame_id: str = param(
         'fingertip',
         'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
@@ -43,13 +35,20 @@ class SensorParams:
         low=0.001,
         high=0.1,
     )
-    finger: int = param(0, 'Index of the finger that is read; 0 is the first one of the device.', low=0, high=4)
-    static_rate_hz: float = param(
-        0.0,
-        'Rate at which taxel images are published; 0 takes the default of the sensor.',
-        unit='Hz',
-        low=0.0,
-        high=1000.0,
+    finger: int = param(0, 'Index of the finger that is read; 0 is the first one.', low=0, high=15)
+
+
+@dataclass(frozen=True)
+class SensorParams(BatchParams):
+    """Where the sensor is and how its samples are delivered."""
+
+    device: str = param(
+        '/dev/rq_tsf85_0',
+        "Path of the device; a symbolic link is followed at each opening. 'auto' finds the only TSF-85 on USB.",
+    )
+    config: str = param(
+        '',
+        "Settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults.",
     )
 
 

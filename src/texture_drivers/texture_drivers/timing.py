@@ -256,6 +256,8 @@ def _slope(remaining: Arrival, right: Arrival) -> float:
 # Give every sample its running index, so that a jump of the index is exactly what was lost.
 
 SHORT_COUNTER = 1 << 16
+TICK_STAMPS = 4  # show how many ticks a sample takes
+MICROSECOND_TICKS = 1000  # a sample at 1 kHz, where a stamp counts microseconds
 
 
 class StampStatus(enum.Enum):
@@ -268,17 +270,18 @@ class StampStatus(enum.Enum):
 
 
 class SampleCounter:
-    """Count samples through the device's own stamps, one tick a sample.
+    """Count samples through the device's own stamps, `ticks` of them a sample; 0 measures by the first four stamps.
 
     A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
     not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
     trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
     """
 
-    def __init__(self, longest_gap: int = 2000) -> None:
+    def __init__(self, longest_gap: int = 2000, ticks: int = 1) -> None:
         self.next_index = 0
         self.lost = 0
         self.damaged_stamps = 0
+        self.ticks = ticks
         self._longest_gap = longest_gap
         self._last: int | None = None
         self._early = 0
@@ -296,6 +299,8 @@ class SampleCounter:
     def place(self, stamps: Sequence[int | None]) -> tuple[list[int], bool]:
         """Return the index of each stamp's sample as far as decided, and whether the device restarted after those."""
         indices: list[int] = []
+        if not self.ticks and not self._measure([stamp for stamp in stamps if stamp is not None]):
+            return indices, False
         for position, stamp in enumerate(stamps):
             status = self._classify(stamp, stamps[position + 1 : position + 2])
             if status in (StampStatus.RESTARTED, StampStatus.PENDING):
@@ -304,20 +309,27 @@ class SampleCounter:
             indices.append(self._take(stamp if status is StampStatus.GOOD else None))
         return indices, False
 
+    def _measure(self, stamps: Sequence[int]) -> bool:
+        """Return whether samples can be counted: without stamps, or once their ticks are known."""
+        if len(stamps) >= TICK_STAMPS:
+            step = float(np.median(np.diff(stamps)))
+            self.ticks = MICROSECOND_TICKS if abs(step / MICROSECOND_TICKS - 1) < 0.5 else 1
+        return bool(self.ticks) or not stamps
+
     def _classify(self, stamp: int | None, following: Sequence[int | None]) -> StampStatus:
-        step = _ticks(self._last, stamp)
+        step = self._step(self._last, stamp)
         if step in (0, 1):
             return StampStatus.GOOD
         if not following:
             return StampStatus.PENDING
-        onward = _ticks(stamp, following[0])
+        onward = self._step(stamp, following[0])
         if 1 < step <= self._longest_gap:
             return StampStatus.GOOD if 1 <= onward <= self._longest_gap else StampStatus.DAMAGED
         return StampStatus.RESTARTED if onward == 1 else StampStatus.DAMAGED
 
     def _take(self, stamp: int | None) -> int:
         """Return the index of the next sample; without a stamp it follows directly."""
-        step = _ticks(self._last, stamp)
+        step = self._step(self._last, stamp)
         if step == 0:
             self._early = 1
         skipped = max(0, step - 1)
@@ -326,17 +338,17 @@ class SampleCounter:
         self.lost += skipped - compensated
         index = self.next_index + skipped - compensated
         self.next_index = index + 1
-        self._last = stamp if stamp is not None or self._last is None else self._last + 1
+        self._last = stamp if stamp is not None or self._last is None else self._last + (self.ticks or 1)
         return index
 
-
-def _ticks(last: int | None, stamp: int | None) -> int:
-    """Return how many ticks a stamp lies after another, 1 if either is unknown."""
-    if last is None or stamp is None:
-        return 1
-    ticks = stamp - last
-    wrapped = last < SHORT_COUNTER and ticks < -SHORT_COUNTER // 2
-    return ticks + SHORT_COUNTER if wrapped else ticks
+    def _step(self, last: int | None, stamp: int | None) -> int:
+        """Return how many samples a stamp lies after another, 1 if either is unknown."""
+        if last is None or stamp is None:
+            return 1
+        ticks = stamp - last
+        if last < SHORT_COUNTER and ticks < -SHORT_COUNTER // 2:  # 16 bits have wrapped
+            ticks += SHORT_COUNTER
+        return round(ticks / (self.ticks or 1))
 
 
 # --------------------
@@ -344,7 +356,11 @@ def _ticks(last: int | None, stamp: int | None) -> int:
 
 
 class PacketNumbering:
-    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed."""
+    """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
+
+    A stream that begins again need not begin on the beat of packets: what is less than a packet is carried on to the
+    next interruption, so that many of them do not add up to a loss that nobody counts.
+    """
 
     def __init__(self, rate_hz: float) -> None:
         self.lost = 0
@@ -352,6 +368,7 @@ class PacketNumbering:
         self._next_index = 0
         self._next_ns: int | None = None  # when the next packet should start
         self._next_number: int | None = None  # none after an interruption
+        self._carried = 0.0  # packets lost in interruptions and not counted yet; below 0: counted too many
 
     def interrupt(self) -> None:
         """Forget the device's numbers: they begin again."""
@@ -363,7 +380,9 @@ class PacketNumbering:
         if self._next_number is not None:
             skipped = number - self._next_number
         elif self._next_ns is not None:
-            skipped = max(0, round((start_ns - self._next_ns) / NANOSECONDS * self._rate_hz))
+            missing = self._carried + max(0.0, (start_ns - self._next_ns) / NANOSECONDS * self._rate_hz)
+            skipped = round(missing)
+            self._carried = missing - skipped
         self.lost += skipped
         index = self._next_index + skipped
         self._next_index = index + count

@@ -52,10 +52,12 @@ ITEMS: Mapping[int, Struct] = {
     TEMPERATURE: Struct('>h'),
 }
 # Firmware up to 1.0.6 sends 16 bits, from 1.1.7 on 64 bits; the packet does not say which. The short one is tried
-# first: it never fits a long stamp, whose third byte, taken as the next item, is 0 and no type (until the year 34).
+# first: it never fits a long stamp, whose third byte, taken as the next item, is below 0x10 and no type (for 200 days
+# of microseconds). The vendor's sources called the long one milliseconds (robotiq/ros @2347d23) and since call it
+# microseconds (@73cb1b5); so the stamps themselves decide.
 TIMESTAMPS = (Struct('>H'), Struct('>Q'))
 
-RATE_HZ = 1000.0  # of the dynamic channel; the device's stamps are milliseconds
+RATE_HZ = 1000.0  # of the dynamic channel; the device stamps each sample with its milliseconds, or microseconds
 DYNAMIC_SENSOR, STATIC_SENSOR, MOTION_SENSOR = 'tsf85/dynamic', 'tsf85/static', 'tsf85/imu'
 DYNAMIC_CHANNELS = ('dynamic',)
 UNIT = 'count'
@@ -213,7 +215,7 @@ UNKNOWN = (float('nan'),) * 3
 class SampleFrame(NamedTuple):
     """One millisecond of one finger: the dynamic value, the taxel image if one came with it, the inertial values."""
 
-    stamp_ms: int | None
+    stamp: int | None
     dynamic: int
     image: tuple[int, ...] | None = None
     motion: tuple[float, ...] = ()
@@ -341,14 +343,12 @@ SIGNAL, BATCH_STATIC, IMU = 'signal', 'signal_static', 'signal_imu'
 class BatchCutter:
     """Batch numbered sample frames: a new batch wherever the index jumps, and taxel images at a constant rate."""
 
-    def __init__(
-        self, layout: Tsf85Layout, settings: Tsf85Settings, static_rate_hz: float, frame_id: str, clock: StreamClock
-    ) -> None:
+    def __init__(self, layout: Tsf85Layout, settings: Tsf85Settings, frame_id: str, clock: StreamClock) -> None:
         self.samples = 0
         self.lost = 0
         self.images = 0
         self.repeated_images = 0  # published although no other image had come since the tick before
-        self.static_rate_hz = static_rate_hz
+        self.static_rate_hz = static_rate_hz = layout.static_rate_hz
         self._clock = clock
         self._motion_gains: Array = settings.gains
         signal = partial(TactileSignal, frame_id=frame_id)
@@ -432,17 +432,12 @@ class FingerStream:
     """
 
     def __init__(
-        self,
-        layout: Tsf85Layout = TSF85,
-        settings: Tsf85Settings | None = None,
-        static_rate_hz: float = 0.0,
-        frame_id: str = '',
+        self, layout: Tsf85Layout = TSF85, settings: Tsf85Settings = Tsf85Settings(), frame_id: str = ''
     ) -> None:
-        settings = Tsf85Settings() if settings is None else settings
-        self.counter = SampleCounter()
+        self.counter = SampleCounter(ticks=0)
         self._numbering = ArrivalNumbering(RATE_HZ, block_s=SHORTEST_LOSS_S / BLOCKS_LATE)
         self.clock = self._numbering.clock
-        self.cutter = BatchCutter(layout, settings, static_rate_hz or layout.static_rate_hz, frame_id, self.clock)
+        self.cutter = BatchCutter(layout, settings, frame_id, self.clock)
         self._waiting: list[SampleFrame] = []
 
     @property
@@ -462,11 +457,11 @@ class FingerStream:
         if not frames:
             return {}
         waiting = [*self._waiting, *frames]
-        indices, restarted = self.counter.place([item.stamp_ms for item in waiting])
+        indices, restarted = self.counter.place([item.stamp for item in waiting])
         placed, self._waiting = waiting[: len(indices)], waiting[len(indices) :]
         skipped = 0
         if indices:
-            counted = any(item.stamp_ms is not None for item in placed)
+            counted = any(item.stamp is not None for item in placed)
             skipped = self._numbering.missing(indices[-1], arrival_ns, counted=counted)
             self.counter.skip(skipped)
         if restarted:
@@ -490,9 +485,7 @@ class Tsf85Decoder(Decoder):
         self._prefixes = prefixes
         self._parser = Tsf85Parser(layout)
         self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in prefixes}
-        self._fingers = {
-            finger: FingerStream(layout, settings, params.static_rate_hz, params.frame_id) for finger in prefixes
-        }
+        self._fingers = {finger: FingerStream(layout, settings, params.frame_id) for finger in prefixes}
         self._last_packet: Packet | None = None
         self._frames = self._repeated = 0
 

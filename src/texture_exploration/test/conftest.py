@@ -12,16 +12,16 @@ from texture_core.types import ExplorationRequest
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.simulated import PLANE, SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.tool_state import ForceSample, PoseSample, RosControllersParams
-from texture_exploration.explorer import Exploration, Explorer, no_signal_watch
+from texture_exploration.exploration import Exploration, no_signal_watch
+from texture_exploration.explorer import Explorer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 # The pure tests run where there is no ROS.
 ROS_TESTS = [
     'test_explorer_node.py',
-    'test_explore_preset.py',
     'test_interrupted_controller.py',
     'test_ros_controllers_hand_over.py',
     'test_ros_controllers_process.py',

@@ -9,7 +9,7 @@ import pytest
 
 from texture_core.types import NANOSECONDS, ExplorationRequest, Phase, TactileSignal
 from texture_exploration.arms.simulated import SimulatedArmParams, SurfaceShape
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)

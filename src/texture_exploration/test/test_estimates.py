@@ -8,11 +8,11 @@ import pytest
 
 from texture_core.errors import ExplorationError
 from texture_core.types import Rejection, RoughnessEstimate, TextureEstimate
-from texture_exploration.explorer import (
+from texture_exploration.exploration import (
     STILL_MOVING,
-    EarlyStoppingParams,
     ExplorationEstimates,
     ExplorationOutcome,
+    may_stop,
     new_id,
 )
 
@@ -46,13 +46,11 @@ def texture(**values):
     )
 
 
-def test_a_known_texture_that_is_decided_ends_the_slide_if_it_is_confident_enough():
-    params = EarlyStoppingParams(min_confidence=0.9)
-    assert params.may_stop(texture(confidence=0.95, decided=True))
-    assert not params.may_stop(texture(confidence=0.95))
-    assert not params.may_stop(texture(confidence=0.85, decided=True))
-    assert not params.may_stop(texture(confidence=0.95, decided=True, rejection=Rejection.NOVEL))
-    assert not params.may_stop(texture(decided=True))  # confidence unknown
+def test_a_known_texture_that_is_decided_ends_the_slide():
+    assert may_stop(texture(confidence=0.95, decided=True))
+    assert not may_stop(texture(confidence=0.95))
+    assert not may_stop(texture(confidence=0.95, decided=True, rejection=Rejection.NOVEL))
+    assert not may_stop(texture(decided=True))  # confidence unknown
 
 
 def test_the_final_estimate_ends_the_waiting():

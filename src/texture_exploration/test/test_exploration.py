@@ -8,8 +8,9 @@ import pytest
 from texture_core.errors import ExplorationError
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArmParams, SurfaceShape
-from texture_exploration.safety import SafetyLimits, SignalWatch
-from texture_exploration.stages import TouchParams
+from texture_exploration.guards import SignalWatch
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.touch import TouchParams
 
 MOVING = (Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT)
 
@@ -24,8 +25,9 @@ def test_a_stop_in_any_phase_lifts_the_finger_and_says_aborted(table, phase):
     assert table.arm.state().position[2] == pytest.approx(table.home[2], abs=0.001)
 
 
-def test_a_lift_that_fails_after_a_stop_is_reported_beside_the_stop(make_table):
-    table = make_table(touch=TouchParams(lift_speed_m_s=0.001), limits=SafetyLimits(lift_timeout_s=0.5))
+def test_a_lift_that_fails_after_a_stop_is_reported_beside_the_stop(table, monkeypatch):
+    monkeypatch.setattr(TouchParams, 'lift_speed_m_s', 0.001)
+    monkeypatch.setattr(SafetyLimits, 'lift_timeout_s', 0.5)
     table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
     outcome = table.explore()
     assert not outcome.success
@@ -139,8 +141,9 @@ def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(t
     assert (end.stamp_ns - begin.stamp_ns) * 1e-9 < 0.15
 
 
-def test_a_force_that_never_settles_aborts_with_what_was_waited_for(make_table):
-    table = make_table(limits=SafetyLimits(contact_timeout_s=0.5), arm=SimulatedArmParams(admittance_m_s_n=1e-4))
+def test_a_force_that_never_settles_aborts_with_what_was_waited_for(make_table, monkeypatch):
+    monkeypatch.setattr(SafetyLimits, 'contact_timeout_s', 0.5)
+    table = make_table(SimulatedArmParams(admittance_m_s_n=1e-4))
     outcome = table.explore(ExplorationRequest('linear_slide', force_n=3.0))
     assert outcome.error is ExplorationError.MOTION_FAILED
     assert outcome.message.startswith('waited 0.5 s for the force to settle at 3 N; the force is')

@@ -10,7 +10,7 @@ from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits, SurfacePatch
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 QUICK = ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.02)
 SLOW = ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1)

@@ -207,7 +207,7 @@ def test_a_parameter_that_only_counts_at_the_start_is_read_only(world):
     [outcome] = world.explorer.set_parameters([Parameter('arm', value='ur')])
     assert not outcome.successful
     assert world.explorer.get_parameter('arm').value == 'simulated'
-    [outcome] = world.explorer.set_parameters([Parameter('settle_s', value=0.2)])
+    [outcome] = world.explorer.set_parameters([Parameter('approach_travel_m', value=0.04)])
     assert outcome.successful, outcome.reason
 
 

@@ -22,7 +22,7 @@ from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, leap_hand
 from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
@@ -190,7 +190,7 @@ import sys
 from texture_core.types import ExplorationRequest
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.explorer import Explorer
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])

@@ -17,7 +17,7 @@ from texture_exploration.force_control import (
     LoopModel,
     spectral_radius,
 )
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 PERIOD_S = 0.004
 

@@ -9,8 +9,9 @@ import pytest
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams, SurfaceShape
-from texture_exploration.safety import ForceWatch, SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.guards import ForceWatch
+from texture_exploration.safety import SafetyLimits
+from texture_exploration.touch import TouchParams
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
 ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n_m=20000.0)

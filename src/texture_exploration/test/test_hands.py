@@ -12,7 +12,6 @@ import struct
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,17 +22,12 @@ from texture_core.config import find_file, load_yaml
 from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, UnknownName
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand
-from texture_exploration.arms.dynamixel import (
-    DynamixelBus,
-    DynamixelFinger,
-    DynamixelHand,
-    MotorState,
-)
+from texture_exploration.arms.dynamixel import DynamixelBus, DynamixelFinger, DynamixelHand, MotorState
 from texture_exploration.arms.hand import SimulatedHand, load_profile, read_profile
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.safety import CommandLimits, SafetyLimits
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.dynamixel import (
     GOAL_CURRENT,
     GOAL_POSITION,
@@ -407,8 +401,9 @@ def test_a_simulated_hand_has_nothing_to_reboot():
         InHandArm().reboot()
 
 
-def test_the_limits_of_a_hand_are_its_parameters():
-    arm = InHandArm(replace(InHandParams(), command_force_n=0.5))
+def test_a_hand_keeps_the_limits_of_commands(monkeypatch):
+    monkeypatch.setattr(CommandLimits, 'command_force_n', 0.5)
+    arm = InHandArm()
     with pytest.raises(CommandRefused, match=r'the force is 2 N; allowed is 0 to 0\.5 N'):
         arm.connect()
 

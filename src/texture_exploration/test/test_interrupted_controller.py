@@ -12,7 +12,7 @@ from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.tool_state import RosControllersParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

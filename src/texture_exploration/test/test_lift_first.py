@@ -8,9 +8,10 @@ import pytest
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
+from texture_exploration.lift_first import CalmDown, WrongWay
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import CalmDown, TouchParams, WrongWay
+from texture_exploration.touch import TouchParams
 
 TOUCH = TouchParams()
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.03)

@@ -15,17 +15,15 @@ from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.motions import (
     DEFAULTS,
     MOTIONS,
-    CircularPath,
-    StraightPath,
     circular,
     cross_slide,
     in_hand_random,
     in_hand_sliding,
     linear_slide,
-    random_strokes,
 )
+from texture_exploration.paths import CircularPath, PathFollower, StraightPath, ramp_s, ramps_m, random_strokes, smooth
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import PathFollower, TouchParams, ramp_s, ramps_m, smooth
+from texture_exploration.touch import TouchParams
 
 LIMITS = SafetyLimits()
 ORDER = [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.DONE]

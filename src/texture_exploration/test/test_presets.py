@@ -1,15 +1,18 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import math
+from dataclasses import replace
 
 import pytest
 
 from texture_core.config import shipped
 from texture_core.errors import InvalidParameter, UnknownName
+from texture_exploration.arms.tool_state import RosControllersParams
+from texture_exploration.lift_first import UNKNOWN_STATE
 from texture_exploration.motions import MOTIONS
 from texture_exploration.presets import load_preset, read_preset
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 # A slide is longer than the recording of its paper by so much: an arm that answers late still covers all of that.
 LATE_S = 0.05
@@ -21,7 +24,8 @@ def test_every_motion_of_a_preset_can_be_planned_with_all_defaults(name):
     preset = load_preset(name)
     assert preset.paper
     for request in preset.requests:
-        MOTIONS[request.motion](request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+        motion = MOTIONS[request.motion](request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+        motion.refuse_too_fast(request.motion, replace(UNKNOWN_STATE, delay_s=RosControllersParams().loop_delay_s))
 
 
 def test_the_first_paper_slid_at_three_speeds_and_three_forces_half_a_second_each():

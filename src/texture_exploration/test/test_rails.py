@@ -17,7 +17,7 @@ from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.fingers import ByteFaults
 from texture_simulation.devices.rails import EmulatedRails
 

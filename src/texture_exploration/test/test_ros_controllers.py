@@ -16,10 +16,11 @@ from texture_exploration.arms.arm import ArmCommand
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.tool_state import GRAVITY_M_S2, FollowWatch, ForceSample, PoseSample, ToolState
 from texture_exploration.arms.tool_state import RosControllersParams as Params
-from texture_exploration.explorer import Exploration, Explorer
+from texture_exploration.exploration import Exploration
+from texture_exploration.explorer import Explorer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
 PERIOD_NS = 4_000_000
@@ -918,7 +919,12 @@ SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance
 TRAVEL_M = 0.06
 LIES = {
     'a wall in the slide': (WALL, {}, 45.0, 'along the surface'),
-    'a wall in a fast slide': (WALL, {'speed_m_s': 0.1}, 75.0, 'along the surface'),
+    'a wall stiffer than declared in a fast slide': (
+        WALL,
+        {'speed_m_s': 0.1, 'declared_n_m': 2000.0},
+        75.0,
+        'along the surface',
+    ),
     'a wall on the way to the start': (WALL, {'travel': True}, 45.0, 'the finger met something'),
     'an inverted twist': ({'invert_twist': True}, {}, 5.0, 'the arm moved by'),
     'an inverted twist in contact': ({'invert_twist': True, 'start_height_m': 0.0}, {}, 15.0, 'the arm moved by'),
@@ -957,7 +963,7 @@ def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffn
     if given.get('travel'):
         home = (WALL['wall_m'] + 0.02, 0.0, home[2])
     request = replace(SLIDE, speed_m_s=given.get('speed_m_s', SLIDE.speed_m_s))
-    touch = TouchParams(approach_stiffness_n_m=stiffness_n_m)
+    touch = TouchParams(approach_stiffness_n_m=given.get('declared_n_m', stiffness_n_m))
     outcome, _ = robot.explore(request, touch, home=home)
     peak_n, end_n = max(robot.pressed_n), robot.pressed_n[-1]
     above_s = longest_above(robot.pressed_n, LIMITS.force_limit_n) * PERIOD_NS * 1e-9

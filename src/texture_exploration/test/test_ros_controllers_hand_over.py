@@ -102,8 +102,18 @@ def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, m
         client = graph.peer.create_client(srv.Explore, 'explore')
         graph.until(client.service_is_ready)
         request = ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.1)
-        client.call_async(srv.Explore.Request(request=to_msg(request)))
-        graph.until(lambda: any(state.phase == Phase.SLIDE.code for state in states))
+        answers = []
+
+        def slides():
+            """Ask again for what a busy machine ended by name: nobody else would ever see it slide."""
+            if not answers or answers[-1].done():
+                for answer in answers[-1:]:
+                    result = answer.result().result
+                    assert result.error_code not in (result.ERROR_NONE, result.ERROR_INTERNAL), result.message
+                answers.append(client.call_async(srv.Explore.Request(request=to_msg(request))))
+            return states and states[-1].phase == Phase.SLIDE.code
+
+        graph.until(slides)
         end(graph, explorer)
         taken, given_back = map(json.loads, log.read_text().splitlines())
     assert (taken['activated'], taken['deactivated']) == (['twist'], ['joints'])

@@ -11,7 +11,8 @@ from texture_core.errors import MotionAborted
 from texture_core.types import ExplorationRequest, Phase, TactileSignal
 from texture_exploration.arms.arm import ArmState
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.stages import SlideWatch, StallWatch, TouchParams
+from texture_exploration.touch import TouchParams
+from texture_exploration.watches import SlideWatch, StallWatch
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 
 SPEED_M_S = 0.02
@@ -35,6 +36,16 @@ def test_a_finger_that_stands_still_counts_as_stalled_once_three_quarters_of_the
     assert watched(lambda s: SPEED_M_S * min(s, 1.0), 3.0) == pytest.approx(
         1.0 + 0.75 * TouchParams().stall_s, abs=0.02
     )
+
+
+@pytest.mark.parametrize('ahead_s', [0.05, -0.05])
+def test_stamps_that_jump_by_50_ms_in_a_slide_are_no_speed(ahead_s):
+    watch = SlideWatch(SPEED_M_S, 1.0, TouchParams())
+    for number in range(100):
+        now_s = number * STEP_S
+        stamp_s = 1.0 + now_s + ahead_s * (now_s > 0.5)
+        watch.update(ArmState(round(stamp_s * 1e9), (SPEED_M_S * now_s, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0), True)
+    assert watch.flaw() == ''
 
 
 @pytest.mark.parametrize(('share', 'stalls'), [(0.3, False), (0.2, True), (-1.0, True)])

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from texture_core.types import ExplorationRequest, Phase
-from texture_exploration import force_control, safety, stages
+from texture_exploration import force_control, guards, lift_first, safety, stages, touch, watches
 from texture_exploration.arms.arm import STANDSTILL
 from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.motion import STATES, state_table
 from texture_exploration.motions import MOTIONS
-from texture_exploration.stages import LIMITS, STATES, limit_table, state_table
+from texture_exploration.safety import LIMITS, limit_table
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'motion.md'
 
@@ -57,14 +58,14 @@ def test_each_state_commands_what_its_row_says(make_table, monkeypatch, name):
 
     monkeypatch.setattr(stages.Stage, 'timed_step', noted)
     table.explore(ExplorationRequest('linear_slide', distance_m=0.02))
-    assert {state for state, _ in seen} >= {stages.Rise, stages.CalmDown, stages.LiftStage}
+    assert {state for state, _ in seen} >= {lift_first.Rise, lift_first.CalmDown, stages.LiftStage}
     assert [(state.__name__, said) for state, said in seen if said not in state.commands] == []
     assert {state for state, _ in seen} <= set(STATES)
 
 
 def test_every_limit_of_the_table_is_a_name_of_the_code():
-    known = {*vars(safety), *vars(stages), *vars(force_control)}
-    for given in (safety.SafetyLimits, safety.CommandLimits, safety.SignalWatchParams, stages.TouchParams):
+    known = {name for module in (force_control, lift_first, safety, touch, watches) for name in vars(module)}
+    for given in (safety.SafetyLimits, safety.CommandLimits, guards.SignalWatchParams, touch.TouchParams):
         known |= {*vars(given), *given.__dataclass_fields__}
     for row in LIMITS:
         names = row.name.replace(', …', '').replace(' to ', ', ').split(', ')
@@ -76,9 +77,9 @@ DECLARED = {
     'friction_limit': (safety.SafetyLimits().friction_limit, '2 × normal + 1 N'),
     'state_timeout_s': (safety.SafetyLimits().state_timeout_s, '0.13 s'),
     'frozen_force_s': (safety.SafetyLimits().frozen_force_s, '0.06 s'),
-    'lost_contact_s': (stages.TouchParams().lost_contact_s, '0.1 s'),
-    'stall_s': (stages.TouchParams().stall_s, '25 % in 0.25 s'),
-    'signal_timeout_s': (safety.SignalWatchParams().signal_timeout_s, '0.5 s'),
+    'lost_contact_s': (touch.TouchParams().lost_contact_s, '0.1 s'),
+    'stall_s': (touch.TouchParams().stall_s, '25 % in 0.25 s'),
+    'signal_timeout_s': (guards.SignalWatchParams().signal_timeout_s, '0.5 s'),
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.types import rotation_matrix
 from texture_exploration.arms.arm import SurfaceFrame
-from texture_exploration.explorer import SurfaceTouches, fit_surface
+from texture_exploration.surface import SurfaceTouches, fit_surface
 
 UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 CORNERS = [(0.3, 0.0, 0.1), (0.4, 0.0, 0.1), (0.35, 0.08, 0.1)]

@@ -38,10 +38,11 @@ from texture_exploration.arms.ur import (
     UrArmParams,
     _ask,
 )
-from texture_exploration.explorer import Exploration, Explorer, Pacer
+from texture_exploration.exploration import Exploration
+from texture_exploration.explorer import Explorer, Pacer
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import REACTION_S, TouchParams
+from texture_exploration.touch import REACTION_S, TouchParams
 from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 pytestmark = [
@@ -275,15 +276,11 @@ def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(
     keep(arm, SLIDING, emulator.moves)
 
 
-def test_connecting_releases_a_protective_stop_only_if_it_is_reported_to(arm, emulator):
+def test_connecting_releases_no_protective_stop(arm, emulator):
     emulator.controller.ask('emulate protective stop')
     arm.close()
     with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find out why'):
         arm.connect()
-    willing = UrArm(UrArmParams(ip=emulator.ip, unlock_protective_stop=True))
-    willing.connect()
-    assert faulty(willing) == ''
-    willing.close()
 
 
 def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, emulator, record_property):

@@ -23,7 +23,7 @@ from texture_exploration.arms.ur import (
 from texture_exploration.arms.ur_worker import UrCommandStream, Watchdog
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 from texture_simulation.devices import ur
 
 PARAMS = UrArmParams(surface_x_m=0.0, surface_z_m=0.0)

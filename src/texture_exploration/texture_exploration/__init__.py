@@ -10,7 +10,7 @@ from texture_core.types import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.explorer import Explorer
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.stages import TouchParams
+from texture_exploration.touch import TouchParams
 
 explorer = Explorer(SimulatedArm(), TouchParams(), SafetyLimits(), on_state=print)
 explorer.connect()

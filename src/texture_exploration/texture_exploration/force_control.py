@@ -99,6 +99,15 @@ def lowest_unstable_gain(loop: LoopModel, stable: Callable[[float], bool], bisec
 
 
 # --------------------
+# The one formula of all limits of speed: a contact presses by its stiffness times the way until the arm stands.
+
+
+def stopping_m_s(rise_n: float, stiffness_n_m: float, stop_s: float) -> float:
+    """Return the speed from which an arm that stands after `stop_s` presses a contact by `rise_n` more."""
+    return rise_n / (stiffness_n_m * stop_s)
+
+
+# --------------------
 # The declared contact, the gain that follows from it, and what the stability margin forbids.
 
 GAIN_MARGIN = 4.0  # below the stability limit: a delayed integrator is critically damped at π/2·e = 4.3
@@ -155,7 +164,7 @@ class ForceLoopParams:
     def approach_m_s(self, period_s: float) -> float:
         """Return how fast the finger may come down: the impact on the stiffest contact stays below its limit."""
         reaction_s = self.loop_delay_s + REACTION_PERIODS * period_s
-        return min(FORCE_SPEED_M_S, self.max_impact_n / self.max_stiffness_n_m / reaction_s)
+        return min(FORCE_SPEED_M_S, stopping_m_s(self.max_impact_n, self.max_stiffness_n_m, reaction_s))
 
 
 class ForceController:

@@ -5,80 +5,20 @@
 from __future__ import annotations
 
 import math
-import statistics
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from texture_core.config import param
 from texture_core.errors import CommandRefused, ExplorationError, InvalidParameter, MotionRefused
-from texture_core.types import ExplorationRequest, Phase
-from texture_exploration.arms.arm import ArmCommand, ArmState, ForceReading, Vector
+from texture_core.types import ExplorationRequest
+from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
 
 # --------------------
-# For how long nothing was heard while somebody listened.
+# What may be asked for and measured.
 
-# After a longer gap between two steps it was we who slept: the age of the arm's state says nothing about the arm.
-GAP_NS = 50_000_000
-
-
-@dataclass(frozen=True)
-class Listening:
-    """Since when the loop has listened, and its newest gap: a machine that slept says nothing about a sensor or an arm.
-
-    Only the newest gap is left out of a silence. If every gap were, a busy machine whose steps are late again and again
-    would never notice that an arm or a sensor is silent.
-    """
-
-    since_ns: int = 0
-    gap_start_ns: int = 0
-    gap_end_ns: int = 0
-
-    def silence_s(self, heard_ns: int, now_ns: int) -> float:
-        """Return for how long nothing was heard, s, without the part of it that lies in the newest gap."""
-        start_ns = max(heard_ns, self.since_ns)
-        silent_ns = now_ns - start_ns
-        # Only the part of the gap after the last sign of life counts.
-        if self.gap_end_ns > start_ns:
-            silent_ns -= self.gap_end_ns - max(self.gap_start_ns, start_ns)
-        return silent_ns * 1e-9
-
-
-WITHOUT_GAPS = Listening()
-
-
-# --------------------
-# What no arm and no sensor can mean: a number that is none, or beyond every robot.
-
-MOST_FORCE_N = 1e4
-MOST_M = 100.0  # of a place, and of a speed in m/s
-
-
-def impossible(what: str, numbers: Iterable[float], most: float, unit: str) -> str:
-    """Return in a short sentence which number nobody can have measured, '' if all may be."""
-    for number in numbers:
-        if not math.isfinite(number):
-            return f'the arm reports a {what} that is no number ({number:g})'
-        if abs(number) > most:
-            return f'the arm reports a {what} of {number:.3g} {unit}, which no {"sensor" if unit == "N" else "arm"} has'
-    return ''
-
-
-def sound(arm: ArmState, before: ArmState) -> ArmState:
-    """Return the state; what nobody can have measured is replaced by what was `before` and makes it unsafe.
-
-    A place that stays unknown grows old, so that the arm counts as silent; a force that stays unknown does not keep a
-    finger from being lifted.
-    """
-    place = impossible('place', arm.position, MOST_M, 'm') or impossible('velocity', arm.velocity, MOST_M, 'm/s')
-    if place:
-        return replace(before, unsafe=arm.unsafe or place, fault=arm.fault)
-    along_n = () if all(map(math.isnan, arm.along_n)) else arm.along_n
-    force = impossible('force', (arm.force_n, *along_n), MOST_FORCE_N, 'N')
-    if force:
-        return replace(arm, force_n=before.force_n, along_n=before.along_n, unsafe=arm.unsafe or force)
-    return arm
+MOST_FORCE_N = 1e4  # no sensor measures more
+MOST_M = 100.0  # of a place, and of a speed in m/s: no arm has more
 
 
 MAX_DISTANCE_M = 1.0
@@ -210,13 +150,9 @@ class SafetyLimits:
     approach_timeout_s: float = param(
         10.0, 'How long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
     )
-    contact_timeout_s: float = param(
-        10.0, 'How long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
-    )
+    contact_timeout_s = 10.0  # that force and speed may take to settle: a contact 30 times softer than declared
     slide_overtime_s = 2.0  # longer than planned, that a slide may take
-    lift_timeout_s: float = param(
-        5.0, 'How long braking and lifting may take before the exploration is aborted.', unit='s', low=0.1
-    )
+    lift_timeout_s = 5.0  # that braking and lifting may take: three times what they do
 
     def __post_init__(self) -> None:
         for axis, (low, high) in self.workspace.items():
@@ -370,13 +306,7 @@ class CommandLimits:
 
     command_speed_m_s = 1.0  # along the surface, of a single command; four times what an exploration may ask for
     command_normal_m_s = 0.5  # along the normal, of a single command
-    command_force_n: float = param(
-        50.0,
-        'Highest normal force that one command may ask for; larger forces are refused.',
-        unit='N',
-        low=0.1,
-        high=200.0,
-    )
+    command_force_n = 50.0  # of a single command; what an exploration may ask for is at most as much
 
     def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:
         """Return if the command may be carried out."""
@@ -469,251 +399,51 @@ class SurfacePatch:
 
 
 # --------------------
-# Whether the measured force can be believed, and whether it is too high in any direction.
-#
-# With a frozen or drifting sensor a force loop presses without limit; with a limit of the normal force alone a wall
-# does.
-
-MIN_REPEATS = 3  # of one reading, before it can count as frozen
-FROZEN_TRAVEL_M = 0.00005  # along the normal, in contact, after which a force must have changed
-CONTACT_N = 0.1  # above the force in free air, which may stay the same for long
-HELD_SHARE = 0.1  # a force this close to the wanted one is being held
-ZEROING_S = 0.1  # an arm may zero its force sensor while it stands, or as it moves off
-BEFORE = 1000  # states before the contact
-LOW_SHARE = 0.25  # of them lie below the force in free air: on a soft surface the force rises long before it counts
-AFTER = 5  # readings in the upper half of the lift
-MIN_RISE_M = 0.001  # a lift that was seen from less far below says nothing of free air
-WAY_S = 0.15  # of commands that count as the way into an obstacle: no arm is later
-BACK_S = 0.3  # no way back takes longer
-HELPS_S = 0.09  # after which the force has begun to fall, if it ever will
-BACK_SPEEDS_M_S = (0.02, 0.1)  # the way back was free a moment ago: it may be gone as fast as it was come
+# All limits, once: docs/motion.md shows them.
 
 
-class ForceWatch:
-    """Compare each measured force with what the arm does.
+class Limit(NamedTuple):
+    """What is limited, by which value, who checks it, how fast, and what follows."""
 
-    A reading is frozen if it stays the same to the last bit for `frozen_force_s`, in at least `MIN_REPEATS` states
-    with new stamps, and this cannot be:
-
-    - a sensor that always carries noise (`ForceReading.NOISY`): at any time;
-    - one that may repeat itself (`MEASURED`): in contact, while the finger moves along the normal;
-    - an arm that holds the force itself (`CONTROLLED`): the same, as long as the wanted force is not reached. The time
-      in which it held the force does not count: the reading also stays until a lift that was commanded takes effect.
-
-    The force in free air is compared before and after the slide: what differs is drift, and the true force of the slide
-    was wrong by as much.
-    """
-
-    def __init__(self, limits: SafetyLimits, reading: ForceReading, wanted_n: float) -> None:
-        self._limits = limits
-        self._reading = reading
-        self._wanted_n = wanted_n
-        self._first: ArmState | None = None  # the first state with the present reading
-        self._newest_ns = 0
-        self._repeats = 0
-        self._before: deque[float] = deque(maxlen=BEFORE)
-        self._begin_ns: int | None = None
-        self._lift: deque[tuple[float, float]] = deque(maxlen=BEFORE)  # height, m, and force, N
-
-    def frozen(self, arm: ArmState, command: ArmCommand) -> str:
-        """Return in a sentence that the reading is frozen, '' if not; `command` is what the arm was doing."""
-        if self._first is None or arm.force_n != self._first.force_n or self._holds(arm.force_n, command):
-            self._first, self._repeats, self._newest_ns = arm, 0, arm.time_ns
-            return ''
-        if arm.time_ns > self._newest_ns:
-            self._newest_ns = arm.time_ns
-            self._repeats += 1
-        same_s = (arm.time_ns - self._first.time_ns) * 1e-9
-        if self._repeats < MIN_REPEATS or same_s < self._limits.frozen_force_s:
-            return ''
-        moved_m = abs(arm.position[2] - self._first.position[2])
-        if self._reading is not ForceReading.NOISY and not self._implausible(arm.force_n, moved_m):
-            return ''
-        return (
-            f'the measured force is frozen: it has been {arm.force_n:.3f} N for {same_s * 1e3:.0f} ms, while the '
-            f'finger moved by {moved_m * 1e3:.2f} mm along the normal; check the force sensor and its cable'
-        )
-
-    def note(self, phase: Phase, arm: ArmState, command: ArmCommand) -> None:
-        """Take note of the force in free air, before the contact and after it."""
-        if phase is Phase.APPROACH:
-            self._note_free(arm, command)
-        elif phase is Phase.LIFT:
-            self._lift.append((arm.position[2], arm.force_n))
-
-    def drifted(self) -> str:
-        """Return in a sentence that the force in free air has changed over the exploration, '' if it has not."""
-        after = self._forces_above()
-        if not self._before or not after:
-            return ''
-        before_n, after_n = self._free_air_n, statistics.median(after)
-        if abs(after_n - before_n) <= self._limits.force_drift_fraction * self._wanted_n:
-            return ''
-        return (
-            f'the force in free air was {before_n:.2f} N before the slide and {after_n:.2f} N after it: the sensor '
-            'drifted, and the true force was wrong by up to the difference; let it warm up, zero it and check it'
-        )
-
-    def _note_free(self, arm: ArmState, command: ArmCommand) -> None:
-        if self._begin_ns is None or command == ArmCommand():
-            self._begin_ns = arm.time_ns
-        if arm.time_ns - self._begin_ns <= ZEROING_S * 1e9:
-            self._before.clear()
-        self._before.append(arm.force_n)
-
-    def _forces_above(self) -> list[float]:
-        """Return the last forces in the upper half of the lift.
-
-        The finger still presses while it brakes, and a busy machine may see but few states of the lift itself.
-        """
-        if not self._lift:
-            return []
-        low_m, high_m = min(height_m for height_m, _ in self._lift), self._lift[-1][0]
-        if high_m - low_m < MIN_RISE_M:
-            return []
-        middle_m = 0.5 * (low_m + high_m)
-        return [force_n for height_m, force_n in self._lift if height_m > middle_m][-AFTER:]
-
-    @property
-    def _free_air_n(self) -> float:
-        """The force without contact, as it was before the contact; 0 until it is known."""
-        return sorted(self._before)[int(LOW_SHARE * len(self._before))] if self._before else 0.0
-
-    def _implausible(self, force_n: float, moved_m: float) -> bool:
-        return force_n - self._free_air_n >= CONTACT_N and moved_m >= FROZEN_TRAVEL_M
-
-    def _holds(self, force_n: float, command: ArmCommand) -> bool:
-        """Return whether the arm keeps the force the same by itself."""
-        if self._reading is not ForceReading.CONTROLLED:
-            return False
-        if command.force_n is None:
-            return command.normal_m_s == 0.0
-        return abs(command.force_n - force_n) <= HELD_SHARE * command.force_n
+    name: str
+    quantity: str
+    value: str
+    checks: str
+    soon: str
+    follows: str
 
 
-class ForceGuard:
-    """Limit the whole force, and find the way back out of what the finger has met.
-
-    As long as the arm has not zeroed its force sensor, only the change since the start counts. The way back
-    is that of the last commands: it needs neither the frame nor the sign of the force, nor those of the pose.
-    """
-
-    def __init__(self, limits: SafetyLimits) -> None:
-        self.blocked = ''
-        self._limits = limits
-        self._zero: Vector | None = None  # what the sensor shows at the start, while it is not zeroed
-        self._way: deque[tuple[int, ArmCommand, float]] = deque()  # with the size of the force
-        self._back: ArmCommand | None = None
-        self._back_ns = 0
-        self._came_back = False  # there is one way back
-        self._largest_n = 0.0
-
-    def relative(self, arm: ArmState, zeroed: bool) -> ArmState:
-        """Return the state with the force that counts."""
-        if zeroed:
-            self._zero = None
-            return arm
-        if self._zero is None:
-            self._zero = arm.force_vector_n
-        x, y, z = (now_n - zero_n for now_n, zero_n in zip(arm.force_vector_n, self._zero, strict=True))
-        return replace(arm, force_n=z, along_n=(x, y))
-
-    def violation(self, arm: ArmState, phase: Phase) -> str:
-        """Return in a sentence that a force is too high, '' if none is; a finger that is lifted may tear itself off."""
-        excess = self._limits.force_violation(arm)
-        return excess if excess or phase is Phase.LIFT else self._limits.friction_violation(arm)
-
-    def yielding(self, arm: ArmState, command: ArmCommand, aborted: bool) -> ArmCommand:
-        """Return the command; or, after an abort, the way back as long as the finger is held."""
-        now_ns, size_n = arm.time_ns, arm.force_size_n
-        held = bool(self._limits.force_violation(arm) or self._limits.friction_violation(arm))
-        while self._way and now_ns - self._way[0][0] > WAY_S * 1e9:
-            self._way.popleft()
-        if aborted and held and self._way:
-            # A force that did not grow on the way, as that of a broken sensor, does not end on the way back.
-            if size_n - min(before_n for _, _, before_n in self._way) > self._limits.tangential_floor_n:
-                self._back, self._back_ns = self._way_back(), now_ns
-            self._way.clear()
-            self._came_back = True
-        if self._back is None:
-            if not self._came_back:
-                self._way.append((now_ns, command, size_n))
-            return command
-        # Half of the allowance: what is left then is no more than noise.
-        self._largest_n = max(self._largest_n, size_n)
-        back_s = (now_ns - self._back_ns) * 1e-9
-        helps = back_s < HELPS_S or size_n < 0.95 * self._largest_n
-        if size_n > 0.5 * self._limits.tangential_floor_n and back_s < BACK_S and helps:
-            return self._back
-        if self._back.normal_m_s < 0.0:
-            self.blocked = 'the force grew while the finger rose; see that nothing is above it, and the surface pose'
-        self._back = None
-        return command
-
-    def _way_back(self) -> ArmCommand | None:
-        """Return the opposite of the last commands; away from a surface that was pressed on."""
-        commands = [command for _, command, _ in self._way]
-        x, y = (sum(command.tangential_m_s[axis] for command in commands) for axis in (0, 1))
-        pressed = any(command.force_n is not None for command in commands)
-        z = sum(command.normal_m_s for command in commands if command.force_n is None)
-        size = math.hypot(x, y, z)
-        if size == 0.0 and not pressed:
-            return None
-        fastest = max(math.hypot(*command.tangential_m_s, command.normal_m_s) for command in commands)
-        speed = min(max(fastest, BACK_SPEEDS_M_S[0]), BACK_SPEEDS_M_S[1])
-        x, y, z = (-speed * part / size if size else 0.0 for part in (x, y, z))
-        return ArmCommand((x, y), normal_m_s=max(z, BACK_SPEEDS_M_S[0]) if pressed else z)
+EVERY_STEP = 'each step, 10 ms'
 
 
-# --------------------
-# Whether samples arrive while the finger moves: a slide without them measures nothing.
+LIMITS: tuple[Limit, ...] = (
+    Limit(
+        'MOST_FORCE_N, MOST_M', 'number of a sample', 'finite, 10 kN, 100 m', 'arm and Exploration', 'at once', 'lift'
+    ),
+    Limit('force_limit_n', 'force in any direction', '10 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit(
+        'WALL_SHARE', 'force at a wall, foreseen', '4.5 × force_limit_n', 'Exploration', 'before it moves', 'refused'
+    ),
+    Limit('friction_limit', 'force along the surface', '2 × normal + 1 N', 'ForceGuard', EVERY_STEP, 'way back, lift'),
+    Limit('x_low_m to z_high_m', 'place', '±0.2 m; −0.02 to 0.2 m', 'Exploration', EVERY_STEP, 'lift'),
+    Limit('surface_tolerance_m', 'height of the contact', '20 mm', 'Exploration', EVERY_STEP, 'lift'),
+    Limit('state_timeout_s', 'age of the state', '0.13 s', 'Exploration', EVERY_STEP, 'stop'),
+    Limit('signal_timeout_s', 'silence of the sensor', '0.5 s', 'SignalWatch', EVERY_STEP, 'lift'),
+    Limit('frozen_force_s', 'force that repeats', '0.06 s', 'ForceWatch', EVERY_STEP, 'lift'),
+    Limit('force_drift_fraction', 'drift in free air', '30 %', 'ForceWatch', 'after the lift', 'no success'),
+    Limit('OVERSHOOT', 'force before the slide', '20 % above the wanted', 'OvershootWatch', '3 steps', 'lift'),
+    Limit('HARD, LATE_S', 'force after the first touch', '2 impacts; 30 ms', 'ForceLoop', 'delay + 0.13 s', 'lift'),
+    Limit('peak_force_fraction', 'force in the slide', '50 % above the wanted', 'SlideWatch', '3 steps', 'no window'),
+    Limit('peak_speed_fraction', 'speed in the slide', '50 % above the wanted', 'SlideWatch', '50 ms', 'no window'),
+    Limit('lost_contact_s', 'time without contact', '0.1 s', 'ContactWatch', EVERY_STEP, 'lift'),
+    Limit('stall_s', 'way by commanded way', '25 % in 0.25 s', 'StallWatch', '0.25 s', 'lift'),
+    Limit('MOST_FORCE_SHARE', 'change of the force in a rise', '65 % of force_limit_n', 'Rise', EVERY_STEP, 'go back'),
+    Limit('approach_travel_m', 'way down in search', '50 mm', 'ApproachStage', EVERY_STEP, 'lift'),
+    Limit('approach_timeout_s, …', 'time of a stage', '10, 10, 2, 5 s', 'Stage', EVERY_STEP, 'lift'),
+    Limit('command_speed_m_s, …', 'a single command', '1 m/s, 0.5 m/s, 50 N', 'arm', 'at once', 'refused, stop'),
+)
 
 
-@dataclass(frozen=True)
-class SignalWatchParams:
-    """Parameters that end an exploration when the sensor falls silent."""
-
-    watch_signal: bool = param(True, "Aborts an exploration when no samples arrive on the topics of 'signal_topics'.")
-    signal_topics: str = param(
-        'signal',
-        "Topics whose samples are watched, separated by spaces: 'finger0/signal finger1/signal' for two fingers.",
-    )
-    signal_timeout_s: float = param(
-        0.5,
-        'How long no sample may arrive before the exploration is aborted.',
-        unit='s',
-        low=0.02,
-        high=5.0,
-    )
-
-    def __post_init__(self) -> None:
-        if not self.topics:
-            raise InvalidParameter("parameter 'signal_topics' is empty; name a topic, or set 'watch_signal' to false")
-
-    @property
-    def topics(self) -> tuple[str, ...]:
-        """Each of the topics once."""
-        return tuple(dict.fromkeys(self.signal_topics.split()))
-
-
-class SignalWatch:
-    """Remember when each stream came last; `on_samples` and `signal_fault` may be called from different threads."""
-
-    def __init__(self, timeout_s: float, clock: Callable[[], int], topics: Sequence[str] = ('signal',)) -> None:
-        self._timeout_s = timeout_s
-        self._clock = clock
-        self._last_samples_ns = dict.fromkeys(topics, 0)
-
-    def on_samples(self, topic: str = 'signal') -> None:
-        """Take note that samples have come."""
-        self._last_samples_ns[topic] = self._clock()
-
-    def signal_fault(self, listening: Listening) -> str:
-        """Return in a sentence which streams are silent while the loop listens, '' if none is."""
-        now_ns = self._clock()
-        ages_s = {topic: listening.silence_s(last, now_ns) for topic, last in self._last_samples_ns.items()}
-        silent = {topic: age_s for topic, age_s in ages_s.items() if age_s > self._timeout_s}
-        if not silent:
-            return ''
-        named = ' and '.join(f"'{topic}'" for topic in silent)
-        return f'no samples have come on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'
+def limit_table() -> str:
+    """Return the limits as rows of a table."""
+    return '\n'.join(f'| `{row.name}` | {" | ".join(row[1:])} |' for row in LIMITS)

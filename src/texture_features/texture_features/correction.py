@@ -289,7 +289,7 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
     if not path.exists():
         raise ModelMismatch(
             f"no reference is stored: '{path}' does not exist; slide over the reference plate with the finger that the "
-            'model was trained with, and store that slide by --store'
+            f'model was trained with, and store that slide by `texture check {model} --store`'
         )
     try:
         content = load_json(path, MOST_BYTES)

@@ -12,7 +12,13 @@ import pytest
 
 from texture_core.framing import Frame, pack, unpack
 from texture_simulation.devices.rails import LOCKED, OVERLOAD, RailsFirmware, RailsMachine
-from texture_simulation.devices.twist_controller import GRAVITY_M_S2, EmulatedTwistArm, TwistControllerParams
+from texture_simulation.devices.twist_controller import (
+    GRAVITY_M_S2,
+    EmulatedTwistArm,
+    TouchedSurfaceParams,
+    TwistControllerParams,
+    touch_force_n,
+)
 
 HOLD, MOVING, PRESS = 0, 1, 2
 STEP_S = 0.0025
@@ -117,3 +123,20 @@ def test_the_sensor_shows_force_weight_and_offset_in_the_frame_of_the_tool() -> 
     weight_n = QUIET.tool_mass_kg * GRAVITY_M_S2
     # The tool looks down: what pushes it up pushes against its z axis.
     assert arm.reading_n()[2] == pytest.approx(-(2.0 - weight_n) + QUIET.force_offset_n)
+
+
+@pytest.mark.parametrize(
+    ('place_m', 'velocity_m_s', 'force_n'),
+    [
+        ((0.0, 0.0, 1e-9), (0.03, 0.04, 0.0), (0.0, 0.0, 0.0)),
+        ((0.0, 0.0, -0.001), (0.0, 0.0, 0.0), (0.0, 0.0, 3.0)),  # stiffness times depth
+        ((0.0, 0.0, -0.001), (0.03, 0.04, 0.01), (-0.4 * 3.0 * 0.6, -0.4 * 3.0 * 0.8, 3.0)),  # Coulomb, against the way
+        ((0.021, 0.0, 0.01), (0.05, 0.0, 0.0), (-20.0, 0.0, 0.0)),  # 1 mm into a wall of 20 kN/m
+    ],
+)
+def test_plane_friction_and_wall_push_as_their_laws_say(place_m, velocity_m_s, force_n) -> None:
+    surface = TouchedSurfaceParams(stiffness_n_m=3000.0, wall_m=0.02)
+    turned = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # x to y, y to z, z to x
+    for axes in (np.eye(3), turned):
+        force = touch_force_n(surface, 0.4, axes, axes @ np.array(place_m), axes @ np.array(velocity_m_s))
+        assert axes.T @ force == pytest.approx(force_n, abs=1e-9)

@@ -19,7 +19,6 @@ from texture_simulation.effects import (
     Noise,
     PatchGrowth,
     Skids,
-    Skin,
     SlideError,
     Unevenness,
 )
@@ -70,23 +69,6 @@ def test_a_skid_holds_the_skin_and_lets_it_catch_up() -> None:
     assert (np.diff(skin.x_m) == 0).mean() == pytest.approx(0.05, rel=0.5)
     assert np.median(behind_m) < 1e-5
     assert (np.diff(skin.x_m) >= -1e-12).all()
-
-
-def test_the_skin_resonates_where_and_as_much_as_mass_spring_and_damper() -> None:
-    skin = Skin(resonance_hz=100.0, damping=0.2)
-    frequency_hz = np.array([1e-3, 20.0, 100.0, 200.0])
-    _, found = signal.sosfreqz(skin.sections(20_000.0), frequency_hz, fs=20_000.0)
-    ratio = frequency_hz / 100.0
-    assert np.abs(found) == pytest.approx(1 / np.hypot(1 - ratio**2, 2 * 0.2 * ratio), rel=2e-3)
-
-
-def test_the_energy_of_a_pushed_skin_never_grows() -> None:
-    skin = Skin(resonance_hz=400.0, damping=0.01).start_force(rng(), RATE_HZ, ())
-    impulse = np.zeros(4000)
-    impulse[0] = 1.0
-    rung = skin(impulse)
-    envelope = np.abs(rung).reshape(-1, 200).max(axis=1)
-    assert (np.diff(envelope) <= 0).all()
 
 
 def test_size_and_stiffness_of_the_contact_grow_with_the_cube_root_of_the_force() -> None:

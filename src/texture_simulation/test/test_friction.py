@@ -35,6 +35,13 @@ USUAL = StickSlip()
 HANGS, GLIDES = {'kind': 'stick_slip'}, {'kind': 'sliding_friction'}
 
 
+def with_skin(**values: float) -> StickSlip:
+    """Return a friction with other constants of skin and bristles, which are in capitals."""
+    constants = {name: value for name, value in values.items() if name.isupper()}
+    fields = {name: value for name, value in values.items() if not name.isupper()}
+    return type('OtherSkin', (StickSlip,), constants)(**fields)
+
+
 def steadily(friction: StickSlip, speed_m_s: float, force_n: float, duration_s: float, step_s: float = STEP_S):
     speed = np.full(round(duration_s / step_s), speed_m_s)
     tip = drag(friction, speed, np.full_like(speed, force_n), step_s)
@@ -47,17 +54,17 @@ def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> tuple[fl
     The tip lets go at static·force and swings about kinetic·force for half a period of the skin.
     """
     drop_n = (friction.static - friction.kinetic) * force_n
-    natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)
-    damping = friction.skin_n_s_m / (2 * friction.mass_kg * natural_1_s)
+    natural_1_s = math.sqrt(friction.SKIN_N_M / friction.MASS_KG)
+    damping = friction.SKIN_N_S_M / (2 * friction.MASS_KG * natural_1_s)
     root = math.sqrt(1 - damping**2)
     swing_n = drop_n * (1 + math.exp(-math.pi * damping / root))
-    return swing_n / (friction.skin_n_m * speed_m_s) + math.pi / (natural_1_s * root), swing_n
+    return swing_n / (friction.SKIN_N_M * speed_m_s) + math.pi / (natural_1_s * root), swing_n
 
 
 def energy_j(friction: StickSlip, tip: Tip, force_n: np.ndarray) -> np.ndarray:
     """Return what is stored: movement of the tip, stretched skin, bent bristles."""
-    bent = force_n * friction.bristle_1_m * tip.bend_m**2
-    return (friction.mass_kg * tip.slip_m_s**2 + friction.skin_n_m * tip.stretch_m**2 + bent) / 2
+    bent = force_n * friction.BRISTLE_1_M * tip.bend_m**2
+    return (friction.MASS_KG * tip.slip_m_s**2 + friction.SKIN_N_M * tip.stretch_m**2 + bent) / 2
 
 
 def test_the_stribeck_curve_falls_from_static_to_kinetic() -> None:
@@ -73,10 +80,10 @@ def test_the_tip_moves_as_scipys_solver_says_of_the_equations_of_the_bristles() 
         stretch, slip, bend = state
         fading = math.exp(-((slip / friction.stribeck_m_s) ** 2))
         curve = friction.kinetic + (friction.static - friction.kinetic) * fading
-        bending = slip - friction.bristle_1_m * abs(slip) * bend / curve
-        rubbing = friction.bristle_1_m * bend + friction.bristle_s_m * fading * bending + friction.viscous_s_m * slip
-        pull = friction.skin_n_m * stretch + friction.skin_n_s_m * (speed - slip)
-        return [speed - slip, (pull - force * rubbing) / friction.mass_kg, bending]
+        bending = slip - friction.BRISTLE_1_M * abs(slip) * bend / curve
+        rubbing = friction.BRISTLE_1_M * bend + friction.BRISTLE_S_M * fading * bending + friction.viscous_s_m * slip
+        pull = friction.SKIN_N_M * stretch + friction.SKIN_N_S_M * (speed - slip)
+        return [speed - slip, (pull - force * rubbing) / friction.MASS_KG, bending]
 
     times_s = np.arange(1, 61) * 1e-3
     solved = solve_ivp(
@@ -89,20 +96,20 @@ def test_the_tip_moves_as_scipys_solver_says_of_the_equations_of_the_bristles() 
 
 @pytest.mark.parametrize('speed_m_s', [-0.3, 0.02, 0.08, 0.3])
 def test_steady_sliding_meets_the_friction_of_the_stribeck_curve(speed_m_s: float) -> None:
-    friction = StickSlip(skin_n_s_m=20.0, viscous_s_m=0.3)  # damped so well that no speed vibrates
+    friction = with_skin(SKIN_N_S_M=20.0, viscous_s_m=0.3)  # damped so well that no speed vibrates
     _, pull = steadily(friction, speed_m_s, 2.0, 0.8)
     assert pull[-1] == pytest.approx(steady_force_n(friction, np.array(speed_m_s), 2.0), rel=1e-4)
 
 
 def test_before_it_slides_a_tip_is_held_by_the_stiffness_of_the_bristles() -> None:
-    friction, force_n = StickSlip(bristle_1_m=2e4), 2.0
+    friction, force_n = with_skin(BRISTLE_1_M=2e4), 2.0
     tip, pull = steadily(friction, 1e-5, force_n, 0.2)  # pulls with a few thousandths of the static friction
-    assert pull[-1] / tip.bend_m[-1] == pytest.approx(force_n * friction.bristle_1_m, rel=4e-3)
+    assert pull[-1] / tip.bend_m[-1] == pytest.approx(force_n * friction.BRISTLE_1_M, rel=4e-3)
     assert tip.bend_m[-1] == pytest.approx(np.sum(tip.slip_m_s) * STEP_S, rel=2e-3)
 
 
 def test_a_slowly_dragged_tip_sticks_and_slips_with_the_period_of_the_formula() -> None:
-    friction = StickSlip(stribeck_m_s=0.003, skin_n_s_m=0.05, bristle_1_m=1e6)
+    friction = with_skin(stribeck_m_s=0.003, SKIN_N_S_M=0.05, BRISTLE_1_M=1e6)
     _, pull = steadily(friction, 0.004, 1.0, 1.2, 2e-5)
     releases = np.flatnonzero((pull[1:-1] > pull[:-2]) & (pull[1:-1] >= pull[2:]) & (pull[1:-1] > 0.8)) * 2e-5
     periods = np.diff(releases[np.diff(releases, prepend=-1.0) > 0.01])
@@ -129,17 +136,17 @@ def drives(n: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 @pytest.mark.parametrize('name', list(drives(1)))
 @pytest.mark.parametrize(
-    'friction', [USUAL, StickSlip(bristle_1_m=1e7), StickSlip(bristle_s_m=80.0), StickSlip(viscous_s_m=1.0)]
+    'friction', [USUAL, with_skin(BRISTLE_1_M=1e7), with_skin(BRISTLE_S_M=80.0), StickSlip(viscous_s_m=1.0)]
 )
 def test_whatever_happens_no_energy_comes_from_nowhere(name: str, friction: StickSlip) -> None:
     speed, force = drives(4000)[name]
     # Up to damping over stiffness of the skin the integrator provably never adds energy.
-    assert friction.skin_n_s_m / friction.skin_n_m >= 2.5e-4
+    assert friction.SKIN_N_S_M / friction.SKIN_N_M >= 2.5e-4
     tip = drag(friction, speed, force, 2.5e-4)
     assert np.isfinite(pull_n(friction, tip, speed)).all()
-    assert np.abs(tip.bend_m).max() <= 1.2 * friction.static / friction.bristle_1_m or name == 'anything'
+    assert np.abs(tip.bend_m).max() <= 1.2 * friction.static / friction.BRISTLE_1_M or name == 'anything'
     stretch = np.concatenate([[0.0], tip.stretch_m])[:-1]
-    put_in = (friction.skin_n_m * stretch + friction.skin_n_s_m * (speed - tip.slip_m_s)) * speed * 2.5e-4
+    put_in = (friction.SKIN_N_M * stretch + friction.SKIN_N_S_M * (speed - tip.slip_m_s)) * speed * 2.5e-4
     stored = energy_j(friction, tip, force)
     lost = np.concatenate([[0.0], stored])[:-1] + put_in - stored
     assert lost.min() > -1e-12
@@ -153,13 +160,13 @@ def test_a_tip_left_alone_comes_to_rest_and_stays() -> None:
 
 def test_friction_and_steps_that_make_no_sense_are_refused() -> None:
     most = PASSIVE * USUAL.kinetic / USUAL.stribeck_m_s
-    StickSlip(bristle_s_m=0.99 * most)
-    with pytest.raises(InvalidParameter, match='never put in; lower it'):
-        StickSlip(bristle_s_m=1.01 * most)
+    with_skin(BRISTLE_S_M=0.99 * most)
+    with pytest.raises(InvalidParameter, match='never put in; raise kinetic'):
+        with_skin(BRISTLE_S_M=1.01 * most)
     with pytest.raises(InvalidParameter, match='must be above 0'):
         check_step(USUAL, 0.0, 0.1, 1.0)
     with pytest.raises(InvalidParameter, match='allows at most'):
-        TipDrag(StickSlip(step_s=0.05), RATE_HZ)
+        TipDrag(with_skin(STEP_S=0.05), RATE_HZ)
     with pytest.raises(InvalidParameter, match='2 kinds of friction; name one of'):
         table(HANGS, GLIDES)
     for kind in (HANGS, GLIDES):
@@ -176,7 +183,8 @@ def along_x(x_m: np.ndarray, force_n: float = 2.0) -> Trajectory:
 
 def glided_n(speed_m_s: np.ndarray, force_n: float = 1.0, **values: float) -> np.ndarray:
     path = along_x(np.cumsum(speed_m_s) / RATE_HZ, force_n)
-    return SlidingDrag(SlidingFriction(force_coupling=1.0, **values), RATE_HZ).advance(path)
+    friction = SlidingFriction(**values)
+    return SlidingDrag(friction, RATE_HZ).advance(path) / friction.FORCE_COUPLING
 
 
 def table(*terms: dict, sensor: str = 'tsf85') -> Scene:
@@ -197,9 +205,9 @@ def test_a_path_in_blocks_senses_like_the_whole() -> None:
 
 
 def test_back_the_way_it_came_the_skin_is_pulled_the_other_way_even_after_a_rest() -> None:
-    friction, there = StickSlip(skin_n_s_m=20.0), 0.1 / RATE_HZ * np.arange(800)
+    friction, there = with_skin(SKIN_N_S_M=20.0), 0.1 / RATE_HZ * np.arange(800)
     path = along_x(np.concatenate([there, np.full(200, there[-1]), there[::-1]]))
-    measured = TipDrag(friction, RATE_HZ).advance(path) / friction.force_coupling
+    measured = TipDrag(friction, RATE_HZ).advance(path) / friction.FORCE_COUPLING
     assert measured[[700, -50]] == pytest.approx([2.0 * 0.5, -2.0 * 0.5], rel=0.05)
 
 

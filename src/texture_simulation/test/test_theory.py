@@ -22,7 +22,7 @@ SPEEDS_M_S = (0.02, 0.05, 0.1, 0.2, 0.4)
 ANGLES_RAD = (0.0, 0.4, 0.8, 1.2, -2.5)
 ROUGH = {'kind': 'self_affine', 'rms_m': 1e-5, 'seed': 5}
 FRICTIONS = ([], [{'kind': 'sliding_friction'}], [{'kind': 'stick_slip'}])
-ALL_EFFECTS = ('skids', 'patch_growth', 'force_gain', 'unevenness', 'skin', 'noise', 'dropouts')
+ALL_EFFECTS = ('skids', 'patch_growth', 'force_gain', 'unevenness', 'noise', 'dropouts')
 
 
 def ridges(pitch_m: float = PITCH_M, **more: object) -> Scene:
@@ -137,7 +137,7 @@ def height(term, blur_m=SHARP, x_m=PLACES, y_m=0.0):
 
 
 def test_a_square_ridge_measured_sharply_is_as_high_and_as_wide_as_asked() -> None:
-    measured = height(Grating(5e-3, 1e-4, shape='square', duty=0.3))
+    measured = height(Grating(pitch_m=5e-3, depth_m=1e-4, shape='square', duty=0.3))
     assert np.median(measured[measured > 0]) - np.median(measured[measured < 0]) == pytest.approx(1e-4, rel=0.02)
     assert (measured > measured.mean()).mean() == pytest.approx(0.3, abs=0.02)
 

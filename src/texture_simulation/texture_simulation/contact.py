@@ -47,7 +47,6 @@ class SkinContact:
         self._gains = [effect.gain for effect in scene.effects_of('gain')]
         begun = rng, rate_hz, batch_shape
         self._trajectory_filters = [effect.start_path(*begun) for effect in scene.effects_of('start_path')]
-        self._force_filters = [effect.start_force(*begun) for effect in scene.effects_of('start_force')]
         self.relocate()
 
     @property
@@ -108,10 +107,11 @@ class SkinContact:
             # One skin is dragged as a whole: all elements of a finger with several sense the same.
             dragged_n = drag.advance(placed)
             if self._surface.variation is not None:
-                dragged_n = dragged_n * self._surface.variation.at(*np.broadcast_arrays(placed.x_m, placed.y_m))[2]
+                dragged_n = (
+                    dragged_n
+                    * self._surface.variation.at(self._surface.name, *np.broadcast_arrays(placed.x_m, placed.y_m))[2]
+                )
             variation_n = variation_n + (dragged_n if offset_m is None else dragged_n[..., None, :])
-        for apply in self._force_filters:
-            variation_n = apply(variation_n)
         return np.asarray(variation_n)
 
     def static_variation_n(self, placed: Trajectory, blur_m: float, offset_m: tuple[Array, Array]) -> Array:

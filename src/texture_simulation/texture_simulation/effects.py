@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array, Samples
-from texture_simulation.path import Filter, Trajectory, interpolated_field
+from texture_simulation.path import Trajectory, interpolated_field
 
 # --------------------
 # Where in the chain from slide to sample an effect acts is told by the method that it has:
@@ -21,7 +21,6 @@ from texture_simulation.path import Filter, Trajectory, interpolated_field
 # start_path(rng, rate_hz, batch_shape)       where the skin goes: a `TrajectoryFilter`
 # blur_growth(force_n), gain_growth(force_n)  how much larger the contact, how much stiffer it is than at 1 N: (...)
 # gain(path, finger)                          how strongly a texture is sensed at places by one individual: (..., n)
-# start_force(rng, rate_hz, batch_shape)      the force that shakes the skin, (..., n) N: a `ForceFilter`
 # start_signal(rng, rate_hz, batch_shape, channels, *, slow)
 #                                             samples in counts, (..., n_samples, n_channels): a `SignalFilter`
 #
@@ -29,7 +28,6 @@ from texture_simulation.path import Filter, Trajectory, interpolated_field
 
 BatchShape = tuple[int, ...]  # () for one slide, (count,) for many at once
 TrajectoryFilter = Callable[[Trajectory], Trajectory]
-ForceFilter = Callable[[Array], Array]
 SignalFilter = Callable[[Samples], Samples]
 
 
@@ -37,36 +35,25 @@ SignalFilter = Callable[[Samples], Samples]
 # A sphere pressed on a plane (Hertz): size and stiffness of the contact grow with the cube root of the force.
 
 
+HERTZ = 1 / 3  # exponent of both
+
+
 @dataclass(frozen=True)
 class PatchGrowth:
     """The contact, over which the skin averages, grows with the force."""
 
-    exponent: float = param(
-        1 / 3,
-        'Exponent with which the contact radius grows with the force; 0 keeps it constant.',
-        low=0.0,
-        high=1.0,
-    )
-
     def blur_growth(self, force_n: Array) -> Array:
         """Return how much larger the contact is than at 1 N; 0 N gives 0."""
-        return np.asarray(np.maximum(force_n, 0.0) ** self.exponent)
+        return np.asarray(np.maximum(force_n, 0.0) ** HERTZ)
 
 
 @dataclass(frozen=True)
 class ForceGain:
     """The contact is the stiffer, the harder it is pressed: the same height changes the force more."""
 
-    exponent: float = param(
-        1 / 3,
-        'Exponent with which the contact stiffness grows with the force; 0 keeps it constant.',
-        low=0.0,
-        high=1.0,
-    )
-
     def gain_growth(self, force_n: Array) -> Array:
         """Return how much stronger a texture is measured than at 1 N; 0 N gives 0."""
-        return np.asarray(np.maximum(force_n, 0.0) ** self.exponent)
+        return np.asarray(np.maximum(force_n, 0.0) ** HERTZ)
 
 
 # --------------------
@@ -82,8 +69,7 @@ class FingerSpread:
     relative: float = param(0.1, 'Relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5)
     skin: float = param(
         0.0,
-        'Relative spread of the skin from finger to finger: a thicker one touches over a larger area, is '
-        'softer and resonates lower.',
+        'Relative spread of the skin from finger to finger: a thicker one touches over a larger area and is softer.',
         low=0.0,
         high=0.5,
     )
@@ -229,38 +215,6 @@ def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array
 
 
 # --------------------
-# The skin as a mass on a spring and a damper.
-
-
-@dataclass(frozen=True)
-class Skin:
-    """The force reaches the sensor through m·x'' + d·x' + k·x = F, so that it resonates and then falls off.
-
-    Turned into a filter by the bilinear transform, warped so that the resonance stays where it is: unconditionally
-    stable, and exact at the resonance.
-    """
-
-    resonance_hz: float = param(200.0, 'Resonance frequency of the skin, √(k/m) / 2π.', unit='Hz', low=1.0, high=400.0)
-    damping: float = param(
-        0.3,
-        'Damping ratio d / (2·√(k·m)); 1 is critical damping, larger values are slower.',
-        low=0.01,
-        high=10.0,
-    )
-
-    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
-        """Return what filters the variation."""
-        return Filter(self.sections(rate_hz))
-
-    def sections(self, rate_hz: float) -> Array:
-        """Return the filter at a sampling rate: a second-order section (1, 6) as scipy.signal.sosfilt takes it."""
-        k = math.tan(math.pi * self.resonance_hz / rate_hz)
-        scale = 1 + 2 * self.damping * k + k * k
-        ahead = [k * k / scale, 2 * k * k / scale, k * k / scale]
-        return np.array([[*ahead, 1.0, 2 * (k * k - 1) / scale, (1 - 2 * self.damping * k + k * k) / scale]])
-
-
-# --------------------
 # A robot is not quite as fast and does not press quite as hard as it should.
 
 MIN_SHARE = 0.05  # of what was wanted
@@ -317,7 +271,6 @@ EFFECTS: Mapping[str, type] = {
     'force_gain': ForceGain,  # a harder pressed finger senses textures more
     'unevenness': Unevenness,  # no sample is everywhere the same
     'finger_spread': FingerSpread,  # no finger is as sensitive as another
-    'skin': Skin,  # resonance of mass, spring and damper
     'noise': Noise,  # of the electronics
     'dropouts': Dropouts,  # moments in which the signal stands still
 }

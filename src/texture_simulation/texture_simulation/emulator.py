@@ -174,7 +174,7 @@ class EmulatorParams:
         choices=('', *LIVE_SENSORS),
     )
     sensor_link: str = param(
-        f'{DEVICES}/tsf85',
+        f'{DEVICES}/sensor',
         'Path of the symbolic link to the emulated sensor, which is the device path of the sensor node.',
     )
     plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,12 +44,7 @@ class Stribeck:
         high=10.0,
     )
     viscous_s_m: float = param(0.0, 'Growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0)
-    force_coupling: float = param(
-        0.2,
-        'Measured force per tangential force on the skin; larger values show friction more strongly.',
-        low=-10.0,
-        high=10.0,
-    )
+    FORCE_COUPLING: ClassVar[float] = 0.2  # measured force per tangential force on the skin
 
     def __post_init__(self) -> None:
         if self.static < self.kinetic:
@@ -64,63 +59,23 @@ class StickSlip(Stribeck):
 
     All friction is proportional to the normal force, so stiffness and damping of the bristles are given for 1 N. The
     values are guesses of the order of what is published for fingertips and silicone on smooth surfaces.
-
-    Raises
-    ------
-    InvalidParameter
-        If the friction could give out more work than it took in (`PASSIVE`), or is lower at rest than in sliding.
     """
 
-    bristle_1_m: float = param(
-        1.5e5,
-        'Bristle stiffness per normal force; larger values bend the bristles less.',
-        unit='1/m',
-        low=1e2,
-        high=1e8,
-    )
-    bristle_s_m: float = param(
-        10.0,
-        'Bristle damping per normal force; larger values damp small motions more.',
-        unit='s/m',
-        low=0.0,
-        high=1e4,
-    )
-    skin_n_m: float = param(
-        1000.0,
-        'Tangential stiffness of the skin; larger values make the stick phases shorter.',
-        unit='N/m',
-        low=1.0,
-        high=1e6,
-    )
-    skin_n_s_m: float = param(
-        0.4,
-        'Tangential damping of the skin; larger values damp the slip phases more.',
-        unit='N s/m',
-        low=0.0,
-        high=1e3,
-    )
-    mass_kg: float = param(
-        5e-4,
-        'Moving mass of the skin; larger values make the slip phases longer.',
-        unit='kg',
-        low=1e-6,
-        high=1.0,
-    )
-    step_s: float = param(
-        2.5e-4,
-        'Longest integration step; a shorter step is more exact and costs more computing time.',
-        unit='s',
-        low=1e-7,
-        high=0.1,
-    )
+    BRISTLE_1_M: ClassVar[float] = 1.5e5  # stiffness of the bristles
+    BRISTLE_S_M: ClassVar[float] = 10.0  # their damping
+    SKIN_N_M: ClassVar[float] = 1000.0  # tangential stiffness of the skin
+    SKIN_N_S_M: ClassVar[float] = 0.4  # its damping
+    MASS_KG: ClassVar[float] = 5e-4  # what moves of it
+    STEP_S: ClassVar[float] = 2.5e-4  # longest step of the integration: exact to 1 % in period, 5 % in amplitude
 
     def __post_init__(self) -> None:
         super().__post_init__()
         most = PASSIVE * self.kinetic / self.stribeck_m_s
-        if self.bristle_s_m > most:
+        if most < self.BRISTLE_S_M:
             raise InvalidParameter(
-                f'bristle_s_m is {self.bristle_s_m} s/m; more than {most:.3g} (9.33·kinetic/stribeck_m_s) would give '
-                'out work that was never put in; lower it'
+                f'kinetic is {self.kinetic} and stribeck_m_s {self.stribeck_m_s}; with the damping of the bristles, '
+                f'{self.BRISTLE_S_M:g} s/m of at most {most:.3g} (9.33·kinetic/stribeck_m_s), friction would give out '
+                'work that was never put in; raise kinetic or lower stribeck_m_s'
             )
 
 
@@ -172,10 +127,10 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
 
     The Stribeck curve g and σ1 are taken at the old slip first, then once again at the slip that this gave.
     """
-    stiffness, damping, viscous = friction.skin_n_m, friction.skin_n_s_m, friction.viscous_s_m
-    bristle, bristle_damping = friction.bristle_1_m, friction.bristle_s_m
+    stiffness, damping, viscous = friction.SKIN_N_M, friction.SKIN_N_S_M, friction.viscous_s_m
+    bristle, bristle_damping = friction.BRISTLE_1_M, friction.BRISTLE_S_M
     kinetic, more = friction.kinetic, friction.static - friction.kinetic
-    inertia, narrow, step_bristle = friction.mass_kg / step_s, -1 / friction.stribeck_m_s**2, step_s * bristle
+    inertia, narrow, step_bristle = friction.MASS_KG / step_s, -1 / friction.stribeck_m_s**2, step_s * bristle
     copysign = math.copysign if exp is math.exp else np.copysign
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
@@ -203,11 +158,11 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
     """
     f = friction
     sticking = slip_m_s == 0.0
-    damper = f.skin_n_s_m + force_n * (f.viscous_s_m + (f.bristle_s_m if sticking else 0.0))
-    spring = f.skin_n_m - (force_n * f.bristle_1_m if sticking else 0.0)
+    damper = f.SKIN_N_S_M + force_n * (f.viscous_s_m + (f.BRISTLE_S_M if sticking else 0.0))
+    spring = f.SKIN_N_M - (force_n * f.BRISTLE_1_M if sticking else 0.0)
     if spring <= 0:
         return math.inf
-    return (damper + math.sqrt(damper**2 + 4 * f.mass_kg * spring)) / spring
+    return (damper + math.sqrt(damper**2 + 4 * f.MASS_KG * spring)) / spring
 
 
 # --------------------
@@ -220,7 +175,7 @@ def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> 
     """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface."""
     # A slipping tip reaches at most the speed of the base and that of the skin let go.
     drop_n = (friction.static - friction.kinetic) * force_n
-    fastest_m_s = speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
+    fastest_m_s = speed_m_s + drop_n / math.sqrt(friction.SKIN_N_M * friction.MASS_KG)
     slip_m_s = max(fastest_m_s, friction.stribeck_m_s)
     cases = ((0.0, force_n), (slip_m_s, force_n), (slip_m_s, 0.0))
     return min(semi_implicit_limit_s(friction, slip, force) for slip, force in cases)
@@ -234,8 +189,7 @@ def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: fl
     if step_s > allowed_s:
         raise InvalidParameter(
             f'a step of {1e6 * step_s:.3g} µs; the integrator allows at most {1e6 * allowed_s:.3g} µs at '
-            f'{force_n:.3g} N and {speed_m_s:.3g} m/s with this skin and these bristles: take a shorter step_s, or a '
-            'heavier or softer skin'
+            f'{force_n:.3g} N and {speed_m_s:.3g} m/s: press less hard, or slide more slowly'
         )
 
 
@@ -268,7 +222,7 @@ def drag(
 
 def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
     """Return the force of the skin on the tip: what the finger senses along the surface."""
-    return np.asarray(friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s))
+    return np.asarray(friction.SKIN_N_M * tip.stretch_m + friction.SKIN_N_S_M * (speed_m_s - tip.slip_m_s))
 
 
 def _few(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array) -> Tip:
@@ -336,8 +290,8 @@ class TipDrag:
     def __init__(self, friction: StickSlip, rate_hz: float, stretched: float | Array = 0.0) -> None:
         self.friction = friction
         self._rate_hz = rate_hz
-        check_step(friction, friction.step_s, 0.0, 0.0)
-        self._substeps = max(1, math.ceil(1 / (rate_hz * friction.step_s) - 1e-9))
+        check_step(friction, friction.STEP_S, 0.0, 0.0)
+        self._substeps = max(1, math.ceil(1 / (rate_hz * friction.STEP_S) - 1e-9))
         self._step_s = 1 / (rate_hz * self._substeps)
         self._stretched = np.asarray(stretched, dtype=np.float64)
         self._tip = AT_REST
@@ -354,7 +308,7 @@ class TipDrag:
         tip = drag(self.friction, speeds, forces, self._step_s, start=self._tip, force_before_n=force_before[..., 0])
         self._tip = Tip(*(values[..., -1] for values in tip))
         self._before = path.x_m[..., -1:], path.y_m[..., -1:], speed_m_s[..., -1:], force_n[..., -1:]
-        sensed_n: Array = self.friction.force_coupling * pull_n(self.friction, tip, speeds)
+        sensed_n: Array = self.friction.FORCE_COUPLING * pull_n(self.friction, tip, speeds)
         return sensed_n[..., self._substeps - 1 :: self._substeps]
 
     def _first(self, force_n: Array) -> tuple[Array, Array, Array, Array]:
@@ -363,8 +317,8 @@ class TipDrag:
         if not self._stretched.any():
             return (nothing,) * 4
         pull_n = self._stretched * self.friction.static * force_n[..., 0]
-        bend_m = self._stretched * self.friction.static / self.friction.bristle_1_m
-        self._tip = Tip(pull_n / self.friction.skin_n_m, np.zeros_like(pull_n), bend_m)
+        bend_m = self._stretched * self.friction.static / self.friction.BRISTLE_1_M
+        self._tip = Tip(pull_n / self.friction.SKIN_N_M, np.zeros_like(pull_n), bend_m)
         return nothing, nothing, nothing, force_n
 
     def _along(self, path: Trajectory) -> Array:
@@ -414,8 +368,6 @@ class SlidingFriction(Stribeck):
     For surfaces on which nothing sticks, hundreds of times cheaper than `StickSlip`.
     """
 
-    static: float = param(0.6, 'Coefficient of friction of slow sliding.', low=0.0, high=5.0)
-
 
 class SlidingDrag:
     """Follow a finger that slides along a path; what lies between the blocks is continuous."""
@@ -434,7 +386,7 @@ class SlidingDrag:
         speed_m_s = np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)) * self._rate_hz
         built_up = speed_m_s / np.hypot(speed_m_s, CREEP_M_S)
         pull_n = np.maximum(path.force_n, 0.0) * built_up * steady_force_n(self._friction, speed_m_s, 1.0)
-        return np.asarray(self._friction.force_coupling * pull_n)
+        return np.asarray(self._friction.FORCE_COUPLING * pull_n)
 
 
 # --------------------

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -92,8 +91,6 @@ class Scene:
             return self
         _, thicker, noisier = spread.factors(finger)
         effects = dict(self.effects)
-        if 'skin' in effects:
-            effects['skin'] = replace(effects['skin'], resonance_hz=effects['skin'].resonance_hz / thicker)
         if 'noise' in effects:
             fast, slow = (count * noisier for count in (effects['noise'].fast_count, effects['noise'].slow_count))
             effects['noise'] = replace(effects['noise'], fast_count=fast, slow_count=slow)
@@ -130,10 +127,7 @@ def scene_from(name: str, content: Any) -> Scene:
     surfaces = {str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()}
     if 'variation' in content:
         variation = from_mapping(PlaceVariation, content['variation'] or {}, f'{where}, variation')
-        surfaces = {
-            key: replace(surface, variation=replace(variation, seed=variation.seed + zlib.crc32(key.encode())))
-            for key, surface in surfaces.items()
-        }
+        surfaces = {key: replace(surface, variation=variation) for key, surface in surfaces.items()}
     return Scene(
         name=name,
         surfaces=surfaces,

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -57,13 +58,15 @@ class PlaceVariation:
         1.0, 'Strength of the variation; 0 is a sample that is the same everywhere.', low=0.0, high=5.0
     )
     length_m: float = param(0.04, 'Length over which the statistics of a sample change.', unit='m', low=0.005, high=1.0)
-    seed: int = param(0, 'Seed of the fields; each surface of a scene has its own.', low=0)
 
-    def at(self, x_m: Array, y_m: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Return factors of level, blur and friction, and shifts of x and y in m, (..., n) each."""
+    def at(self, surface: str, x_m: Array, y_m: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """Return factors of level, blur and friction, and shifts of x and y in m, (..., n) each.
+
+        The fields are drawn by the name of the surface: each surface of a scene has its own.
+        """
         if not x_m.shape[-1]:
             return (np.ones_like(x_m), np.ones_like(x_m), np.ones_like(x_m), np.zeros_like(x_m), np.zeros_like(x_m))
-        waves_1_m, phases = _field_waves(self.seed, self.length_m)
+        waves_1_m, phases = _field_waves(zlib.crc32(surface.encode()), self.length_m)
         shape = (-1, FIELD_WAVES, *[1] * max(x_m.ndim, y_m.ndim))
 
         def fields(x_m: Array, y_m: Array) -> Array:
@@ -141,7 +144,18 @@ class Relief:
 
 
 @dataclass(frozen=True)
-class Ridges(Relief):
+class Cut(Relief):
+    """A relief as a tool cuts it: its depth and the cross-section of what stands out."""
+
+    depth_m: float = param(
+        2e-4, 'Height above the grooves; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
+    )
+    shape: str = param('sine', "Cross-section, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Fraction of the pitch that a square ridge, post or hollow takes.', low=0.05, high=0.95)
+
+
+@dataclass(frozen=True)
+class Ridges(Cut):
     """What ridges of one pitch have in common, be they straight or rings."""
 
     pitch_m: float = param(
@@ -151,36 +165,22 @@ class Ridges(Relief):
         low=1e-5,
         high=0.1,
     )
-    depth_m: float = param(
-        2e-4,
-        'Height of the ridges above the grooves; a larger depth gives a stronger signal.',
-        unit='m',
-        low=0.0,
-        high=0.01,
-    )
-    shape: str = param('sine', "Cross-section of the ridges, 'sine' or 'square'.", choices=SHAPES)
-    duty: float = param(0.5, 'Fraction of the pitch that a square ridge takes.', low=0.05, high=0.95)
+
+    def across_m(self, distance_m: Array, blur_m: Array) -> Array:
+        """Return the blurred height at distances across the ridges, (..., n)."""
+        return self.depth_m * profile(distance_m, blur_m, self.pitch_m, self.shape, self.duty)
 
 
-# --------------------
-# Concentric rings.
+CENTRE_M = 0.05  # of rings, along x and y: slides begin within 0.1 m of the origin
 
 
 @dataclass(frozen=True)
 class Circles(Ridges):
     """Concentric rings: blurred as straight ridges are, which is right but within a pitch or so of the centre."""
 
-    centre_x_m: float = param(0.05, 'X coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m')
-    centre_y_m: float = param(0.05, 'Y coordinate of the centre; slides begin within 0.1 m of the origin.', unit='m')
-
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""
-        radius_m = np.hypot(x_m - self.centre_x_m, y_m - self.centre_y_m)
-        return self.depth_m * profile(radius_m, blur_m, self.pitch_m, self.shape, self.duty)
-
-
-# --------------------
-# Parallel ridges.
+        return self.across_m(np.hypot(x_m - CENTRE_M, y_m - CENTRE_M), blur_m)
 
 
 @dataclass(frozen=True)
@@ -193,8 +193,7 @@ class Grating(Ridges):
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""
-        across_m = x_m * math.cos(self.angle_rad) + y_m * math.sin(self.angle_rad)
-        return self.depth_m * profile(across_m, blur_m, self.pitch_m, self.shape, self.duty)
+        return self.across_m(x_m * math.cos(self.angle_rad) + y_m * math.sin(self.angle_rad), blur_m)
 
 
 # --------------------
@@ -204,7 +203,7 @@ MEAN = {'sine': 0.5}
 
 
 @dataclass(frozen=True)
-class Grid(Relief):
+class Grid(Cut):
     """Posts in rows and columns, or a net of ribs between hollows.
 
     The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
@@ -224,12 +223,7 @@ class Grid(Relief):
         low=1e-5,
         high=0.1,
     )
-    depth_m: float = param(
-        2e-4, 'Height of posts or ribs; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
-    )
     angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
-    shape: str = param('sine', "Cross-section of the posts or hollows, 'sine' or 'square'.", choices=SHAPES)
-    duty: float = param(0.5, 'Fraction of the pitch that a post or a hollow takes.', low=0.05, high=0.95)
     relief: str = param(
         'posts', "What stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
     )
@@ -270,7 +264,7 @@ class Surface:
         """Return the blurred height at positions."""
         level: Array | float = 1.0
         if self.variation is not None:
-            level, blur, _, shift_x_m, shift_y_m = self.variation.at(*np.broadcast_arrays(x_m, y_m))
+            level, blur, _, shift_x_m, shift_y_m = self.variation.at(self.name, *np.broadcast_arrays(x_m, y_m))
             x_m, y_m, blur_m = x_m + shift_x_m, y_m + shift_y_m, blur_m * blur
         blur_m = np.clip(blur_m, MIN_BLUR_M, MAX_BLUR_M)
         height = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape, blur_m.shape))
@@ -292,7 +286,14 @@ MIN_POINTS_FOR_OWN_TILE = 20_000
 TILE_POINTS = (SIDE + 1) ** 2
 
 
-class RandomRelief(Relief):
+@dataclass(frozen=True)
+class Seeded(Relief):
+    """A relief of which something is drawn at random."""
+
+    seed: int = param(0, 'Seed of what is random; equal seeds give equal surfaces.', low=0)
+
+
+class RandomRelief(Seeded):
     """A kind of random relief; hashable, so that its tiles are made once."""
 
     @property
@@ -301,13 +302,7 @@ class RandomRelief(Relief):
         raise NotImplementedError
 
     def sharp(self) -> Array:
-        """Return the height over one tile, (SIDE, SIDE) m, not blurred, going on periodically.
-
-        Returns
-        -------
-        (SIDE, SIDE)
-            m.
-        """
+        """Return the height over one tile, (SIDE, SIDE) m, not blurred, going on periodically."""
         raise NotImplementedError
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
@@ -414,7 +409,6 @@ class Sandpaper(RandomRelief):
         high=0.005,
     )
     cover: float = param(0.5, 'Fraction of the sheet that lies under grains.', low=0.02, high=2.0)
-    seed: int = param(0, 'Seed of the places and heights of the grains.', low=0)
 
     @property
     def spacing_m(self) -> float:
@@ -455,7 +449,6 @@ class SelfAffine(RandomRelief):
     hurst: float = param(0.8, 'Hurst exponent: 1 is smooth on small scales, 0 is jagged.', low=0.0, high=1.0)
     longest_m: float = param(6e-3, 'Longest wavelength of the relief.', unit='m', low=1e-4, high=0.1)
     shortest_m: float = param(4e-4, 'Shortest wavelength of the relief.', unit='m', low=1e-5, high=0.01)
-    seed: int = param(0, 'Seed of the random relief.', low=0)
 
     def __post_init__(self) -> None:
         if not 1 < self.longest_m / self.shortest_m <= SIDE / POINTS_PER_WAVE / 2:
@@ -490,7 +483,7 @@ KNOT_M = 2.5e-4  # straight between such places the shift is wrong by 1 % at mos
 
 
 @dataclass(frozen=True)
-class Weave(Relief):
+class Weave(Seeded):
     """Two sets of yarns: those met when sliding along x stand `pitch_x_m` apart.
 
     Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
@@ -536,7 +529,6 @@ class Weave(Relief):
         low=0.0,
         high=0.005,
     )
-    seed: int = param(0, 'Seed of the yarn positions.', low=0)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""

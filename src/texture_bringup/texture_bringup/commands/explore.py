@@ -38,27 +38,31 @@ from texture_exploration.presets import load_preset
 from texture_features.correction import read_reference
 from texture_recordings.dataset import SlideDataset
 
-# Option, field of the request, unit or '', meaning.
+# Option, field of the request, unit, meaning.
 NUMBERS = (
-    ('speed', 'speed_m_s', 'm/s', 'speed along the surface'),
-    ('force', 'force_n', 'N', 'force on the surface'),
-    ('distance', 'distance_m', 'm', 'length of a straight slide'),
-    ('radius', 'radius_m', 'm', 'radius, if the motion has one'),
-    ('turns', 'turns', '', 'turns, if the motion has some'),
-    ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
+    ('speed', 'speed_m_s', 'M/S', 'speed along the surface'),
+    ('force', 'force_n', 'NEWTON', 'force on the surface'),
+    ('distance', 'distance_m', 'M', 'length of a straight slide'),
+    ('radius', 'radius_m', 'M', 'radius, if the motion has one'),
+    ('turns', 'turns', 'N', 'turns, if the motion has some'),
+    ('duration', 'duration_s', 'S', 'duration of an in-hand slide'),
 )
 UNLIKE = 'it resembles none of the known textures'
 BAR = 24
 TIMEOUT_S = 300.0
+EXPLORER_S = 5.0  # within which an explorer that runs is discovered
 
 
 def _configure_explore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('motion', nargs='?', default='', help=f'how to move: {", ".join(MOTIONS)}')
     parser.add_argument('--preset', metavar='NAME', help='make all motions of a preset instead, such as ets-linear')
+    parser.add_argument(
+        '--repeats', type=int, default=0, metavar='N', help='rounds through a preset (default: as many as it says)'
+    )
     parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
     for option, _, unit, meaning in NUMBERS:
-        shown = f'{meaning}, {unit}' if unit else meaning
-        parser.add_argument(f'--{option}', type=float, default=0.0, help=f'{shown}; 0: the default of the motion')
+        shown = f'{meaning}; 0: the default of the motion'
+        parser.add_argument(f'--{option}', type=float, default=0.0, metavar=unit, help=shown)
     parser.add_argument(
         '--direction',
         type=float,
@@ -93,7 +97,7 @@ def _explore(options: argparse.Namespace) -> int:
     requests, made, code = requests_of(options), 0, 0
     try:
         with Operator(options.namespace) as operator:
-            operator.wait_for_explorer(deadline_s=10.0)
+            operator.wait_for_explorer(EXPLORER_S)
             while made < len(requests):
                 result = explored(operator, requests[made])
                 code = max(code, exit_code(result))
@@ -105,9 +109,10 @@ def _explore(options: argparse.Namespace) -> int:
                     break
                 made += 1
     finally:
-        if made < len(requests) > 1 and not options.preset:
+        if made < len(requests) > 1:
             left = ' '.join(f'{degrees:g}' for degrees in options.direction[made:])
-            print(f'{made} of {len(requests)} slides were made; go on with --direction {left}', file=sys.stderr)
+            advice = '' if options.preset else f'; go on with --direction {left}'
+            print(f'{made} of {len(requests)} slides were made{advice}', file=sys.stderr)
     return code
 
 
@@ -133,7 +138,11 @@ def as_json(result: ExplorationResult) -> dict[str, Any]:
         'error': result.error.name.lower(),
         'message': result.message,
         'exploration_id': result.exploration_id,
-        'texture': {**asdict(result.texture), 'rejection': result.texture.rejection.name.lower()},
+        'texture': {
+            **asdict(result.texture),
+            'rejection': result.texture.rejection.name.lower(),
+            'labels': result.labels,
+        },
         'roughness': asdict(result.roughness),
     }
     return cast(dict[str, Any], finite(values))
@@ -172,7 +181,8 @@ def tell(explored: ExplorationResult) -> bool:
         raise MotionRefused(explored.message)
     print(f'{explored.exploration_id}: {explored.message}')
     print(f'texture:   {texture_text(explored.texture)}')
-    print(f'roughness: {roughness_text(explored.roughness)}')
+    if explored.roughness.valid or explored.roughness.message:  # else nothing estimates it
+        print(f'roughness: {roughness_text(explored.roughness)}')
     return bool(explored.success)
 
 
@@ -181,7 +191,9 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     if bool(options.motion) == bool(options.preset):
         raise InvalidParameter('give the motion, such as linear_slide, or --preset NAME')
     if options.preset:
-        return [replace(one, surface=options.surface) for one in load_preset(options.preset).all(0)]
+        if options.repeats < 0:
+            raise InvalidParameter(f'--repeats is {options.repeats}; 1 or more rounds are needed')
+        return [replace(one, surface=options.surface) for one in load_preset(options.preset).all(options.repeats)]
     find(MOTIONS, options.motion, 'motion')  # said before an explorer is waited for
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     x_m, y_m = options.start or (0.0, 0.0)
@@ -225,7 +237,7 @@ def progress_text(estimate: TextureEstimate) -> str:
 def roughness_text(estimate: RoughnessEstimate) -> str:
     """Return a roughness estimate in words."""
     if not estimate.valid:
-        return estimate.message or 'none'
+        return estimate.message
     return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'
 
 
@@ -258,7 +270,7 @@ def _identify(options: argparse.Namespace) -> int:
         )
     belief, number = known.uniform_log_prior, 0
     with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(deadline_s=10.0)
+        operator.wait_for_explorer(EXPLORER_S)
         while number < options.most and np.exp(belief.max()) < options.sure:
             number += 1
             motion, information = known.best_motion(belief, known.motions)
@@ -308,18 +320,32 @@ PLATE_NUMBERS = {
 }
 
 
+# Option, lowest and highest of the collection, unit, meaning.
+RANGES = (
+    ('speed', ('speed_low_m_s', 'speed_high_m_s'), 'm/s', 'speeds of the slides (default: 0.02 to 0.05)'),
+    ('force', ('force_low_n', 'force_high_n'), 'N', 'normal forces of the slides (default: 1 to 2)'),
+)
+IN_RANGES = tuple(name for _, names, _, _ in RANGES for name in names)
+
+
 def _configure_collect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('surface', help='label of the surface under the finger')
     parser.add_argument('folder', type=Path, help='folder of the bags of all surfaces; made if missing')
-    add_parameters(parser, CollectionParams)
+    for option, _, unit, meaning in RANGES:
+        parser.add_argument(f'--{option}', type=float, nargs=2, metavar=('LOW', 'HIGH'), help=f'{meaning}, {unit}')
+    add_parameters(parser, CollectionParams, without=(*IN_RANGES, 'distance_m'))
+    parser.add_argument('--distance', type=float, metavar='M', help='length of each slide (default: 0.04)')
     add_namespace(parser)
 
 
 def _collect(options: argparse.Namespace) -> int:
     """Collect, say after a few places how well left-out ones are told; return 0 if the bound is met, else 1."""
-    params = parameters_from(options, CollectionParams)
+    given = {'distance_m': options.distance} if options.distance is not None else {}
+    for option, names, _, _ in RANGES:
+        given |= dict(zip(names, getattr(options, option) or (), strict=False))
+    params = parameters_from(options, CollectionParams, given)
     with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(10.0)
+        operator.wait_for_explorer(EXPLORER_S)
         end, bag = collect_surface(
             operator,
             options.surface,
@@ -389,7 +415,7 @@ def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> E
 def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str, count: int) -> None:
     """Slide over the reference plate so many times, and record that into a bag; MotionAborted if a slide fails."""
     with Operator(namespace) as operator:
-        operator.wait_for_explorer(10.0)
+        operator.wait_for_explorer(EXPLORER_S)
         with recorder(operator, bag, namespace):
             for _ in range(count):
                 explored = operator.explore(request)

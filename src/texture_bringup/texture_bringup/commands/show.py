@@ -13,15 +13,14 @@ import re
 import socket
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import yaml
 
 from texture_core.cli import Command
-from texture_core.config import find, shipped
+from texture_core.config import find, folder, shipped
 from texture_core.types import NANOSECONDS
 
 # What a command needs is imported when it runs: each looks at other packages.
@@ -41,33 +40,21 @@ def table(rows: Iterable[Row]) -> str:
 # List what can be chosen.
 
 
-def _first_line(entry: Any) -> str:
-    """Return the first line of the docstring of a class or of the module of a function, and which fingers it is for."""
-    if isinstance(entry, partial):
-        return f'{_first_line(entry.func)} {", ".join(f"{name} {value}" for name, value in _shown(entry))}'.strip()
-    documented = entry if inspect.isclass(entry) else inspect.getmodule(entry)
-    line = (inspect.getdoc(documented) or '').partition('\n')[0]
-    return re.split(r'[;.] [Ss]ee `', line)[0]
+def _catalogue(module: ModuleType) -> list[Row]:
+    """Return each name of a catalogue with the comment next to it in the source."""
+    return re.findall(r"^    '(\w+)': .*  # (.+)$", inspect.getsource(module), re.MULTILINE)
 
 
-def _shown(entry: partial[Any]) -> Iterator[tuple[str, Any]]:
-    return ((name, value) for name, value in entry.keywords.items() if isinstance(value, tuple))
+def _sensors() -> Iterable[Row]:
+    from texture_drivers import catalogue
+
+    return _catalogue(catalogue)
 
 
-def _catalogue(entries: Mapping[str, Any]) -> Iterator[Row]:
-    return ((name, _first_line(entry)) for name, entry in entries.items())
+def _arms() -> Iterable[Row]:
+    from texture_exploration.arms import catalogue
 
-
-def _sensors() -> Iterator[Row]:
-    from texture_drivers.catalogue import SENSORS
-
-    return _catalogue(SENSORS)
-
-
-def _arms() -> Iterator[Row]:
-    from texture_exploration.arms.catalogue import ARMS
-
-    return _catalogue(ARMS)
+    return _catalogue(catalogue)
 
 
 def _motions() -> Iterator[Row]:
@@ -85,8 +72,10 @@ def _motions() -> Iterator[Row]:
 
 
 def _recipes() -> Iterator[Row]:
-    for folder in ('config/recipes', 'config/roughness'):
-        for name, path in shipped('texture_estimation', folder).items():
+    for kind in ('config/recipes', 'config/roughness'):
+        ours = folder('texture_estimation', kind)
+        # Those of the papers come last.
+        for name, path in sorted(shipped('texture_estimation', kind).items(), key=lambda one: one[1].parent != ours):
             yield name, str(yaml.safe_load(path.read_text(encoding='utf-8')).get('description', ''))
 
 
@@ -98,7 +87,7 @@ def _surfaces() -> Iterator[Row]:
         yield name, f'{scene.sensor}: {", ".join(scene.surfaces)}'
 
 
-LISTS: Mapping[str, tuple[str, Callable[[], Iterator[Row]]]] = {
+LISTS: Mapping[str, tuple[str, Callable[[], Iterable[Row]]]] = {
     'sensors': ('what `sensor:=` of a launch takes', _sensors),
     'motions': ('what `texture explore` takes, with default and range of each number', _motions),
     'arms': ('what the parameter `arm` of the explorer takes', _arms),
@@ -140,9 +129,15 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _model_lines(path: Path) -> list[str]:
+    from texture_core.config import load_card
     from texture_estimation.model import load_model
-    from texture_evaluation.commands.train import summary
+    from texture_estimation.roughness import load_roughness_model
+    from texture_evaluation.commands.train import graded_summary, summary
 
+    card = path.with_name(f'{path.name.removesuffix(".npz").removesuffix(".json")}.json')
+    if card.is_file() and 'regressor' in load_card(card):
+        graded = load_roughness_model(path)
+        return [f'roughness model {graded.name}', *graded_summary(graded, path)[:-1]]
     model = load_model(path)
     return [f'model {model.name}', *summary(model, path)[:-1], f'topics: {", ".join(model.recipe.feature_set.topics)}']
 

@@ -8,10 +8,14 @@ import argparse
 import os
 import signal
 import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from multiprocessing import get_context
 from pathlib import Path
 
 from texture_bringup.launcher import (
+    NodeDescription,
     Supervisor,
     all_arguments,
     end_with,
@@ -22,6 +26,7 @@ from texture_bringup.launcher import (
 from texture_core.cli import Command, add_namespace, add_parameters, add_seed, parameters_from
 
 # Each command imports what it starts when it runs: a launcher is a child of many programs, and is up sooner without.
+# ruff: noqa: PLC0415
 
 
 def _configure_launch(parser: argparse.ArgumentParser) -> None:
@@ -44,8 +49,61 @@ def _launch(options: argparse.Namespace) -> int:
     if options.show_args:
         print(arguments_text(path))
         return 0
-    nodes = read(path, given_arguments(options.arguments), os.environ)
+    given = given_arguments(options.arguments)
+    nodes = read(path, given, os.environ)
+    refuse_wrong(nodes, set(given.values()))
     return Supervisor(nodes, _say, together=options.together).run()
+
+
+# What a node would refuse, by its program: the parameters of which all are looked at if one of them was given.
+LOOKED_AT = {
+    'emulator': ('scene', 'surface'),
+    'classifier': ('model',),
+    'roughness_estimator': ('model',),
+    'feature_extractor': ('recipe',),
+    'replay': ('bag',),
+}
+
+
+def _look_at(program: str, value: str, *more: str) -> None:
+    """Load what a program would load of its parameters; TextureError if it cannot be."""
+    if program == 'emulator':
+        from texture_simulation.scene import load_scene
+
+        load_scene(value).surface(*more)
+    elif program == 'classifier':
+        from texture_estimation.model import load_model
+
+        load_model(value)
+    elif program == 'roughness_estimator':
+        from texture_estimation.roughness import load_roughness_model
+
+        load_roughness_model(value)
+    elif program == 'feature_extractor':
+        from texture_features.feature_set import FeatureSet
+
+        FeatureSet.load(value)
+    else:
+        from texture_recordings.bags import find_bags
+
+        find_bags([value])
+
+
+def refuse_wrong(nodes: Sequence[NodeDescription], given: set[str]) -> None:
+    """Raise, before any node starts, what one of the suite's would say of a value that was given.
+
+    In a process of its own: libraries that start threads must not be in a launcher.
+    """
+    wanted = []
+    for node in nodes:
+        known = {name: value for one in node.parameters if isinstance(one, Mapping) for name, value in one.items()}
+        values = [str(known.get(name, '')) for name in LOOKED_AT.get(node.executable, ())]
+        if all(values) and given.intersection(values):
+            wanted.append((node.executable, *values))
+    if wanted:
+        with ProcessPoolExecutor(1, get_context('fork')) as pool:
+            for one in wanted:
+                pool.submit(_look_at, *one).result()
 
 
 def arguments_text(path: Path) -> str:
@@ -67,7 +125,7 @@ def _say(line: str) -> None:
 
 
 def _configure_dashboard(parser: argparse.ArgumentParser) -> None:
-    from texture_bringup.nodes.dashboard import DashboardParams  # noqa: PLC0415 – see above
+    from texture_bringup.nodes.dashboard import DashboardParams
 
     add_parameters(parser, DashboardParams)
     add_namespace(parser)
@@ -75,8 +133,8 @@ def _configure_dashboard(parser: argparse.ArgumentParser) -> None:
 
 def _dashboard(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    from texture_bringup.nodes.dashboard import DashboardNode, DashboardParams  # noqa: PLC0415 – see above
-    from texture_core.ros import run_node  # noqa: PLC0415
+    from texture_bringup.nodes.dashboard import DashboardNode, DashboardParams
+    from texture_core.ros import run_node
 
     run_node(DashboardNode, asdict(parameters_from(options, DashboardParams)), options.namespace)
     return 0
@@ -91,8 +149,8 @@ def _configure_demo(parser: argparse.ArgumentParser) -> None:
 
 def _demo(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if an answer was not as expected."""
-    from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate  # noqa: PLC0415 – see above
-    from texture_estimation.recipe import load_recipe  # noqa: PLC0415
+    from texture_bringup.demo import DemoPlan, ProgressLog, demonstrate
+    from texture_estimation.recipe import load_recipe
 
     load_recipe(options.recipe)  # refused before the nodes start
     progress = ProgressLog()

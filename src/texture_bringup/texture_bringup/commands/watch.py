@@ -17,7 +17,7 @@ from rich.text import Text
 
 from texture_bringup.feed import FRAME_PERIOD_S, Feed
 from texture_core.cli import add_namespace
-from texture_core.errors import InvalidParameter
+from texture_core.errors import ExplorationError, InvalidParameter
 from texture_core.types import NANOSECONDS
 
 BAR, LABELS = 30, 5
@@ -57,7 +57,7 @@ def _play(bag: str, rate: float, namespace: str, feed: Feed, show: Callable[[], 
     """Give the messages of a bag to the feed at their pace."""
     from texture_recordings.bags import read_bag  # noqa: PLC0415 - nothing else needs it
 
-    last_ns = None
+    last_ns, feed.recorded = None, True
     for topic, log_ns, value in read_bag(bag, feed.topics, namespace or None):
         pause_s = 0.0 if last_ns is None else (log_ns - last_ns) / NANOSECONDS / rate
         time.sleep(min(max(0.0, pause_s), LONGEST_PAUSE_S))
@@ -144,13 +144,14 @@ def line(frame: Frame) -> str:
 
 
 def finger_text(state: Mapping[str, Any]) -> str:
-    """Return motion, speed and force of a frame in words."""
+    """Return speed, force, motion and what ended it of a frame in words."""
     numbers = [
         f'{state[name]:.{digits}f} {unit}'
         for name, digits, unit in (('speed_m_s', 3, 'm/s'), ('force_n', 2, 'N'))
         if state[name] is not None
     ]
-    return '  '.join([*numbers, *filter(None, [state['motion']])]) or 'no exploration'
+    error = ExplorationError(state['error_code']).name.lower().replace('_', ' ') if state['error_code'] else ''
+    return '  '.join([*numbers, *filter(None, [state['motion'], error])]) or 'no exploration'
 
 
 def texture_text(texture: Mapping[str, Any]) -> str:

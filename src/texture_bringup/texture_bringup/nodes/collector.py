@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import signal
 import subprocess
@@ -75,7 +76,7 @@ def collect_surface(
     plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
-    with recorder(operator, bag, namespace) as check:
+    with recorder(operator, bag, namespace) as check, _unfinished(bag):
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
             check()
@@ -93,6 +94,21 @@ def collect_surface(
     with suppress(OSError):  # other surfaces lie in it
         folder.rmdir()
     return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
+
+
+@contextmanager
+def _unfinished(bag: Path) -> Iterator[None]:
+    """Log, within a `with` block, nothing of a bag that is still being recorded: it has no end yet."""
+
+    def of_others(record: logging.LogRecord) -> bool:
+        return str(bag) not in record.getMessage()
+
+    log = logging.getLogger('texture_recordings.bags')
+    log.addFilter(of_others)
+    try:
+        yield
+    finally:
+        log.removeFilter(of_others)
 
 
 def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:

@@ -40,6 +40,7 @@ from texture_core.ros import (
     to_msg,
 )
 from texture_core.types import ExplorationRequest, checked_label
+from texture_features.correction import read_reference
 
 ANSWER_DEADLINE_S = 30.0
 RETRY_PERIOD_S = 2.0
@@ -133,6 +134,7 @@ class DashboardNode(Node):
         path = answer.values[0].string_value
         if not path:
             raise InvalidParameter('the classifier has no model whose reference could be compared; start it with one')
+        read_reference(path)  # without one nothing need move
         return await self._run('check', path)
 
     async def collect(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:

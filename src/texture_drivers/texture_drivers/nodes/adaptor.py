@@ -17,6 +17,7 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.ros import SENSOR_QOS, DiagnosticReport, Diagnostics, declare, frame_name, run, to_msg
 from texture_drivers.adaptor import SignalAdaptor, load_mapping, losses
 from texture_drivers.health import BEFORE_THE_START
+from texture_drivers.sensor import BatchParams
 
 
 def import_message(message_type: str) -> Any:
@@ -32,23 +33,11 @@ def import_message(message_type: str) -> Any:
 
 
 @dataclass(frozen=True)
-class AdaptorParams:
+class AdaptorParams(BatchParams):
     """Parameters that select which messages are converted."""
 
     mapping: str = param(
         'robotiq_tsf', 'Mapping of messages to signals: name of a shipped one, or path of a YAML file.'
-    )
-    finger: int = param(0, 'Index of the finger that is converted; 0 is the first one of the message.', low=0, high=15)
-    batch_s: float = param(
-        0.01,
-        'Duration of one published batch; a longer batch costs less computing time and adds latency.',
-        unit='s',
-        low=0.001,
-        high=0.1,
-    )
-    frame_id: str = param(
-        'fingertip',
-        'Frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
     )
 
 

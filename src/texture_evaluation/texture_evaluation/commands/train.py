@@ -26,11 +26,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         '--grades', metavar='FILE', help='CSV file texture,grade: learn to grade roughness, by a roughness recipe'
     )
     parser.add_argument('-o', '--out', required=True, metavar='MODEL', help='makes MODEL.npz and MODEL.json')
+    parser.add_argument('--force', action='store_true', help='replace a model that is there already')
     add_slides(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Train, save, and say what was trained."""
+    _check_place(Path(options.out), replace=options.force)
     if options.grades:
         graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
         print('\n'.join(graded_summary(graded, Path(options.out))))
@@ -41,6 +43,15 @@ def run(options: argparse.Namespace) -> int:
     for line in summary(model, Path(options.out)):
         print(line)
     return 0
+
+
+def _check_place(out: Path, *, replace: bool) -> None:
+    """Refuse, before anything is computed, a place where a model is already, or a folder that does not exist."""
+    file = out.with_name(f'{out.name.removesuffix(".npz")}.npz')
+    if file.exists() and not replace:
+        raise InvalidParameter(f"'{file}' exists; give another name, or --force to replace it")
+    if not file.parent.is_dir():
+        raise InvalidParameter(f"there is no folder '{file.parent}' for the model; make it, or name another")
 
 
 def summary(model: TextureModel, out: Path) -> list[str]:

@@ -44,7 +44,8 @@ class ArmState:
     of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
     the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
     cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
-    more; 0 if it does not say. `unsafe` says why it must not go on although it obeys: it is to be lifted; '' if it may.
+    more; 0 if it does not say. `delay_s` passes from a force to the motion that answers it. `unsafe` says why it must
+    not go on although it obeys: it is to be lifted; '' if it may.
     """
 
     time_ns: int
@@ -56,6 +57,7 @@ class ArmState:
     tangential_force_n: float = math.nan
     along_n: tuple[float, float] = (math.nan, math.nan)
     unsafe: str = ''
+    delay_s: float = 0.0
 
     @property
     def force_vector_n(self) -> Vector:

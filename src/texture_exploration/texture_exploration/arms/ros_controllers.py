@@ -39,7 +39,7 @@ from texture_exploration.arms.tool_state import (
     RosControllersParams,
     ToolState,
 )
-from texture_exploration.safety import GAP_NS, Listening
+from texture_exploration.guards import GAP_NS, Listening
 
 
 class ControllerTopics(Protocol):

@@ -16,15 +16,7 @@ import numpy as np
 from texture_core.config import param
 from texture_core.errors import DeviceError
 from texture_core.types import FingerSender, FingerState
-from texture_exploration.arms.arm import (
-    STANDSTILL,
-    Arm,
-    ArmCommand,
-    ArmState,
-    CommandedVelocity,
-    ForceReading,
-    Vector,
-)
+from texture_exploration.arms.arm import STANDSTILL, Arm, ArmCommand, ArmState, CommandedVelocity, ForceReading, Vector
 from texture_exploration.force_control import ForceLoopParams
 from texture_exploration.safety import CommandLimits
 
@@ -142,15 +134,13 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
     force_mode: bool = param(
         True, 'Lets the arm control forces itself, ideally; false gives a delayed velocity interface.'
     )
-    undeclared_lag_s: float = param(
-        0.0, "Lag of an arm without force mode beyond 'loop_delay_s', not declared.", unit='s', low=0.0, high=0.2
-    )
     force_noise_n: float = param(
         0.001, 'Standard deviation of the force noise of an arm without force mode.', unit='N', low=0.0, high=1.0
     )
     stiffness_n_m: float = param(
         2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
     )
+    edge_m: float = param(0.0, 'Place along x where the surface ends; 0: nowhere.', unit='m', low=0.0, high=1.0)
     admittance_m_s_n: float = param(
         0.01, "Normal speed per force error of the arm's force mode.", unit='m/s/N', low=1e-4, high=1.0
     )
@@ -197,7 +187,9 @@ class SimulatedArm(Arm):
         self._clock = clock
         self._own_thread = own_thread
         self._last_command = (STANDSTILL, clock())  # the command, and when it came
-        self._state = ArmState(clock(), (0.0, 0.0, params.start_height_m), (0.0, 0.0, 0.0), 0.0)
+        self._delay_s = 0.0 if params.force_mode else params.loop_delay_s
+        start: Vector = (0.0, 0.0, params.start_height_m)
+        self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0, delay_s=self._delay_s)
         self._frozen = self._jammed = False
         self._fault = ''
         self._push_n = 0.0
@@ -211,10 +203,10 @@ class SimulatedArm(Arm):
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._emulator = FingerSender(params.finger_pipe)
+        shape = replace(shape, edge_m=params.edge_m) if params.edge_m else shape
         self._surface = SimulatedSurface(shape, params.stiffness_n_m)
-        # The force control is told `loop_delay_s` alone; the rest it has to find out.
         self._velocity = None if params.force_mode else CommandedVelocity(params, 1 / RATE_HZ)
-        self._delayed = DelayedVelocity(params.loop_delay_s + params.undeclared_lag_s, clock())
+        self._delayed = DelayedVelocity(params.loop_delay_s, clock())
 
     def connect(self) -> None:
         """Start to move in time; clears what was injected."""
@@ -320,7 +312,16 @@ class SimulatedArm(Arm):
             self._last_command = (STANDSTILL, now_ns)
         self._true_n = self._surface.force_n(x, z) + self._push_n
         along_n = (self._surface.wall_n(x), 0.0)
-        self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault, along_n=along_n)
+        force_n = self._measured_n(dt_s)
+        self._state = replace(
+            self._state,
+            time_ns=now_ns,
+            position=(x, y, z),
+            velocity=velocity,
+            force_n=force_n,
+            along_n=along_n,
+            fault=self._fault,
+        )
         if self._velocity:
             self._delayed.ask(now_ns, self._velocity.choose(command, self._state, min(dt_s, HOLDS_S)))
         self._emulator.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))

@@ -25,7 +25,8 @@ from texture_exploration.arms.arm import (
     tangential_force_n,
 )
 from texture_exploration.force_control import ForceLoopParams
-from texture_exploration.safety import WITHOUT_GAPS, CommandLimits
+from texture_exploration.guards import WITHOUT_GAPS
+from texture_exploration.safety import CommandLimits
 
 # --------------------
 # What can be chosen about an arm that is driven by ROS controllers.
@@ -284,6 +285,7 @@ class ToolState:
             fault,
             tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
             along_n=self._force_vector_n[:2],
+            delay_s=self._params.loop_delay_s + self._params.force_smoothing_s,
         )
 
     @property

@@ -49,20 +49,21 @@ from texture_core.ros import (
 from texture_core.types import ExplorationState, Phase, RoughnessEstimate, TextureEstimate, quaternion
 from texture_exploration.arms.arm import ENDING
 from texture_exploration.arms.catalogue import ARMS
-from texture_exploration.explorer import (
+from texture_exploration.exploration import (
     STILL_MOVING,
-    EarlyStoppingParams,
     Exploration,
     ExplorationEstimates,
     ExplorationOutcome,
-    Explorer,
+    may_stop,
     new_id,
     no_signal_watch,
     refusal,
 )
+from texture_exploration.explorer import Explorer
+from texture_exploration.guards import Listening, SignalWatch, SignalWatchParams
 from texture_exploration.motions import DEFAULTS, MOTIONS
-from texture_exploration.safety import Listening, SafetyLimits, SignalWatch, SignalWatchParams, SurfacePatch
-from texture_exploration.stages import TouchParams
+from texture_exploration.safety import SafetyLimits, SurfacePatch
+from texture_exploration.touch import TouchParams
 
 # --------------------
 # Frames of surface and fingertip on tf, where tf2_msgs is installed.
@@ -150,9 +151,9 @@ LOGGED: dict[str, Callable[[Any, str], Any]] = {
     'warning': lambda logger, text: logger.warning(text),
     'error': lambda logger, text: logger.error(text),
 }
-NOT_KNOWN = (
-    'whether the finger presses is not known, as after an explorer that was killed: the service ~/lift lifts it now, '
-    "and the first exploration does so; 'lift_at_start: true' does so at every start"
+PRESSED = (
+    'the force sensor shows {:.1f} N, so the finger may press, as after an explorer that was killed: `texture lift` '
+    "lifts it now, and the first exploration does so; 'lift_at_start: true' does so at every start"
 )
 RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
@@ -174,6 +175,9 @@ class ExplorerParams:
         'Lifts the finger until nothing touches it whenever the node takes control of the arm, as an explorer that was '
         'killed leaves it pressed.',
     )
+    estimate_timeout_s: float = param(
+        1.0, 'How long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
+    )
 
 
 class ExplorerNode(PatientLifecycleNode):
@@ -184,8 +188,8 @@ class ExplorerNode(PatientLifecycleNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
-        self._early_stopping = declare(self, EarlyStoppingParams, changeable=True)
         params = declare(self, ExplorerParams)
+        self._estimate_timeout_s = params.estimate_timeout_s
         self._explorer = self._make_explorer(params.arm)
         self._frames = FrameBroadcaster(self, declare(self, FrameParams))
         self._broadcast_surface()
@@ -199,6 +203,10 @@ class ExplorerNode(PatientLifecycleNode):
         self._infos = self.create_publisher(msg.ExplorerInfo, 'explorer_info', quality_of_service('explorer_info'))
         self._info, self._last_error, self._active = msg.ExplorerInfo(), ExplorationError.NONE, False
         self.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
+        self._model = msg.ModelInfo()
+        self.create_subscription(
+            msg.ModelInfo, 'model_info', partial(setattr, self, '_model'), quality_of_service('model_info')
+        )
         self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
@@ -243,12 +251,18 @@ class ExplorerNode(PatientLifecycleNode):
         if connected and self._lift_at_start:
             self._tried(self._explorer.lift)
         elif connected:
-            self.get_logger().info(NOT_KNOWN)
+            self._tried(self._name_pressed)
         if not (connected and self._tried(self._explorer.check_start)) and not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
         return super().on_activate(state)
+
+    def _name_pressed(self) -> None:
+        """Log that the finger may press, if the force sensor shows that."""
+        force_n = self._explorer.arm.state().force_n
+        if force_n > self._explorer.touch.contact_force_n:
+            self.get_logger().warning(PRESSED.format(force_n))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Lift the finger and let go of the arm."""
@@ -331,7 +345,6 @@ class ExplorerNode(PatientLifecycleNode):
 
     def _follow_parameters(self) -> None:
         """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
-        on_change(self, EarlyStoppingParams, partial(setattr, self, '_early_stopping'))
         on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
         on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
         on_change(self, SurfacePatch, partial(setattr, self._explorer, 'patch'))
@@ -375,6 +388,8 @@ class ExplorerNode(PatientLifecycleNode):
         result.error_code, result.message, result.lifted = int(outcome.error), outcome.message, outcome.lifted
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
+        of_model = (result.texture.model, result.texture.revision) == (self._model.model, self._model.revision)
+        result.labels = self._model.labels if of_model and result.texture.probabilities else []
         self._last_end = outcome.sentence(exploration.exploration_id)
         self._not_lifted = '' if outcome.lifted else self._last_end
         self._last_error = outcome.error
@@ -405,7 +420,7 @@ class ExplorerNode(PatientLifecycleNode):
     def _wait_for_final_estimates(self, exploration: Exploration, estimates: ExplorationEstimates) -> None:
         if exploration.outcome.slid and not self._closing:
             kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
-            estimates.wait_until_final(kinds, self._early_stopping.estimate_timeout_s)
+            estimates.wait_until_final(kinds, self._estimate_timeout_s)
 
     def _offer(self, name: str, work: Callable[[], str], group: ReentrantCallbackGroup) -> None:
         """Offer a service without numbers; `work` returns what was done, or raises why not."""
@@ -452,7 +467,7 @@ class ExplorerNode(PatientLifecycleNode):
         current = self._explorer.current
         wanted = current is not None and current.request.early_stopping
         ours = current is not None and current.exploration_id == estimate.exploration_id
-        if wanted and ours and isinstance(estimate, TextureEstimate) and self._early_stopping.may_stop(estimate):
+        if wanted and ours and isinstance(estimate, TextureEstimate) and may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is decided with {estimate.confidence:.2f} "
                 f'after {estimate.windows} windows'

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections import Counter
 from pathlib import Path
 
 from texture_core.cli import Command, add_parameters, add_slides, parameters_from, task
@@ -36,6 +38,8 @@ def _configure_import(parser: argparse.ArgumentParser) -> None:
 def _import(options: argparse.Namespace) -> int:
     """Import, and name the bags."""
     mapped = options.data_set in MAPPED
+    if not mapped:
+        find({**IMPORTS, **MAPPED}, options.data_set, 'data set or kind of source')
     if options.dry_run and mapped and len(options.places) == 2:
         options.places.append('')
     if len(options.places) != 2 + mapped:
@@ -70,6 +74,12 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
     report = import_tables(load_mapping(mapping), source, out, MAPPED[options.data_set])
     for line in report.lines():
         print(line)
+    stems = Counter(re.sub(r'[ _-]?\d+$', '', name) for name in report.slides)
+    if numbered := [name for name in report.slides if stems[re.sub(r'[ _-]?\d+$', '', name)] > 1]:
+        print(
+            f'surfaces that differ by a number alone: {", ".join(numbered)}; if it belongs to no label, give it a '
+            'field of its own in `files` of the mapping, such as {material}_{run:d}'
+        )
     return report.bags
 
 

@@ -24,6 +24,9 @@ def _record(options: argparse.Namespace) -> int:
     return 0
 
 
+RUNNING_S = 3.0  # within which nodes that run already are discovered
+
+
 def _configure_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bag', help='the bag, or a folder of bags')
     parser.add_argument('--rate', type=float, default=1.0, help='how many times faster than recorded')
@@ -35,7 +38,7 @@ def _configure_replay(parser: argparse.ArgumentParser) -> None:
 def _replay(options: argparse.Namespace) -> int:
     check_option(ReplayParams, 'rate', options.rate)
     parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides, 'clock': options.clock}
-    run_node(ReplayNode, parameters, options.namespace)
+    run_node(ReplayNode, {**parameters, 'deadline_s': RUNNING_S}, options.namespace)
     return 0
 
 

@@ -30,7 +30,8 @@ QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messag
 POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
 NOTHING = RawMessage('', '', 0, b'')
-EVENTS = '/parameter_events'
+EVENTS, EVENT = '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'
+HEADER = 4  # bytes that tell the encoding of a message
 DISCOVERY_S = 0.5  # how often it is asked what else is published
 
 
@@ -131,7 +132,11 @@ class RecordNode(Node):
                 pairs = zip(names, values.result().values, strict=True)
                 event = ParameterEvent(node=node, stamp=self.get_clock().now().to_msg())
                 event.new_parameters = [Parameter(name=name, value=value) for name, value in pairs]
-                self._on_message(EVENTS, 'rcl_interfaces/msg/ParameterEvent', serialize_message(event))
+                # As it is published: behind the message, rclpy leaves up to 8 bytes that were never set for each value,
+                # at which readers stop. They estimate the length with padding for empty arrays, which is not written.
+                raw, definition = serialize_message(event), typestore().get_msgdef(EVENT)
+                _, end = definition.deserialize_cdr_le(raw[HEADER:], 0, definition.cls, typestore())
+                self._on_message(EVENTS, EVENT, raw[: HEADER + end])
 
             def ask(listed: Future) -> None:
                 names = list(listed.result().result.names)

@@ -104,7 +104,7 @@ class ReplayNode(Node):
         self._clock_time = self.create_publisher(ClockTime, '/clock', 10) if self._params.clock else None
         self._counts: Counter[str] = Counter()
         self._stop = threading.Event()
-        self._error: TextureError | None = None
+        self.error: TextureError | None = None  # which ended the player
         self._player = threading.Thread(target=self._play, name='player')
         self._player.start()
         # With use_sim_time the node's own time would end with the recording.
@@ -131,10 +131,8 @@ class ReplayNode(Node):
         return (message for s in chosen for message in read_named(s.bag, namespace, s.start_ns, s.stop_ns)), names
 
     def _check(self) -> None:
-        """End the node when the player is through; a fault of the player is raised where it is seen."""
+        """End the node when the player is through."""
         if not self._player.is_alive():
-            if self._error is not None:
-                raise self._error
             rclpy.try_shutdown()
 
     def _play(self) -> None:
@@ -145,7 +143,7 @@ class ReplayNode(Node):
             self._wait_alone()
             self._publish_all()
         except TextureError as error:
-            self._error = error
+            self.error = error
 
     def _wait_for_subscribers(self) -> None:
         deadline = time.monotonic() + self._params.deadline_s
@@ -155,8 +153,9 @@ class ReplayNode(Node):
                 break
             if time.monotonic() > deadline:
                 raise DeviceError(
-                    f"within {self._params.deadline_s} s '{missing[0]}' did not get {self._params.subscribers} "
-                    "subscription(s); start what shall listen, or set 'subscribers' to 0"
+                    f"nobody listens to '{missing[0]}' (waited {self._params.deadline_s:g} s), so nothing is played; "
+                    f'`texture launch replay bag:={self._params.bag}` starts what listens, too, and --namespace names '
+                    'nodes that run elsewhere'
                 )
 
     def _wait_alone(self) -> None:

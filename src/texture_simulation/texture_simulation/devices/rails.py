@@ -37,24 +37,31 @@ REACHED = 0.99  # of the wanted force, where the motor stops
 LIFT_SPEED_M_S = 0.05
 
 
+ACCELERATION_M_S2 = 5.0  # of the stepper motors
+XY_COUNTS_M, Z_COUNTS_M = 200_000.0, 1_000_000.0  # encoder counts per metre: the defaults of the arm
+OVERLOAD_N = 14.0  # above this the firmware lifts the finger by itself
+RISE_M = 0.05  # of the pressing motor above the start
+
+
 @dataclass(frozen=True)
-class RailsMachine:
-    """Parameters of the emulated rails and of the surface under the finger."""
+class TouchParams:
+    """Where a finger begins, and how hard it is to press."""
 
     start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
     stiffness_n_m: float = param(
-        2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
+        2000.0,
+        'Stiffness of finger and surface in contact; 0 removes the surface.',
+        unit='N/m',
+        low=0.0,
+        high=200000.0,
     )
+
+
+@dataclass(frozen=True)
+class RailsMachine(TouchParams):
+    """Parameters of the emulated rails and of the surface under the finger."""
+
     travel_m: float = param(0.3, 'Distance of the end switches from the start.', unit='m', low=0.01)
-    acceleration_m_s2: float = param(
-        5.0,
-        'Acceleration of the stepper motors; larger values reach a commanded speed sooner.',
-        unit='m/s²',
-        low=0.1,
-    )
-    xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3)
-    z_counts_m: float = param(1_000_000.0, 'Encoder counts per metre of the pressing motor.', unit='1/m', low=1e3)
-    overload_n: float = param(14.0, 'Force above which the firmware lifts the finger by itself.', unit='N', low=0.1)
     stalled: bool = param(False, 'Blocks the rails mechanically, so that the encoders do not follow the motors.')
     reports_stall: bool = param(True, 'Lets the firmware stop and report encoders that do not follow the motors.')
 
@@ -98,15 +105,15 @@ class RailsFirmware:
         self._watch(dt_s)
         self._move_rails(dt_s)
         self._move_motor(dt_s)
-        if self.force_n > self.machine.overload_n:
+        if self.force_n > OVERLOAD_N:
             self._flags |= OVERLOAD
             self._wanted[:] = 0.0
             self._mode, self._value = MOVING, LIFT_SPEED_M_S
 
     def state(self) -> bytes:
         """Return a state on the wire."""
-        x, y = (round(place * self.machine.xy_counts_m) for place in self.position[:2])
-        z = round((self.position[2] - self.machine.start_height_m) * self.machine.z_counts_m)
+        x, y = (round(place * XY_COUNTS_M) for place in self.position[:2])
+        z = round((self.position[2] - self.machine.start_height_m) * Z_COUNTS_M)
         body = struct.pack('<iiiiBH', x, y, z, round(1e3 * self.force_n), self._flags, self.watchdog_stops % 2**16)
         self._sent += 1
         return framed(0x20, VERSION, self._sent - 1, round(self._time_s * 1e6), shape=(1, 1), body=body)
@@ -137,7 +144,7 @@ class RailsFirmware:
             self._halt()
 
     def _move_rails(self, dt_s: float) -> None:
-        change = self.machine.acceleration_m_s2 * dt_s
+        change = ACCELERATION_M_S2 * dt_s
         self.velocity[:2] += np.clip(self._wanted - self.velocity[:2], -change, change)
         if self.machine.stalled and self._wanted.any():
             self.velocity[:2] = 0.0
@@ -165,7 +172,7 @@ class RailsFirmware:
                 self._flags |= LOCKED
             else:
                 speed = float(np.clip(-PRESS_GAIN_M_S_N * error, -PRESS_SPEED_M_S, PRESS_SPEED_M_S))
-        top = self.machine.start_height_m + 0.05
+        top = self.machine.start_height_m + RISE_M
         before = self.position[2]
         self.position[2] = min(top, before + speed * dt_s)
         self._flags = (self._flags & ~TOP) | (self.position[2] >= top) * TOP

@@ -12,16 +12,16 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array, FingerState, rotation_matrix
+from texture_simulation.devices.rails import TouchParams
 
 # --------------------
 # The surface under the finger of an emulated arm, and a wall.
 
 
 @dataclass(frozen=True)
-class TouchedSurfaceParams:
-    """Where the surface lies, and how finger and force sensor begin."""
+class TouchedSurfaceParams(TouchParams):
+    """Where the surface lies, and what else is there."""
 
-    start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
     surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
     surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')
     surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
@@ -40,11 +40,16 @@ class TouchedSurfaceParams:
 STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
 
 
-def coulomb_n(friction: float, pressing_n: float, normal: Array, velocity_m_s: Array) -> Array:
-    """Return the Coulomb friction on a finger that is pressed on a surface with this normal."""
+def touch_force_n(
+    params: TouchedSurfaceParams, friction: float, axes: Array, from_origin_m: Array, velocity_m_s: Array
+) -> Array:
+    """Return the force on a finger, (3,): an elastic plane with Coulomb friction across axis z, a wall across x."""
+    normal = axes[:, 2]
+    pressing_n = params.stiffness_n_m * max(0.0, -float(from_origin_m @ normal))
+    behind_m = max(0.0, float(from_origin_m @ axes[:, 0]) - params.wall_m)
     along = velocity_m_s - (velocity_m_s @ normal) * normal
-    speed = math.sqrt(float(along @ along))
-    return -friction * pressing_n * along / max(speed, STICTION_M_S)
+    dragging = along / max(math.sqrt(float(along @ along)), STICTION_M_S)
+    return pressing_n * (normal - friction * dragging) - params.wall_stiffness_n_m * behind_m * axes[:, 0]
 
 
 # --------------------
@@ -96,13 +101,6 @@ class TwistControllerParams(TouchedSurfaceParams):
     surface_rz_rad: float = param(
         0.0, 'Z component of the rotation vector of the surface in the base frame.', unit='rad'
     )
-    stiffness_n_m: float = param(
-        2000.0,
-        'Stiffness of finger and surface in contact; 0 removes the surface.',
-        unit='N/m',
-        low=0.0,
-        high=200000.0,
-    )
     friction: float = param(
         0.3, 'Coefficient of Coulomb friction; larger values drag the finger more.', low=0.0, high=3.0
     )
@@ -123,13 +121,6 @@ class TwistControllerParams(TouchedSurfaceParams):
         low=-4.0,
         high=4.0,
     )
-    compliance_m_s_n: float = param(
-        0.002,
-        'Speed per force error with which the arm yields to a commanded force; larger values settle faster.',
-        unit='m/s/N',
-        low=0.0,
-        high=1.0,
-    )
 
 
 # --------------------
@@ -139,6 +130,7 @@ STEP_NS = 1_000_000
 MAX_STEPS = 100  # in one go, after the machine was busy
 GRAVITY_M_S2 = 9.81
 TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)  # quaternion x, y, z, w: the tool's z axis points against that of the base
+COMPLIANCE_M_S_N = 0.002  # speed per force error with which the arm yields; a guess of a usual order
 TOOL_AXES = np.diag([1.0, -1.0, -1.0])
 
 
@@ -184,13 +176,9 @@ class EmulatedTwistArm:
 
     @property
     def force_n(self) -> Array:
-        """Force on the finger in the base frame, (3,), N: elastic surface with Coulomb friction, and a wall."""
-        params, normal = self.params, self._axes[:, 2]
-        depth_m = -float((self.position - self._origin) @ normal)
-        behind_m = max(0.0, float((self.position - self._origin) @ self._axes[:, 0]) - params.wall_m)
-        pressing_n = params.stiffness_n_m * max(0.0, depth_m)
-        force = pressing_n * normal + coulomb_n(params.friction, pressing_n, normal, self.velocity)
-        return force - params.wall_stiffness_n_m * behind_m * self._axes[:, 0]
+        """Force on the finger in the base frame, (3,), N."""
+        from_origin_m = self.position - self._origin
+        return touch_force_n(self.params, self.params.friction, self._axes, from_origin_m, self.velocity)
 
     def reading_n(self) -> Array:
         """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise."""
@@ -227,4 +215,4 @@ class EmulatedTwistArm:
         if size == 0.0:
             return np.zeros(3)
         direction = self._pressing / size
-        return self.params.compliance_m_s_n * (size + float(self.force_n @ direction)) * direction
+        return COMPLIANCE_M_S_N * (size + float(self.force_n @ direction)) * direction

@@ -11,93 +11,27 @@ import json
 import math
 import os
 import re
-import selectors
+import select
 import signal
 import socket
 import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texture_core.config import param
 from texture_core.errors import DeviceError, TextureError
 from texture_core.types import Array, FingerSender, FingerState, loopback_address, rotation_matrix
 from texture_simulation.devices.rails import FingerPipeParams
-from texture_simulation.devices.twist_controller import TouchedSurfaceParams, coulomb_n
-
-# --------------------
-# What moves the emulated robot.
-#
-# Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched: rotation
-# vectors change component by component, and 1 rad counts as 1 m.
-
-
-class SpeedMove:
-    """Gain a velocity and keep it (speedl); `done` when it will not move any further by itself."""
-
-    def __init__(self, wanted: Array, acceleration: float) -> None:
-        self.done = False
-        self._wanted = wanted
-        self._acceleration = acceleration
-
-    def velocity(self, velocity: Array, step_s: float) -> Array:
-        """Return the velocity of the next step, (6,)."""
-        led = approach(velocity, self._wanted, self._acceleration * step_s)
-        self.done = not led.any() and not self._wanted.any()
-        return led
-
-
-def stop_move(deceleration: float) -> SpeedMove:
-    """Return the loss of all speed (stopl)."""
-    return SpeedMove(np.zeros(6), deceleration)
-
-
-def approach(now: Array, wanted: Array, step: float) -> Array:
-    """Return `now` led towards `wanted` by at most `step`."""
-    offset = wanted - now
-    distance = math.sqrt(offset @ offset)
-    return wanted if distance <= step else now + step / distance * offset
-
-
-# --------------------
-# The registers through which a program on the controller and the world outside talk.
-
-COUNT = 48
-
-
-class Registers:
-    """Input and output registers of integers and doubles.
-
-    `last_command_s` is when the command register last came, and `excused_s` how much of the silence since then the
-    client is not charged with.
-    """
-
-    def __init__(self) -> None:
-        self.int_in = np.zeros(COUNT, dtype=np.int64)
-        self.double_in = np.zeros(COUNT)
-        self.int_out = np.zeros(COUNT, dtype=np.int64)
-        self.double_out = np.zeros(COUNT)
-        self.last_command_s = 0.0
-        self.excused_s = 0.0
-
-    def heard(self, time_s: float) -> None:
-        """Take note that the command register came."""
-        self.last_command_s, self.excused_s = time_s, 0.0
-
-    def from_first(self, first: int) -> Registers:
-        """Return the registers from a first one on, counted from there: what is written to them is written here."""
-        shifted = Registers()
-        for name in ('int_in', 'double_in', 'int_out', 'double_out'):
-            setattr(shifted, name, getattr(self, name)[first:])
-        return shifted
-
+from texture_simulation.devices.twist_controller import TouchedSurfaceParams, touch_force_n
 
 # --------------------
 # Facts about UR controllers and about the control script of ur-rtde.
@@ -130,7 +64,6 @@ class RtdeMessage(enum.IntEnum):
 
     REQUEST_VERSION = 86
     CONTROLLER_VERSION = 118
-    TEXT = 77
     DATA = 85
     SETUP_OUTPUTS = 79
     SETUP_INPUTS = 73
@@ -140,8 +73,6 @@ class RtdeMessage(enum.IntEnum):
 
 # RTDE type -> format of `struct`, big-endian
 FORMATS: Mapping[str, str] = {
-    'BOOL': 'B',
-    'UINT8': 'B',
     'UINT32': 'I',
     'UINT64': 'Q',
     'INT32': 'i',
@@ -149,8 +80,8 @@ FORMATS: Mapping[str, str] = {
     'VECTOR3D': '3d',
     'VECTOR6D': '6d',
     'VECTOR6INT32': '6i',
-    'VECTOR6UINT32': '6I',
 }
+REGISTERS = 48  # of each kind
 
 
 class SafetyMode(enum.IntEnum):
@@ -161,10 +92,10 @@ class SafetyMode(enum.IntEnum):
 
 
 SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2}
-ROBOT_RUNNING = 7  # robot_mode
-PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
-CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
+RUNTIME_STATES = {'STOPPED': 1, 'PLAYING': 2, 'PAUSED': 4}
 POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
+ROBOT_RUNNING = 7  # robot_mode
+CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
 
 
 class ScriptCommand(enum.IntEnum):
@@ -201,16 +132,6 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
         'Loopback address to listen on, as the ports are fixed; or a path, which stands for one of its own.',
     )
     version: str = param('5.12', 'Version of the emulated control software.', choices=tuple(VERSIONS))
-    stiffness_n_m: float = param(
-        2000.0,
-        'Stiffness of finger and surface in contact; 0 removes the surface.',
-        unit='N/m',
-        low=0.0,
-        high=20000.0,
-    )
-    friction: float = param(
-        0.5, 'Coefficient of Coulomb friction; larger values drag the finger more.', low=0.0, high=3.0
-    )
     force_noise_n: float = param(0.02, 'Standard deviation of the noise of the force sensor.', unit='N', low=0.0)
     stop_force_n: float = param(
         100.0, 'Force above which the controller goes into a protective stop.', unit='N', low=1.0
@@ -221,34 +142,692 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
 
 
 # --------------------
-# The surface under the robot's finger: a level plane, elastic and with friction; a wall.
+# The emulated robot: a finger that follows motions exactly, complies under force control, and measures forces.
+#
+# Poses and velocities are arrays (6,): x, y, z in m, then a rotation vector in rad. Turning is only sketched: rotation
+# vectors change component by component, and 1 rad counts as 1 m.
+
+FRICTION = 0.5  # of the surface, until `emulate friction` sets another
+# Speed per force error, and the lag of the arm behind it. With 2 kN/m the error fades in about 0.1 s, which is of the
+# order of a real arm's.
+ADMITTANCE_M_S_N = 0.01
+LAG_S = 0.01
+HALT = 20.0  # deceleration of a protective stop, m/s²
+# The sensor drifts apart on all axes when it is not zeroed.
+OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
 
 
-UP = np.array([0.0, 0.0, 1.0])
+class SpeedMove:
+    """Gain a velocity and keep it (speedl); `done` when it will not move any further by itself."""
+
+    def __init__(self, wanted: Array, acceleration: float) -> None:
+        self.done = False
+        self._wanted = wanted
+        self._acceleration = acceleration
+
+    def velocity(self, velocity: Array, step_s: float) -> Array:
+        """Return the velocity of the next step, (6,)."""
+        change, most = self._wanted - velocity, self._acceleration * step_s
+        size = math.sqrt(change @ change)
+        led = self._wanted if size <= most else velocity + most / size * change
+        self.done = not led.any() and not self._wanted.any()
+        return led
 
 
-class ContactPlane:
-    """Contact force on a finger at a position and velocity, in the base frame of the robot."""
+def stop_move(deceleration: float) -> SpeedMove:
+    """Return the loss of all speed (stopl)."""
+    return SpeedMove(np.zeros(6), deceleration)
 
-    def __init__(self, params: UrControllerParams) -> None:
-        self._params = params
-        self.drop_m = 0.0
-        self.friction = params.friction
+
+class ForceMode(NamedTuple):
+    """Which axes of a frame, (3, 3) columns, yield, to which wrench of the robot, how fast at most; (6,) each."""
+
+    axes: Array
+    selection: Array
+    wrench: Array
+    limits: Array
+
+
+class EmulatedRobot:
+    """Physics of the robot, step by step.
+
+    `pose`, `velocity` and `force`, (6,), are of the fingertip in the base frame; the force is that of the surroundings
+    on the robot, as the sensor shows it. `motion` and `force_mode` move it. `speed_share` is the speed slider on the
+    pendant, 0 to 1, which the force mode does not obey.
+    """
+
+    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
         self.origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
+        self.friction = FRICTION
+        self.pose: Array = np.array([*self.origin, 0.0, 0.0, 0.0])
+        self.pose[2] += params.start_height_m
+        self.velocity: Array = np.zeros(6)
+        self.force: Array = np.zeros(6)
+        self.motion = stop_move(HALT)
+        self.force_mode: ForceMode | None = None
+        self.speed_share = 1.0
+        self._params = params
+        self._rng = rng
+        self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
+        self._offset: Array = params.force_offset_n * OFFSET_DIRECTION
+        self._contact: Array = np.zeros(3)
+        self._compliant_m_s: Array = np.zeros(3)  # speed of the yielding axes in the frame of the force mode
 
-    def force_n(self, position_m: Array, velocity_m_s: Array) -> Array:
-        """Return the force of the surface on the finger."""
-        behind_m = max(0.0, float(position_m[0] - self.origin[0]) - self._params.wall_m)
-        wall: Array = np.array([-self._params.wall_stiffness_n_m * behind_m, 0.0, 0.0])
-        depth_m = float(self.origin[2] - self.drop_m - position_m[2])
-        pressing = self._params.stiffness_n_m * max(0.0, depth_m)
-        if pressing == 0.0:
-            return wall
-        return wall + pressing * UP + coulomb_n(self.friction, pressing, UP, velocity_m_s)
+    @property
+    def pressing_n(self) -> float:
+        """The true force of the surface on the finger, along the vertical."""
+        return float(self._contact[2])
+
+    def step(self, step_s: float) -> None:
+        """Move for one step."""
+        # What is led by the motion is slowed by the slider, what yields to the force is not.
+        led = velocity = self.motion.velocity(self._unslowed, step_s)
+        if self.force_mode is not None:
+            led, velocity = self._comply(velocity, self.force_mode, step_s)
+        self._unslowed = velocity
+        self.velocity = velocity = velocity - (1.0 - self.speed_share) * led
+        self.pose = self.pose + velocity * step_s
+        # The contact, and what the sensor makes of it.
+        from_origin = self.pose[:3] - self.origin
+        self._contact = touch_force_n(self._params, self.friction, np.eye(3), from_origin, velocity[:3])
+        self.force = self._offset + self._params.force_noise_n * self._rng.standard_normal(6)
+        self.force[:3] += self._contact
+
+    def zero_force(self) -> None:
+        """Take what the sensor shows for nothing from now on."""
+        self._offset = np.array([*-self._contact, 0.0, 0.0, 0.0])
+
+    def end_force_mode(self) -> None:
+        """Yield no longer."""
+        self.force_mode = None
+        self._compliant_m_s = np.zeros(3)
+
+    def halt(self, deceleration: float = HALT) -> None:
+        """Stop, whatever it was doing."""
+        self.end_force_mode()
+        self.motion = stop_move(deceleration)
+
+    def _comply(self, velocity: Array, mode: ForceMode, step_s: float) -> tuple[Array, Array]:
+        """Return the velocity along the axes that do not yield, and that with those which seek the wanted force."""
+        error = mode.wrench[:3] + mode.axes.T @ self.force[:3]
+        wanted = np.clip(ADMITTANCE_M_S_N * error, -mode.limits[:3], mode.limits[:3])
+        self._compliant_m_s = self._compliant_m_s - (wanted - self._compliant_m_s) * math.expm1(-step_s / LAG_S)
+        yields, along = mode.selection > 0, mode.axes.T @ velocity[:3]
+        stiff = mode.axes @ np.where(yields[:3], 0.0, along)
+        complying = mode.axes @ np.where(yields[:3], self._compliant_m_s, along)
+        turning = np.where(yields[3:], 0.0, velocity[3:])
+        return np.concatenate([stiff, velocity[3:]]), np.concatenate([complying, turning])
 
 
 # --------------------
-# The emulated controller as a process of its own, for demonstrations and tests.
+# The emulated controller without its network: registers, program, robot, safety, in steps of its own time.
+
+STARTING_S = 0.05  # between the upload of a program and its start
+STOP_DECELERATION = 5.0  # of a program that ends, m/s²
+FORCE_MODE_STOP = 10.0  # m/s², as in the script
+ENDED = object()
+MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
+# So the control script of ur-rtde says it; the client puts the number behind a comment.
+FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
+Steps = Iterator[None]
+
+
+class Registers(NamedTuple):
+    """Through which a program and the world outside talk."""
+
+    int_in: NDArray[np.int64]
+    double_in: Array
+    int_out: NDArray[np.int64]
+    double_out: Array
+
+
+class EmulatedController:
+    """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
+
+    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
+        self.version = VERSIONS[params.version]
+        self.step_s = 1.0 / self.version.rate_hz
+        self.time_s = 0.0  # since it was switched on
+        whole, real = np.zeros((2, REGISTERS), dtype=np.int64), np.zeros((2, REGISTERS))
+        self.registers = Registers(whole[0], real[0], whole[1], real[1])
+        self.first_register = 0  # that the program uses
+        self.robot = EmulatedRobot(params, rng)
+        self.safety = SafetyMode.NORMAL
+        self.acknowledge_s = 0.0  # how much later than done stops and zeroing are acknowledged
+        self.program_name = CONTROL_SCRIPT  # of the one that runs, or ran last
+        self.paused = False
+        self._params = params
+        self._loaded = ''  # name of the program that `play` starts
+        self._starts_s = math.inf  # when an uploaded program starts
+        self._program: Iterator[None] | None = None
+        self._watchdog_s = math.inf  # longest silence
+        self._heard_s = self._excused_s = 0.0  # when the command register last came; silence that is not the client's
+        self._stopped_s = 0.0  # when the protective stop happened
+        self._unknown: set[int] = set()
+
+    @property
+    def playing(self) -> bool:
+        """Whether a program runs."""
+        return self._program is not None and not self.paused
+
+    @property
+    def state(self) -> str:
+        """State of the program, as the dashboard names it."""
+        return 'PAUSED' if self.paused else 'PLAYING' if self.playing else 'STOPPED'
+
+    def tick(self) -> None:
+        """Do one cycle."""
+        self.time_s += self.step_s
+        if self.time_s >= self._starts_s:
+            self._starts_s, self.program_name, self._program = math.inf, CONTROL_SCRIPT, self._control_script()
+        if self.time_s - self._heard_s > self._watchdog_s:
+            self.stop_program()
+        if self.playing and next(self._program or iter(()), ENDED) is ENDED:
+            self.stop_program()
+        self.robot.step(self.step_s)
+        if np.linalg.norm(self.robot.force[:3]) > self._params.stop_force_n:
+            self.protective_stop()
+
+    def catch_up(self) -> None:
+        """Do a cycle that should have been done before; it is not the client who was silent in it.
+
+        A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
+        """
+        if self._excused_s < MAX_EXCUSED_S:
+            self._excused_s += self.step_s
+            self._heard_s += self.step_s
+        self.tick()
+
+    def write(self, name: str, index: int, value: float) -> None:
+        """Write an input register; the watchdog watches that of the program's commands."""
+        getattr(self.registers, name)[index] = value
+        if name == 'int_in' and index == self.first_register:
+            self._heard_s, self._excused_s = self.time_s, 0.0
+
+    def upload(self, script: str) -> None:
+        """Take over a program, which starts a little later; in a protective stop none starts."""
+        if CONTROL_SCRIPT in script and self.safety is SafetyMode.NORMAL:
+            self.stop_program()
+            self._starts_s = self.time_s + STARTING_S
+            first = FIRST_REGISTER.search(script)
+            self.first_register = int(first.group(1)) if first else 0
+
+    def load(self, name: str) -> str:
+        """Take note of what `play` runs, and return the answer of the dashboard."""
+        self._loaded = name
+        return f'Loading program: {name}'
+
+    def play(self) -> str:
+        """Run the loaded program, which takes no commands and does nothing; return the answer of the dashboard."""
+        if not self._loaded:
+            return 'Failed to execute: play'
+        self.stop_program()
+        self._program, self.program_name = itertools.repeat(None), self._loaded
+        return 'Starting program'
+
+    def pause(self) -> None:
+        """Let the program wait."""
+        self.paused = self._program is not None
+
+    def stop_program(self) -> None:
+        """End the program, and with it every motion and the watchdog."""
+        if self._program is not None:
+            self.robot.halt(STOP_DECELERATION)
+        self._program, self.paused = None, False
+        self._starts_s = self._watchdog_s = math.inf
+
+    def protective_stop(self) -> None:
+        """Stop hard; the program ends."""
+        if self.safety is SafetyMode.NORMAL:
+            self.safety, self._stopped_s = SafetyMode.PROTECTIVE_STOP, self.time_s
+            self.stop_program()
+            self.robot.halt()
+
+    def unlock(self) -> bool:
+        """End a protective stop; return whether it was old enough for that."""
+        if self.time_s - self._stopped_s < self._params.unlock_delay_s:
+            return False
+        self.safety = SafetyMode.NORMAL
+        return True
+
+    # What the control script of ur-rtde does, without being URScript. It looks at its command register, number 0 or
+    # 24, once per cycle. Realtime commands are obeyed in every cycle in which they stand there; others once, until the
+    # client has written 0 in between. A command that is overwritten within a cycle is lost, as on the real controller.
+
+    def _control_script(self) -> Steps:
+        """Obey until told to end; one item per cycle."""
+        whole_in, real_in, whole_out, real_out = self.registers
+        here = slice(self.first_register, None)
+        registers = Registers(whole_in[here], real_in[here], whole_out[here], real_out[here])
+        executed = False
+        registers.int_out[0] = READY
+        while (number := int(registers.int_in[0])) != ScriptCommand.STOP_SCRIPT:
+            if number in REALTIME:
+                yield from self._execute(number, registers)
+                registers.int_out[0] = READY
+            elif number == ScriptCommand.NONE:
+                executed = False
+                registers.int_out[0] = READY
+            elif not executed:
+                yield from self._execute(number, registers)
+                if number in SLOW:
+                    yield from itertools.repeat(None, round(self.acknowledge_s / self.step_s))
+                executed = True
+                registers.int_out[0] = DONE
+            yield
+
+    def _execute(self, number: int, registers: Registers) -> Steps:
+        """Do one command with the arguments in its registers: d are doubles, i integers."""
+        robot, doubles = self.robot, registers.double_in.copy()
+        if number == ScriptCommand.SPEED_L:  # d0-5 velocity, d6 acceleration
+            robot.motion = SpeedMove(doubles[:6], doubles[6])
+        elif number == ScriptCommand.SPEED_STOP:  # d0 deceleration
+            yield from self._stop(doubles[0])
+        elif number == ScriptCommand.FORCE_MODE:  # i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; type 2 only
+            axes, selection = rotation_matrix(doubles[3:6]), registers.int_in[2:8].astype(float)
+            robot.force_mode = ForceMode(axes, selection, doubles[6:12], doubles[12:18])
+        elif number == ScriptCommand.FORCE_MODE_STOP:
+            speeding = robot.motion
+            robot.end_force_mode()
+            yield from self._stop(FORCE_MODE_STOP)
+            if not speeding.done:  # a speed goes on afterwards: its thread lives
+                robot.motion = speeding
+        elif number == ScriptCommand.ZERO_FT_SENSOR:
+            robot.zero_force()
+        elif number == ScriptCommand.GET_STEPTIME:
+            registers.double_out[0] = self.step_s
+        elif number == ScriptCommand.SET_WATCHDOG:  # d0 lowest frequency
+            self._watchdog_s, self._heard_s, self._excused_s = 1.0 / doubles[0], self.time_s, 0.0
+        elif number not in self._unknown:
+            self._unknown.add(number)
+            print(f'emulated UR controller: command {number} does nothing here', file=sys.stderr)
+
+    def _stop(self, deceleration: float) -> Steps:
+        self.robot.motion = motion = stop_move(deceleration)
+        while not motion.done:
+            yield
+
+
+# --------------------
+# The sessions: what the ports of dashboard, scripts and RTDE answer.
+
+
+class Session:
+    """One conversation with one client; `greeting` is said first, `package` unasked in each cycle."""
+
+    greeting = b''
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answer."""
+        raise NotImplementedError
+
+    def package(self) -> bytes:
+        """Return what is sent unasked in this cycle."""
+        return b''
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+
+# The dashboard: one line asks, one line answers. Beside the real commands it obeys the fault switches of the emulator:
+# `emulate protective stop`, `emulate silence SECONDS`, in which nobody is heard or answered, `emulate slow SECONDS`,
+# which lets stops, the end of force control and zeroing be acknowledged so much later, `emulate speed SHARE`, as of
+# the slider on the pendant, and `emulate friction COEFFICIENT`, as of another sample under the finger.
+# `load NAME` and `play` start a program of somebody else, which takes no commands.
+
+SERIAL_NUMBER = '20205500001'
+BANNER = b'Connected: Universal Robots Dashboard Server\n'
+TOO_EARLY = (
+    'Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking'
+)
+
+
+class DashboardSession(Session):
+    """The conversation on the dashboard."""
+
+    greeting = BANNER
+
+    def __init__(self, controller: EmulatedController, go_silent: Callable[[float], None]) -> None:
+        self._received = b''
+        numbers = '.'.join(str(number) for number in controller.version.numbers)
+        # Command: what answers the rest of the line.
+        self._answers: Mapping[str, Callable[[str], str]] = {
+            'get serial number': lambda _: SERIAL_NUMBER,
+            'get robot model': lambda _: 'UR5',
+            'polyscopeversion': lambda _: f'URSoftware {numbers} (emulated)',
+            'robotmode': lambda _: 'Robotmode: RUNNING',
+            'is in remote control': lambda _: 'true',
+            'safetystatus': lambda _: f'Safetystatus: {controller.safety.name}',
+            'safetymode': lambda _: f'Safetymode: {controller.safety.name}',
+            'running': lambda _: f'Program running: {str(controller.playing).lower()}',
+            'programstate': lambda _: f'{controller.state} {controller.program_name}',
+            'load': controller.load,
+            'play': lambda _: controller.play(),
+            'stop': partial(_do, controller.stop_program, 'Stopped'),
+            'pause': partial(_do, controller.pause, 'Pausing program'),
+            'unlock protective stop': lambda _: 'Protective stop releasing' if controller.unlock() else TOO_EARLY,
+            'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
+            'emulate silence': partial(_set, go_silent, 'seconds'),
+            'emulate slow': partial(_set, partial(setattr, controller, 'acknowledge_s'), 'seconds'),
+            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_share'), 'shares'),
+            'emulate friction': partial(_set, partial(setattr, controller.robot, 'friction'), 'newtons per N'),
+        }
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answers."""
+        *lines, self._received = (self._received + data).split(b'\n')
+        return b''.join(self._answer(line.decode('utf-8', 'replace').strip()).encode() + b'\n' for line in lines)
+
+    def _answer(self, line: str) -> str:
+        for command, answer in self._answers.items():
+            if line.lower() == command or line.lower().startswith(command + ' '):
+                return answer(line[len(command) :].strip())
+        return f'could not understand: {line}'
+
+
+def _do(action: Callable[[], None], answer: str, _argument: str) -> str:
+    action()
+    return answer
+
+
+def _set(use: Callable[[float], None], unit: str, argument: str) -> str:
+    """Set what a fault switch sets by a number, and return the answer."""
+    try:
+        number = float(argument)
+    except ValueError:
+        number = math.nan
+    if not 0 <= number < math.inf:
+        return f"came '{argument}'; a number of {unit} is needed"
+    use(number)
+    return f'set to {number:g} {unit}'
+
+
+LONGEST_SCRIPT = 1_000_000
+END = b'\nend\n'
+
+
+class ScriptSession(Session):
+    """The conversation with one client, who sends programs in URScript and gets no answer."""
+
+    def __init__(self, controller: EmulatedController) -> None:
+        self._controller = controller
+        self._received = b''
+
+    def receive(self, data: bytes) -> bytes:
+        """Start a program once its last line is there."""
+        self._received = (self._received + data)[-LONGEST_SCRIPT:]
+        if self._received.endswith(END):
+            self._controller.upload(self._received.decode('utf-8', 'replace'))
+            self._received = b''
+        return b''
+
+
+# The variables that RTDE offers: name, type and how to read it. The robot has no joints, and what no client of the
+# suite looks at is 0.
+
+Variable = tuple[str, Callable[[EmulatedController], Sequence[Any]]]
+UNUSED: Mapping[str, str] = {
+    'VECTOR6INT32': 'joint_mode',
+    'VECTOR3D': 'actual_tool_accelerometer payload_cog',
+    'VECTOR6D': 'target_q actual_q target_qd actual_qd target_qdd target_current actual_current target_moment '
+    'actual_current_as_torque joint_control_output joint_temperatures actual_joint_voltage payload_inertia',
+    'UINT64': 'actual_digital_input_bits actual_digital_output_bits',
+    'DOUBLE': 'payload actual_momentum standard_analog_input0 standard_analog_input1 standard_analog_output0 '
+    'standard_analog_output1 speed_scaling target_speed_fraction actual_robot_current actual_main_voltage '
+    'actual_robot_voltage actual_execution_time',
+}
+
+
+def _zeros(kind: str) -> Variable:
+    zeros = (0,) * len(struct.unpack(f'>{FORMATS[kind]}', bytes(struct.calcsize(f'>{FORMATS[kind]}'))))
+    return kind, lambda _controller: zeros
+
+
+def _of_robot(name: str) -> Variable:
+    return 'VECTOR6D', lambda controller: getattr(controller.robot, name).tolist()
+
+
+def _of_register(kind: str, name: str, index: int) -> Variable:
+    return kind, lambda controller: (getattr(controller.registers, name)[index],)
+
+
+OUTPUTS: Mapping[str, Variable] = {
+    **{name: _zeros(kind) for kind, names in UNUSED.items() for name in names.split()},
+    'robot_mode': ('INT32', lambda _controller: (ROBOT_RUNNING,)),
+    'timestamp': ('DOUBLE', lambda controller: (controller.time_s,)),
+    **dict.fromkeys(('actual_TCP_pose', 'target_TCP_pose'), _of_robot('pose')),
+    **dict.fromkeys(('actual_TCP_speed', 'target_TCP_speed'), _of_robot('velocity')),
+    **dict.fromkeys(('actual_TCP_force', 'ft_raw_wrench'), _of_robot('force')),
+    'safety_mode': ('INT32', lambda controller: (int(controller.safety),)),
+    'safety_status_bits': ('UINT32', lambda controller: (SAFETY_BITS[controller.safety],)),
+    'robot_status_bits': ('UINT32', lambda controller: (POWER_ON_BIT | PROGRAM_RUNNING_BIT * controller.playing,)),
+    'runtime_state': ('UINT32', lambda controller: (RUNTIME_STATES[controller.state],)),
+    **{f'output_int_register_{index}': _of_register('INT32', 'int_out', index) for index in range(REGISTERS)},
+    **{f'output_double_register_{index}': _of_register('DOUBLE', 'double_out', index) for index in range(REGISTERS)},
+}
+# Name: type, registers and index; what has no registers is taken and not used.
+INPUTS: Mapping[str, tuple[str, str, int]] = {
+    **{f'input_int_register_{index}': ('INT32', 'int_in', index) for index in range(REGISTERS)},
+    **{f'input_double_register_{index}': ('DOUBLE', 'double_in', index) for index in range(REGISTERS)},
+    'external_force_torque': ('VECTOR6D', '', 0),
+}
+
+# RTDE, protocol version 2: one session per connection, `package` is what it gets each cycle once it has asked for it.
+
+HEADER = struct.Struct('>HB')
+PROTOCOL_VERSION = 2
+OUTPUT_RECIPE = 1
+
+
+class RtdeSession(Session):
+    """The conversation with one client."""
+
+    def __init__(self, controller: EmulatedController, claims: dict[str, RtdeSession]) -> None:
+        self._controller = controller
+        self._claims = claims
+        self._received = b''
+        self._outputs: list[Variable] = []
+        self._every_s = controller.step_s
+        self._due_s = 0.0
+        self._started = False
+        self._inputs: list[list[str]] = []
+
+    def receive(self, data: bytes) -> bytes:
+        """Take over what came; return the answers."""
+        self._received += data
+        answers = b''
+        while len(self._received) >= HEADER.size:
+            size, kind = HEADER.unpack_from(self._received)
+            if size < HEADER.size:
+                self._received = b''
+            if len(self._received) < max(size, HEADER.size):
+                break
+            payload, self._received = self._received[HEADER.size : size], self._received[size:]
+            answer = self._answer(kind, payload)
+            answers += _message(kind, answer) if answer else b''
+        return answers
+
+    def close(self) -> None:
+        """Give the inputs free."""
+        for name in [name for name, owner in self._claims.items() if owner is self]:
+            del self._claims[name]
+
+    def package(self) -> bytes:
+        """Return the data message if one is due, else nothing."""
+        controller = self._controller
+        if not self._started or controller.time_s < self._due_s - 0.5 * controller.step_s:
+            return b''
+        self._due_s = max(self._due_s + self._every_s, controller.time_s)
+        values = [value for _, read in self._outputs for value in read(controller)]
+        packed = struct.pack(_format(kind for kind, _ in self._outputs), *values)
+        return _message(RtdeMessage.DATA, bytes([OUTPUT_RECIPE]) + packed)
+
+    def _answer(self, kind: int, payload: bytes) -> bytes:
+        """Return the content of the answer, b'' if there is none."""
+        if kind == RtdeMessage.REQUEST_VERSION:
+            return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
+        if kind == RtdeMessage.CONTROLLER_VERSION:
+            return struct.pack('>4I', *self._controller.version.numbers)
+        if kind == RtdeMessage.SETUP_OUTPUTS and len(payload) >= 8:
+            return self._on_setup_outputs(struct.unpack_from('>d', payload)[0], _names(payload[8:]))
+        if kind == RtdeMessage.SETUP_INPUTS:
+            return self._on_setup_inputs(_names(payload))
+        if kind in (RtdeMessage.START, RtdeMessage.PAUSE):
+            self._started = kind == RtdeMessage.START
+            return b'\x01'
+        if kind == RtdeMessage.DATA and payload and 1 <= payload[0] <= len(self._inputs):
+            self._write_inputs(self._inputs[payload[0] - 1], payload[1:])
+        return b''
+
+    def _on_setup_outputs(self, frequency_hz: float, names: list[str]) -> bytes:
+        self._every_s = max(1.0 / frequency_hz if frequency_hz > 0 else 0.0, self._controller.step_s)
+        if all(name in OUTPUTS for name in names):
+            self._outputs = [OUTPUTS[name] for name in names]
+        types = [OUTPUTS[name][0] if name in OUTPUTS else 'NOT_FOUND' for name in names]
+        return bytes([OUTPUT_RECIPE]) + ','.join(types).encode()
+
+    def _on_setup_inputs(self, names: list[str]) -> bytes:
+        types = [
+            'NOT_FOUND' if name not in INPUTS
+            else INPUTS[name][0] if self._claims.get(name, self) is self
+            else 'IN_USE'
+            for name in names
+        ]  # fmt: skip
+        if not {'NOT_FOUND', 'IN_USE'} & set(types):
+            self._claims.update(dict.fromkeys(names, self))
+            self._inputs.append(names)
+        return bytes([len(self._inputs)]) + ','.join(types).encode()
+
+    def _write_inputs(self, names: list[str], data: bytes) -> None:
+        """Write the values in `data` to inputs; what has another length is not taken."""
+        if len(data) != struct.calcsize(_format(INPUTS[name][0] for name in names)):
+            return
+        start = 0
+        for kind, registers, index in (INPUTS[name] for name in names):
+            value, *_ = struct.unpack_from(_format([kind]), data, start)
+            start += struct.calcsize(_format([kind]))
+            if registers:
+                self._controller.write(registers, index, value)
+
+
+def _message(kind: int, payload: bytes) -> bytes:
+    return HEADER.pack(HEADER.size + len(payload), kind) + payload
+
+
+def _names(data: bytes) -> list[str]:
+    """Return the names of a list, which may end with a comma."""
+    return [name for name in data.decode('ascii', 'replace').split(',') if name]
+
+
+def _format(kinds: Iterable[str]) -> str:
+    return '>' + ''.join(FORMATS[kind] for kind in kinds)
+
+
+# --------------------
+# The network of the emulated controller, and its clock.
+#
+# One thread: it sleeps until the next cycle is due, looks what has come, lets the controller do its cycles, and
+# sends.
+
+# That are made up for; a process that was held up for longer has lost the time. Meanwhile it hears no commands, and no
+# real controller moves for longer than its watchdog waits without one.
+MAX_MISSED_CYCLES = 50
+CHUNK = 65536
+
+
+class Server:
+    """Serve a controller on its ports."""
+
+    def __init__(self, controller: EmulatedController, ip: str, finger_pipe: str) -> None:
+        self._controller = controller
+        self._sessions: dict[socket.socket, Session] = {}
+        self._listeners: dict[socket.socket, Callable[[], Session]] = {}
+        self._silent_until_ns = 0
+        self._emulator = FingerSender(finger_pipe)
+        claims: dict[str, RtdeSession] = {}
+        self._listen(ip, RTDE_PORT, partial(RtdeSession, controller, claims))
+        self._listen(ip, SCRIPT_PORT, partial(ScriptSession, controller))
+        if controller.version.dashboard:
+            self._listen(ip, DASHBOARD_PORT, partial(DashboardSession, controller, self._go_silent))
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        """Serve until told to stop."""
+        step_ns = round(self._controller.step_s * 1e9)
+        due_ns = time.monotonic_ns()
+        while not stopped():
+            time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
+            missed = max(0, time.monotonic_ns() - due_ns) // step_ns
+            due_ns += (1 + missed) * step_ns
+            silent = time.monotonic_ns() < self._silent_until_ns
+            if not silent:
+                self._receive()
+            for _ in range(min(missed, MAX_MISSED_CYCLES)):
+                self._controller.catch_up()
+            self._controller.tick()
+            for connection, session in [] if silent else list(self._sessions.items()):
+                self._send(connection, session.package())
+            self._tell_emulator()
+
+    def _listen(self, ip: str, port: int, make_session: Callable[[], Session]) -> None:
+        try:
+            listener = socket.create_server((ip, port), backlog=8)
+        except OSError as error:
+            raise DeviceError(
+                f'the emulated UR controller cannot listen on {ip}:{port}: {error}; give each controller '
+                "a loopback address of its own, such as '127.0.0.3'"
+            ) from error
+        listener.setblocking(False)
+        self._listeners[listener] = make_session
+
+    def _go_silent(self, seconds: float) -> None:
+        self._silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
+
+    def _receive(self) -> None:
+        """Deal with what has come."""
+        ready, _, _ = select.select([*self._listeners, *self._sessions], [], [], 0)
+        for connection in ready:
+            if connection in self._listeners:
+                self._accept(connection)
+                continue
+            try:
+                data = connection.recv(CHUNK)
+            except OSError:
+                data = b''
+            if data:
+                self._send(connection, self._sessions[connection].receive(data))
+            else:
+                self._hang_up(connection)
+
+    def _accept(self, listener: socket.socket) -> None:
+        with suppress(BlockingIOError):
+            connection, _ = listener.accept()
+            connection.setblocking(False)
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            session = self._sessions[connection] = self._listeners[listener]()
+            self._send(connection, session.greeting)
+
+    def _send(self, connection: socket.socket, data: bytes) -> None:
+        """Send all of it, or hang up on a client that does not read."""
+        try:
+            sent = connection.send(data) if data else 0
+        except OSError:
+            sent = -1
+        if sent < len(data):
+            self._hang_up(connection)
+
+    def _hang_up(self, connection: socket.socket) -> None:
+        self._sessions.pop(connection).close()
+        connection.close()
+
+    def _tell_emulator(self) -> None:
+        robot = self._controller.robot
+        x, y, z = (robot.pose[:3] - robot.origin).tolist()
+        vx, vy, vz = robot.velocity[:3].tolist()
+        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
+
+
+# --------------------
+# The emulated controller as a process of its own, whose argument is the JSON of its parameters.
 #
 # It cannot run in the process of its client: the constructors of ur-rtde hold Python's global lock until they are
 # answered.
@@ -282,7 +861,9 @@ class ControllerProcess:
             text=True,
             start_new_session=True,  # Ctrl-C is for the owner; the process sees that it has ended
         )
-        if not self._ready(self._process):
+        assert self._process.stdout is not None
+        answered, _, _ = select.select([self._process.stdout], [], [], START_S)
+        if not answered or self._process.stdout.readline() != 'ready\n':
             self._process.kill()
             _, stderr = self._process.communicate()
             raise DeviceError(stderr.strip() or 'the emulated UR controller did not start')
@@ -322,832 +903,10 @@ class ControllerProcess:
             lines.flush()
             return lines.readline().strip()
 
-    @staticmethod
-    def _ready(process: subprocess.Popen[str]) -> bool:
-        assert process.stdout is not None
-        with selectors.DefaultSelector() as selector:
-            selector.register(process.stdout, selectors.EVENT_READ)
-            return bool(selector.select(START_S)) and process.stdout.readline() == 'ready\n'
-
-
-# --------------------
-# The emulated robot: a finger that follows motions exactly, complies under force control, and measures forces.
-
-# Force control of the emulated robot: speed per force error, and the lag of the arm behind it. With 2 kN/m the error
-# fades in about 0.1 s, which is of the order of a real arm's.
-ADMITTANCE_M_S_N = 0.01
-LAG_S = 0.01
-HALT = 20.0  # deceleration of a protective stop, m/s²
-# The sensor drifts apart on all axes when it is not zeroed.
-OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
-
-
-class ForceMode(NamedTuple):
-    """Which axes of a frame yield (selection, (6,)), to which wrench, and how fast at most; see force_mode in URScript.
-
-    `axes` is (3, 3), the axes of the frame as columns, in the base frame. The wrench is what the robot does to its
-    surroundings.
-    """
-
-    axes: Array
-    selection: Array
-    wrench: Array
-    limits: Array
-
-
-class EmulatedRobot:
-    """Physics of the robot, step by step.
-
-    Attributes
-    ----------
-    pose, velocity, force : (6,)
-        Of the fingertip in the base frame: m and rad, m/s, N. The force is that of the surroundings on the robot, as
-        the sensor shows it, with offset and noise.
-    motion, force_mode
-        What moves it; set from outside.
-    speed_share
-        Position of the speed slider on the pendant, 0 to 1; the force mode does not obey it.
-    """
-
-    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
-        self.surface = ContactPlane(params)
-        x, y, z = self.surface.origin
-        self.pose: Array = np.array([x, y, z + params.start_height_m, 0.0, 0.0, 0.0])
-        self.velocity: Array = np.zeros(6)
-        self.speed_share = 1.0
-        self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
-        self.force: Array = np.zeros(6)
-        self.motion = stop_move(HALT)
-        self.force_mode: ForceMode | None = None
-        self._offset: Array = params.force_offset_n * OFFSET_DIRECTION
-        self._noise_n = params.force_noise_n
-        self._rng = rng
-        self._contact: Array = np.zeros(3)
-        self._compliant_m_s: Array = np.zeros(3)  # speed of the yielding axes in the frame of the force mode
-
-    @property
-    def pressing_n(self) -> float:
-        """The true force of the surface on the finger, along the vertical."""
-        return float(self._contact[2])
-
-    def step(self, step_s: float) -> None:
-        """Move for one step."""
-        led = velocity = self.motion.velocity(self._unslowed, step_s)
-        if self.force_mode is not None:
-            velocity = self._comply(velocity, self.force_mode, step_s)
-            led = _stiff(led, self.force_mode)
-        self._unslowed = velocity
-        velocity = velocity - (1.0 - self.speed_share) * led
-        self.velocity = velocity
-        self.pose = self.pose + velocity * step_s
-        self._contact = self.surface.force_n(self.pose[:3], velocity[:3])
-        self.force = self._offset + self._noise_n * self._rng.standard_normal(6)
-        self.force[:3] += self._contact
-
-    def zero_force(self) -> None:
-        """Take what the sensor shows for nothing from now on."""
-        self._offset = np.zeros(6)
-        self._offset[:3] = -self._contact
-
-    def end_force_mode(self) -> None:
-        """Yield no longer."""
-        self.force_mode = None
-        self._compliant_m_s = np.zeros(3)
-
-    def halt(self) -> None:
-        """Stop hard, whatever it was doing."""
-        self.end_force_mode()
-        self.motion = stop_move(HALT)
-
-    def _comply(self, velocity: Array, mode: ForceMode, step_s: float) -> Array:
-        """Replace the velocity along yielding axes by one that brings the force to what is wanted."""
-        error = mode.wrench[:3] + mode.axes.T @ self.force[:3]
-        wanted = np.clip(ADMITTANCE_M_S_N * error, -mode.limits[:3], mode.limits[:3])
-        self._compliant_m_s = self._compliant_m_s - (wanted - self._compliant_m_s) * math.expm1(-step_s / LAG_S)
-        along = mode.axes.T @ velocity[:3]
-        along = np.where(mode.selection[:3] > 0, self._compliant_m_s, along)
-        turning = np.where(mode.selection[3:] > 0, 0.0, velocity[3:])
-        return np.concatenate([mode.axes @ along, turning])
-
-
-def _stiff(velocity: Array, mode: ForceMode) -> Array:
-    """Return the part of a velocity along the axes that do not yield, (6,)."""
-    along = np.where(mode.selection[:3] > 0, 0.0, mode.axes.T @ velocity[:3])
-    return np.concatenate([mode.axes @ along, velocity[3:]])
-
-
-# --------------------
-# What the control script of ur-rtde does on the controller, without being URScript.
-#
-# The script looks at its command register, input_int_register_0 or 24, once per cycle. Realtime commands are obeyed in
-# every cycle in which they stand there; others once, until the client has written 0 in between. A command that is
-# overwritten within a cycle is lost, as on the real controller.
-
-FORCE_MODE_STOP = 10.0  # m/s², as in the script
-Steps = Iterator[None]
-
-
-class ControlProgram:
-    """The running script; `cycles` is advanced once per cycle of the controller and ends with the script."""
-
-    def __init__(self, robot: EmulatedRobot, registers: Registers, host: EmulatedController, step_s: float) -> None:
-        self._robot = robot
-        self._registers = registers
-        self._host = host
-        self._step_s = step_s
-        self._unknown: set[int] = set()
-
-    def cycles(self) -> Steps:
-        """Obey until told to end; one item per cycle."""
-        registers = self._registers
-        executed = False
-        registers.int_out[0] = READY
-        while (number := int(registers.int_in[0])) != ScriptCommand.STOP_SCRIPT:
-            if number in REALTIME:
-                yield from self._execute(number)
-                registers.int_out[0] = READY
-            elif number == ScriptCommand.NONE:
-                executed = False
-                registers.int_out[0] = READY
-            elif not executed:
-                yield from self._execute(number)
-                if number in SLOW:
-                    yield from self._wait(self._host.acknowledge_s)
-                registers.int_out[0] = DONE
-                executed = True
-            yield
-
-    def _wait(self, seconds: float) -> Steps:
-        for _ in range(round(seconds / self._step_s)):
-            yield
-
-    def _execute(self, number: int) -> Steps:
-        """Do one command with the arguments in its registers: d are doubles, i integers."""
-        registers, robot = self._registers, self._robot
-        doubles = registers.double_in.copy()
-        if number == ScriptCommand.SPEED_L:  # d0-5 velocity, d6 acceleration
-            robot.motion = SpeedMove(doubles[:6], doubles[6])
-        elif number == ScriptCommand.SPEED_STOP:  # d0 deceleration
-            yield from self._stop(doubles[0])
-        elif number == ScriptCommand.FORCE_MODE:  # i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; type 2 only
-            axes, selection = rotation_matrix(doubles[3:6]), registers.int_in[2:8].astype(float)
-            robot.force_mode = ForceMode(axes, selection, doubles[6:12], doubles[12:18])
-        elif number == ScriptCommand.FORCE_MODE_STOP:
-            speeding = robot.motion
-            robot.end_force_mode()
-            yield from self._stop(FORCE_MODE_STOP)
-            if not speeding.done:  # a speed goes on afterwards: its thread lives
-                robot.motion = speeding
-        elif number == ScriptCommand.ZERO_FT_SENSOR:
-            robot.zero_force()
-        elif number == ScriptCommand.GET_STEPTIME:
-            registers.double_out[0] = self._step_s
-        elif number == ScriptCommand.SET_WATCHDOG:  # d0 lowest frequency
-            self._host.set_watchdog(doubles[0])
-        elif number not in self._unknown:
-            self._unknown.add(number)
-            print(f'emulated UR controller: command {number} does nothing here', file=sys.stderr)
-
-    def _stop(self, deceleration: float) -> Steps:
-        self._robot.motion = motion = stop_move(deceleration)
-        while not motion.done:
-            yield
-
-
-# --------------------
-# The emulated controller without its network: program, robot, safety, in steps of its own time.
-
-STARTING_S = 0.05  # between the upload of a program and its start
-STOP_DECELERATION = 5.0  # of a program that ends, m/s²
-ENDED = object()
-MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
-# So the control script of ur-rtde says it; the client puts the number behind a comment.
-FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
-
-
-class EmulatedController:
-    """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
-
-    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
-        self.version = VERSIONS[params.version]
-        self.step_s = 1.0 / self.version.rate_hz
-        self.ticks = 0
-        self.registers = Registers()
-        self.first_register = 0  # that the program uses
-        self.robot = EmulatedRobot(params, rng)
-        self.safety = SafetyMode.NORMAL
-        self.acknowledge_s = 0.0  # see `Host`; set from outside
-        self.program_name = CONTROL_SCRIPT  # of the one that runs, or ran last
-        self.loaded = ''  # name of the program that `play` starts
-        self.paused = False
-        self._params = params
-        self._starts_s: float | None = None  # when an uploaded program starts
-        self._program: Iterator[None] | None = None
-        self._watchdog_s = 0.0  # longest silence, 0: no watchdog
-        self._stopped_s = 0.0  # when the protective stop happened
-
-    @property
-    def time_s(self) -> float:
-        """Time since the controller was switched on."""
-        return self.ticks * self.step_s
-
-    @property
-    def playing(self) -> bool:
-        """Whether a program runs."""
-        return self._program is not None and not self.paused
-
-    @property
-    def state(self) -> str:
-        """State of the program, as the dashboard names it."""
-        return 'PAUSED' if self.paused else 'PLAYING' if self.playing else 'STOPPED'
-
-    def tick(self) -> None:
-        """Do one cycle."""
-        self.ticks += 1
-        if self._starts_s is not None and self.time_s >= self._starts_s:
-            self._start_program()
-        if self._watchdog_s and self.time_s - self.registers.last_command_s > self._watchdog_s:
-            self.stop_program()
-        if self._program is not None and not self.paused and next(self._program, ENDED) is ENDED:
-            self.stop_program()
-        self.robot.step(self.step_s)
-        if np.linalg.norm(self.robot.force[:3]) > self._params.stop_force_n:
-            self.protective_stop()
-
-    def catch_up(self) -> None:
-        """Do a cycle that should have been done before; it is not the client who was silent in it.
-
-        A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
-        """
-        registers = self.registers
-        if registers.excused_s < MAX_EXCUSED_S:
-            registers.excused_s += self.step_s
-            registers.last_command_s += self.step_s
-        self.tick()
-
-    def upload(self, script: str) -> None:
-        """Take over a program, which starts a little later; in a protective stop none starts."""
-        if 'rtde_control' in script and self.safety is SafetyMode.NORMAL:
-            self.stop_program()
-            self._starts_s = self.time_s + STARTING_S
-            first = FIRST_REGISTER.search(script)
-            self.first_register = int(first.group(1)) if first else 0
-
-    def load(self, name: str) -> str:
-        """Take note of what `play` runs, and return the answer of the dashboard."""
-        self.loaded = name
-        return f'Loading program: {name}'
-
-    def play(self) -> bool:
-        """Run the loaded program, which takes no commands and does nothing; return whether there is one."""
-        if self.loaded:
-            self.stop_program()
-            self._program, self.program_name = itertools.repeat(None), self.loaded
-        return bool(self.loaded)
-
-    def pause(self) -> None:
-        """Let the program wait."""
-        self.paused = self._program is not None
-
-    def _start_program(self) -> None:
-        self._starts_s = None
-        self.program_name = CONTROL_SCRIPT
-        self._program = ControlProgram(
-            self.robot, self.registers.from_first(self.first_register), self, self.step_s
-        ).cycles()
-
-    def stop_program(self) -> None:
-        """End the program, and with it every motion and the watchdog."""
-        if self._program is not None:
-            self.robot.end_force_mode()
-            self.robot.motion = stop_move(STOP_DECELERATION)
-        self._program = None
-        self.paused = False
-        self._starts_s = None
-        self._watchdog_s = 0.0
-
-    def set_watchdog(self, min_frequency_hz: float) -> None:
-        """Stop the program when input_int_register_0 comes less often."""
-        self._watchdog_s = 1.0 / min_frequency_hz
-        self.registers.heard(self.time_s)
-
-    def protective_stop(self) -> None:
-        """Stop hard; the program ends."""
-        if self.safety is SafetyMode.NORMAL:
-            self.safety = SafetyMode.PROTECTIVE_STOP
-            self._stopped_s = self.time_s
-            self.stop_program()
-            self.robot.halt()
-
-    def unlock(self) -> bool:
-        """End a protective stop; return whether it was old enough for that."""
-        if self.time_s - self._stopped_s < self._params.unlock_delay_s:
-            return False
-        self.safety = SafetyMode.NORMAL
-        return True
-
-
-# --------------------
-# The dashboard server: one line asks, one line answers.
-#
-# Beside the real commands it obeys the fault switches of the emulator: `emulate protective stop`,
-# `emulate offline SECONDS`, `emulate slow SECONDS`, which lets stops, the end of force control and zeroing be
-# acknowledged so much later, `emulate drop METRES`, which lowers the surface under the finger by so much, and
-# `emulate friction COEFFICIENT`, as of another sample under the finger.
-# `load NAME` and `play` start a program of somebody else, which takes no commands.
-
-BANNER = b'Connected: Universal Robots Dashboard Server\n'
-SERIAL_NUMBER = '20205500001'
-TOO_EARLY = (
-    'Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking'
-)
-
-
-class Session:
-    """One conversation with one client; by itself it says nothing."""
-
-    def greeting(self) -> bytes:
-        """Return what the server says first."""
-        return b''
-
-    def receive(self, data: bytes) -> bytes:
-        """Take over what came; return the answer."""
-        raise NotImplementedError
-
-    def package(self) -> bytes:
-        """Return what is sent unasked in this cycle."""
-        return b''
-
-    def close(self) -> None:
-        """Leave nothing behind."""
-
-
-FIXED_ANSWERS: Mapping[str, str] = {
-    'get serial number': SERIAL_NUMBER,
-    'get robot model': 'UR5',
-    'is in remote control': 'true',
-    'robotmode': 'Robotmode: RUNNING',
-    'close safety popup': 'closing safety popup',
-    'quit': 'Disconnected',
-}
-
-
-class DashboardSession(Session):
-    """The conversation on the dashboard."""
-
-    def __init__(
-        self, controller: EmulatedController, go_offline: Callable[[float], None], go_silent: Callable[[float], None]
-    ) -> None:
-        self._controller = controller
-        self._received = b''
-        robot, plane = controller.robot, controller.robot.surface
-        numbers = '.'.join(str(number) for number in controller.version.numbers)
-        # Command: its answer, or what does it and returns the answer.
-        self._answers: Mapping[str, str | Callable[[str], str]] = {
-            **FIXED_ANSWERS,
-            'polyscopeversion': f'URSoftware {numbers} (emulated)',
-            'safetystatus': lambda _: f'Safetystatus: {controller.safety.name}',
-            'safetymode': lambda _: f'Safetymode: {controller.safety.name}',
-            'running': lambda _: f'Program running: {str(controller.playing).lower()}',
-            'programstate': lambda _: f'{controller.state} {controller.program_name}',
-            'load': controller.load,
-            'play': lambda _: 'Starting program' if controller.play() else 'Failed to execute: play',
-            'stop': partial(_do, controller.stop_program, 'Stopped'),
-            'pause': partial(_do, controller.pause, 'Pausing program'),
-            'unlock protective stop': lambda _: 'Protective stop releasing' if controller.unlock() else TOO_EARLY,
-            'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
-        }
-        # Fault switch: what takes the number, and its unit.
-        self._switches: Mapping[str, tuple[Callable[[float], None], str]] = {
-            'emulate offline': (go_offline, 'seconds'),
-            'emulate silence': (go_silent, 'seconds'),
-            'emulate slow': (partial(setattr, controller, 'acknowledge_s'), 'seconds'),
-            'emulate speed': (partial(setattr, robot, 'speed_share'), 'shares'),
-            'emulate drop': (partial(setattr, plane, 'drop_m'), 'metres'),
-            'emulate friction': (partial(setattr, plane, 'friction'), 'newtons per N'),
-        }
-
-    def greeting(self) -> bytes:
-        """Return the line with which the server begins."""
-        return BANNER
-
-    def receive(self, data: bytes) -> bytes:
-        """Take over what came; return the answers."""
-        *lines, self._received = (self._received + data).split(b'\n')
-        return b''.join(self._answer(line.decode('utf-8', 'replace').strip()).encode() + b'\n' for line in lines)
-
-    def _answer(self, line: str) -> str:
-        for command, answer in self._answers.items():
-            if line.lower() == command or line.lower().startswith(command + ' '):
-                return answer if isinstance(answer, str) else answer(line[len(command) :].strip())
-        for command, (use, unit) in self._switches.items():
-            if line.lower().startswith(command):
-                return _set(use, unit, line[len(command) :].strip())
-        return f'could not understand: {line}'
-
-
-def _do(action: Callable[[], None], answer: str, _argument: str) -> str:
-    action()
-    return answer
-
-
-def _set(use: Callable[[float], None], unit: str, argument: str) -> str:
-    """Set what a fault switch sets by a number, and return the answer."""
-    try:
-        number = float(argument)
-    except ValueError:
-        number = math.nan
-    if not 0 <= number < math.inf:
-        return f"came '{argument}'; a number of {unit} is needed"
-    use(number)
-    return f'set to {number:g} {unit}'
-
-
-# --------------------
-# The port that takes programs in URScript.
-
-LONGEST_SCRIPT = 1_000_000
-END = b'\nend\n'
-
-
-class ScriptSession(Session):
-    """The conversation with one client, who sends programs and gets no answer."""
-
-    def __init__(self, controller: EmulatedController) -> None:
-        self._controller = controller
-        self._received = b''
-
-    def receive(self, data: bytes) -> bytes:
-        """Start a program once its last line is there."""
-        self._received = (self._received + data)[-LONGEST_SCRIPT:]
-        if self._received.endswith(END):
-            self._controller.upload(self._received.decode('utf-8', 'replace'))
-            self._received = b''
-        return b''
-
-
-# --------------------
-# The variables that RTDE offers: name, type and how to read it.
-#
-# The robot has no joints: joint variables stand still at a usual pose. What no client of the suite looks at is
-# constant.
-
-Getter = Callable[[EmulatedController], Sequence[Any]]
-Variable = tuple[str, Getter]
-
-JOINTS = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
-JOINT_RUNNING = 253
-STATES = {'PAUSED': PROGRAM_PAUSED, 'PLAYING': PROGRAM_PLAYING, 'STOPPED': PROGRAM_STOPPED}
-ZEROS = (0.0,) * 6
-# What stands still: type, values, and the names that have them.
-CONSTANTS: Sequence[tuple[str, Sequence[float], str]] = (
-    ('INT32', (ROBOT_RUNNING,), 'robot_mode'),
-    ('VECTOR6INT32', (JOINT_RUNNING,) * 6, 'joint_mode'),
-    ('VECTOR3D', (0.0, 0.0, -9.81), 'actual_tool_accelerometer'),
-    ('VECTOR3D', ZEROS[:3], 'payload_cog'),
-    ('VECTOR6D', JOINTS, 'target_q actual_q'),
-    (
-        'VECTOR6D',
-        ZEROS,
-        'payload_inertia target_qd target_qdd target_current target_moment actual_qd actual_current '
-        'actual_current_as_torque joint_control_output',
-    ),
-    ('VECTOR6D', (30.0,) * 6, 'joint_temperatures'),
-    ('VECTOR6D', (48.0,) * 6, 'actual_joint_voltage'),
-    ('UINT64', (0,), 'actual_digital_input_bits actual_digital_output_bits'),
-    (
-        'DOUBLE',
-        (0.0,),
-        'payload actual_momentum standard_analog_input0 standard_analog_input1 standard_analog_output0 '
-        'standard_analog_output1',
-    ),
-    ('DOUBLE', (1.0,), 'speed_scaling target_speed_fraction actual_robot_current'),
-    ('DOUBLE', (48.0,), 'actual_main_voltage actual_robot_voltage'),
-    ('DOUBLE', (0.1,), 'actual_execution_time'),
-)
-
-
-def _constant(values: Sequence[float]) -> Getter:
-    return lambda _controller: values
-
-
-def _register(name: str, index: int) -> Getter:
-    return lambda controller: (getattr(controller.registers, name)[index],)
-
-
-def _of_robot(name: str) -> Variable:
-    return 'VECTOR6D', lambda controller: getattr(controller.robot, name).tolist()
-
-
-OUTPUTS: Mapping[str, Variable] = {
-    **{name: (kind, _constant(values)) for kind, values, names in CONSTANTS for name in names.split()},
-    'timestamp': ('DOUBLE', lambda controller: (controller.time_s,)),
-    **dict.fromkeys(('actual_TCP_pose', 'target_TCP_pose'), _of_robot('pose')),
-    **dict.fromkeys(('actual_TCP_speed', 'target_TCP_speed'), _of_robot('velocity')),
-    **dict.fromkeys(('actual_TCP_force', 'ft_raw_wrench'), _of_robot('force')),
-    'safety_mode': ('INT32', lambda controller: (int(controller.safety),)),
-    'safety_status_bits': ('UINT32', lambda controller: (SAFETY_BITS[controller.safety],)),
-    'robot_status_bits': ('UINT32', lambda controller: (POWER_ON_BIT | PROGRAM_RUNNING_BIT * controller.playing,)),
-    'runtime_state': ('UINT32', lambda controller: (STATES[controller.state],)),
-    **{f'output_int_register_{index}': ('INT32', _register('int_out', index)) for index in range(COUNT)},
-    **{f'output_double_register_{index}': ('DOUBLE', _register('double_out', index)) for index in range(COUNT)},
-}
-
-Setter = Callable[[EmulatedController, Sequence[Any]], None]
-
-
-def _write(name: str, index: int) -> Setter:
-    def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
-        getattr(controller.registers, name)[index] = values[0]
-        if name == 'int_in' and index == controller.first_register:  # the watchdog watches that of the program
-            controller.registers.heard(controller.time_s)
-
-    return setter
-
-
-INPUTS: Mapping[str, tuple[str, Setter]] = {
-    **{f'input_int_register_{index}': ('INT32', _write('int_in', index)) for index in range(COUNT)},
-    **{f'input_double_register_{index}': ('DOUBLE', _write('double_in', index)) for index in range(COUNT)},
-    'external_force_torque': ('VECTOR6D', lambda _controller, _values: None),
-}
-
-
-# --------------------
-# RTDE, protocol version 2, as the controller speaks it: one session per connection.
-
-HEADER = struct.Struct('>HB')
-PROTOCOL_VERSION = 2
-OUTPUT_RECIPE = 1
-
-
-class RtdeSession(Session):
-    """The conversation with one client; `package` is what it gets each cycle once it has asked for it."""
-
-    def __init__(self, controller: EmulatedController, claims: dict[str, RtdeSession]) -> None:
-        self._controller = controller
-        self._claims = claims
-        self._received = b''
-        self._output_format = struct.Struct('>')
-        self._getters: list[Getter] = []
-        self._every_s = controller.step_s
-        self._due_s = 0.0
-        self._started = False
-        self._inputs: list[list[str]] = []
-
-    def receive(self, data: bytes) -> bytes:
-        """Take over what came; return the answers."""
-        self._received += data
-        answers = b''
-        while (packet := self._take_packet()) is not None:
-            kind, payload = packet
-            answer = self._answer(kind, payload)
-            answers += _message(kind, answer) if answer is not None else b''
-        return answers
-
-    def _take_packet(self) -> tuple[int, bytes] | None:
-        """Return the kind and the content of the next packet; None if it is not complete."""
-        if len(self._received) < HEADER.size:
-            return None
-        size, kind = HEADER.unpack_from(self._received)
-        if size < HEADER.size:
-            self._received = b''
-        if len(self._received) < size or size < HEADER.size:
-            return None
-        payload, self._received = self._received[HEADER.size : size], self._received[size:]
-        return kind, payload
-
-    def close(self) -> None:
-        """Give the inputs free."""
-        for name in [name for name, owner in self._claims.items() if owner is self]:
-            del self._claims[name]
-
-    def package(self) -> bytes:
-        """Return the data message if one is due, else nothing."""
-        controller = self._controller
-        if not self._started or controller.time_s < self._due_s - 0.5 * controller.step_s:
-            return b''
-        self._due_s = max(self._due_s + self._every_s, controller.time_s)
-        values = [value for getter in self._getters for value in getter(controller)]
-        return _message(RtdeMessage.DATA, bytes([OUTPUT_RECIPE]) + self._output_format.pack(*values))
-
-    def _answer(self, kind: int, payload: bytes) -> bytes | None:
-        if kind == RtdeMessage.REQUEST_VERSION:
-            return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
-        if kind == RtdeMessage.CONTROLLER_VERSION:
-            return struct.pack('>4I', *self._controller.version.numbers)
-        if kind == RtdeMessage.SETUP_OUTPUTS:
-            return self._on_setup_outputs(payload)
-        if kind == RtdeMessage.SETUP_INPUTS:
-            return self._on_setup_inputs(payload)
-        if kind in (RtdeMessage.START, RtdeMessage.PAUSE):
-            self._started = kind == RtdeMessage.START
-            return b'\x01'
-        if kind == RtdeMessage.DATA and payload and 1 <= payload[0] <= len(self._inputs):
-            write_inputs(self._controller, self._inputs[payload[0] - 1], payload[1:])
-        return None
-
-    def _on_setup_outputs(self, payload: bytes) -> bytes | None:
-        if len(payload) < 8:
-            return None
-        (frequency_hz,) = struct.unpack_from('>d', payload)
-        self._every_s = max(1.0 / frequency_hz if frequency_hz > 0 else 0.0, self._controller.step_s)
-        names = _names(payload[8:])
-        types = [OUTPUTS[name][0] if name in OUTPUTS else 'NOT_FOUND' for name in names]
-        if 'NOT_FOUND' not in types:
-            self._getters = [OUTPUTS[name][1] for name in names]
-            self._output_format = _format(types)
-        return bytes([OUTPUT_RECIPE]) + ','.join(types).encode()
-
-    def _on_setup_inputs(self, payload: bytes) -> bytes:
-        names = _names(payload)
-        types = [self._input_type(name) for name in names]
-        if not {'NOT_FOUND', 'IN_USE'} & set(types):
-            self._claims.update(dict.fromkeys(names, self))
-            self._inputs.append(names)
-        return bytes([len(self._inputs)]) + ','.join(types).encode()
-
-    def _input_type(self, name: str) -> str:
-        if name not in INPUTS:
-            return 'NOT_FOUND'
-        return INPUTS[name][0] if self._claims.get(name, self) is self else 'IN_USE'
-
-
-def write_inputs(controller: EmulatedController, names: Sequence[str], data: bytes) -> None:
-    """Write the values in `data` to inputs; what has another length is not taken."""
-    if len(data) != _format([INPUTS[name][0] for name in names]).size:
-        return
-    start = 0
-    for name in names:
-        kind, setter = INPUTS[name]
-        fields = struct.Struct('>' + FORMATS[kind])
-        setter(controller, fields.unpack_from(data, start))
-        start += fields.size
-
-
-def _message(kind: int, payload: bytes) -> bytes:
-    return HEADER.pack(HEADER.size + len(payload), kind) + payload
-
-
-def _names(data: bytes) -> list[str]:
-    """Return the names of a list, which may end with a comma."""
-    return [name for name in data.decode('ascii', 'replace').split(',') if name]
-
-
-def _format(types: list[str]) -> struct.Struct:
-    return struct.Struct('>' + ''.join(FORMATS[name] for name in types))
-
-
-# --------------------
-# The network of the emulated controller, and its clock.
-#
-# One thread: it sleeps until the next cycle is due, looks what has come, lets the controller do its cycles, and
-# sends.
-
-# That are made up for; a process that was held up for longer has lost the time. Meanwhile it hears no commands, and no
-# real controller moves for longer than its watchdog waits without one.
-MAX_MISSED_CYCLES = 50
-CHUNK = 65536
-
-
-class Server:
-    """Serve a controller on its ports."""
-
-    def __init__(self, controller: EmulatedController, ip: str, finger_pipe: str) -> None:
-        self._controller = controller
-        self._ip = ip
-        claims: dict[str, RtdeSession] = {}
-        self._kinds: dict[int, Callable[[], Session]] = {
-            RTDE_PORT: partial(RtdeSession, controller, claims),
-            SCRIPT_PORT: partial(ScriptSession, controller),
-        }
-        if controller.version.dashboard:
-            self._kinds[DASHBOARD_PORT] = partial(DashboardSession, controller, self._go_offline, self._go_silent)
-        self._selector = selectors.DefaultSelector()
-        self._listeners: list[socket.socket] = []
-        self._sessions: dict[socket.socket, Session] = {}
-        self._online_ns = 0
-        self._offline_s = 0.0  # asked for
-        self._silent_until_ns = 0
-        self._emulator = FingerSender(finger_pipe)
-        self._open()
-
-    def run(self, stopped: Callable[[], bool]) -> None:
-        """Serve until told to stop."""
-        step_ns = round(self._controller.step_s * 1e9)
-        due_ns = time.monotonic_ns()
-        while not stopped():
-            time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
-            missed = max(0, time.monotonic_ns() - due_ns) // step_ns
-            due_ns += (1 + missed) * step_ns
-            self._serve()
-            for _ in range(min(missed, MAX_MISSED_CYCLES)):
-                self._controller.catch_up()
-            self._controller.tick()
-            self._publish()
-
-    def close(self) -> None:
-        """Close all ports and connections."""
-        for connection in list(self._sessions):
-            self._hang_up(connection)
-        for listener in self._listeners:
-            self._selector.unregister(listener)
-            listener.close()
-        self._listeners = []
-
-    def _open(self) -> None:
-        for port, make_session in self._kinds.items():
-            try:
-                listener = socket.create_server((self._ip, port), backlog=8)
-            except OSError as error:
-                self.close()
-                raise DeviceError(
-                    f'the emulated UR controller cannot listen on {self._ip}:{port}: {error}; give each controller '
-                    "a loopback address of its own, such as '127.0.0.3'"
-                ) from error
-            listener.setblocking(False)
-            self._listeners.append(listener)
-            self._selector.register(listener, selectors.EVENT_READ, partial(self._accept, listener, make_session))
-
-    def _go_offline(self, seconds: float) -> None:
-        self._offline_s = seconds
-
-    def _go_silent(self, seconds: float) -> None:
-        self._silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
-
-    @property
-    def _silent(self) -> bool:
-        return time.monotonic_ns() < self._silent_until_ns
-
-    def _serve(self) -> None:
-        """Deal with what has come."""
-        if self._silent:
-            return
-        for key, _ in self._selector.select(timeout=0):
-            key.data()
-        if self._offline_s:
-            self.close()
-            self._online_ns = time.monotonic_ns() + int(self._offline_s * 1e9)
-            self._offline_s = 0.0
-        if not self._listeners and time.monotonic_ns() >= self._online_ns:
-            self._open()
-
-    def _accept(self, listener: socket.socket, make_session: Callable[[], Session]) -> None:
-        with suppress(BlockingIOError):
-            connection, _ = listener.accept()
-            connection.setblocking(False)
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            session = self._sessions[connection] = make_session()
-            self._selector.register(connection, selectors.EVENT_READ, partial(self._receive, connection, session))
-            self._send(connection, session.greeting())
-
-    def _receive(self, connection: socket.socket, session: Session) -> None:
-        try:
-            data = connection.recv(CHUNK)
-        except OSError:
-            data = b''
-        if data:
-            self._send(connection, session.receive(data))
-        else:
-            self._hang_up(connection)
-
-    def _publish(self) -> None:
-        if not self._silent:
-            for connection, session in list(self._sessions.items()):
-                self._send(connection, session.package())
-        robot = self._controller.robot
-        x, y, z = (robot.pose[:3] - robot.surface.origin).tolist()
-        vx, vy, vz = robot.velocity[:3].tolist()
-        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
-
-    def _send(self, connection: socket.socket, data: bytes) -> None:
-        """Send all of it, or hang up on a client that does not read."""
-        if not data:
-            return
-        try:
-            sent = connection.send(data)
-        except OSError:
-            sent = 0
-        if sent < len(data):
-            self._hang_up(connection)
-
-    def _hang_up(self, connection: socket.socket) -> None:
-        session = self._sessions.pop(connection, None)
-        if session is not None:
-            self._selector.unregister(connection)
-            session.close()
-            connection.close()
-
-
-# --------------------
-# Run the emulated controller as a process, whose argument is the JSON of its parameters.
-
 
 def main() -> int:
-    """Serve until SIGINT, SIGTERM or the end of the parent process; 'ready' is printed once the ports are open."""
-    signals: list[int] = []
+    """Serve until the parent process ends; 'ready' is printed once the ports are open."""
     parent = os.getppid()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, _frame: signals.append(number))
     params = UrControllerParams(**json.loads(sys.argv[1]))
     controller = EmulatedController(params, np.random.default_rng(params.seed))
     try:
@@ -1156,8 +915,7 @@ def main() -> int:
         print(f'emulated UR controller: {error}', file=sys.stderr)
         return 2
     print('ready', flush=True)
-    server.run(lambda: bool(signals) or os.getppid() != parent)
-    server.close()
+    server.run(lambda: os.getppid() != parent)
     return 0
 
 

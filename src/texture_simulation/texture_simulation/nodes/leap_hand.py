@@ -27,9 +27,6 @@ class LeapHandParams(FingerPipeParams):
         'Path of the symbolic link to the emulated hand, which is the device path of the arm.',
     )
     finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
-    stiffness_n_m: float = param(
-        2000.0, 'Stiffness of fingertip and object in contact; 0 removes the object.', unit='N/m', low=0.0
-    )
 
 
 class LeapHandNode(Node):
@@ -38,7 +35,7 @@ class LeapHandNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('leap_hand', **kwargs)
         params = declare(self, LeapHandParams)
-        motors = leap_hand(params.stiffness_n_m)
+        motors = leap_hand()
         finger = LEAP_FINGERS[params.finger]
         self._open = ExitStack()
         self._bus = self._open.enter_context(

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""How a finger comes to the surface, presses and leaves: the parameters, and how fast it may go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from texture_core.config import param
+from texture_exploration.force_control import stopping_m_s
+from texture_exploration.paths import ramp_s
+
+REACTION_S = 0.03  # from contact to standstill: two states of the arm, two steps of the exploration
+STEP_S = 0.014  # of exploration and arm, that an arm stands later than by its delay
+WALL_SHARE = 4.5  # times the force limit, with which a wall as stiff as declared may press until the arm stands
+IMPACT = 0.8  # of the wanted force
+HARMLESS_N = 0.5  # a smaller force is not approached more slowly for what an arm does that hears nothing
+
+
+def stop_s(delay_s: float) -> float:
+    """Return how long after a contact an arm stands."""
+    return max(REACTION_S, delay_s + STEP_S)
+
+
+@dataclass(frozen=True)
+class TouchParams:
+    """Parameters of approach, contact, acceleration and lift."""
+
+    travel_speed_m_s: float = param(
+        0.05,
+        'Highest speed above the surface on the way back to the start; a stiff contact may ask for a lower one.',
+        unit='m/s',
+        low=0.01,
+        high=1.0,
+    )
+    approach_speed_m_s: float = param(
+        0.02,
+        'Highest speed towards the surface; the wanted force may ask for a lower one.',
+        unit='m/s',
+        low=0.001,
+        high=0.1,
+    )
+    approach_stiffness_n_m: float = param(
+        2000.0,
+        'Stiffest contact that is expected, also from the side; larger values lower the approach speed, so that the '
+        'impact stays below the wanted force, and the highest speed of a slide.',
+        unit='N/m',
+        low=10.0,
+        high=200000.0,
+    )
+    approach_travel_m: float = param(
+        0.05,
+        'How far the finger comes down in search of the surface before the motion is aborted.',
+        unit='m',
+        low=0.001,
+        high=0.5,
+    )
+    unheard_force_fraction = 1.5  # of the wanted force, that an arm may reach which only its watchdog stops
+    contact_force_n: float = param(
+        0.2,
+        'Force above which the finger counts as in contact; a larger force needs a harder touch.',
+        unit='N',
+        low=0.02,
+        high=5.0,
+    )
+    force_tolerance: float = param(
+        0.1,
+        'Fraction of the wanted force within which the force has settled; a larger fraction settles sooner.',
+        low=0.01,
+        high=0.5,
+    )
+    speed_tolerance: float = param(
+        0.05,
+        'Fraction of the wanted speed within which the speed is reached; a larger fraction starts the slide sooner.',
+        low=0.005,
+        high=0.5,
+    )
+    settle_s = 0.1  # that the force must stay within its tolerance before the finger slides
+    acceleration_m_s2: float = param(
+        1.0,
+        'Highest tangential acceleration; larger values shorten the ramps before and after a slide.',
+        unit='m/s²',
+        low=0.05,
+        high=10.0,
+    )
+    jerk_m_s3 = 50.0  # along the surface: ramps of 0.1 s up to 0.05 m/s
+    arm_lag_s = 0.005  # after which an arm follows a command: the direction on a curved path is led by it
+    lost_force_fraction = 0.25  # of the wanted force, below which contact counts as lost
+    lost_contact_s: float = param(
+        0.1,
+        'How long contact may be lost before the slide ends; shorter gaps are bounces on a rough surface.',
+        unit='s',
+        low=0.02,
+        high=5.0,
+    )
+    stall_speed_fraction = 0.25  # of the commanded way, below which a sliding finger counts as stalled
+    stall_s: float = param(
+        0.25,
+        'Time over which the commanded way and that of the finger are compared during a slide; a longer time '
+        'notices a stall later.',
+        unit='s',
+        low=0.05,
+        high=5.0,
+    )
+    mean_force_fraction = 0.3  # error of the mean force with which a slide succeeds
+    peak_force_fraction: float = param(
+        0.5,
+        'By which fraction of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
+        'it are not steady. A larger fraction bears a rougher surface.',
+        low=0.05,
+        high=20.0,
+    )
+    mean_speed_fraction: float = param(
+        0.2,
+        'Largest relative error of the mean speed with which a slide succeeds.',
+        low=0.02,
+        high=5.0,
+    )
+    peak_speed_fraction: float = param(
+        0.5,
+        'By which fraction of the wanted speed the finger may be faster for 50 ms in a slide that succeeds; states '
+        'beyond it are not steady.',
+        low=0.05,
+        high=20.0,
+    )
+    mean_friction = 2.0  # mean force along the surface by wanted force, of a slide that succeeds
+    peak_friction = 3.0  # the same for 50 ms; states beyond it are not steady
+    lift_speed_m_s = 0.05  # away from the surface, once it is proven that up is up
+    clearance_m = 0.005  # least rise after a contact
+
+    def approach_m_s(self, force_n: float, watchdog_s: float = 0.0, delay_s: float = 0.0) -> float:
+        """Return how fast the finger may come down to press with a force.
+
+        An arm that loses its commands just as it reacts to the contact goes on for the time of its watchdog. Until then
+        the force stays below `unheard_force_fraction` of the wanted one on a contact of `approach_stiffness_n_m`.
+
+        Parameters
+        ----------
+        force_n
+            The wanted force.
+        watchdog_s, delay_s
+            See `texture_exploration.arms.arm.ArmState`.
+        """
+        heard_m_s = stopping_m_s(IMPACT * force_n, self.approach_stiffness_n_m, stop_s(delay_s))
+        allowed_n, unheard_s = max(self.unheard_force_fraction * force_n, HARMLESS_N), watchdog_s + REACTION_S
+        unheard_m_s = stopping_m_s(allowed_n, self.approach_stiffness_n_m, unheard_s) if watchdog_s else math.inf
+        return min(self.approach_speed_m_s, heard_m_s, unheard_m_s)
+
+    def travel_m_s(self, limit_n: float, delay_s: float) -> float:
+        """Return how fast the finger may go where something may stand in its way, for an impact below a force."""
+        return min(self.travel_speed_m_s, stopping_m_s(limit_n, self.approach_stiffness_n_m, stop_s(delay_s)))
+
+    def slide_m_s(self, limit_n: float, delay_s: float) -> float:
+        """Return how fast the finger may slide: from the force limit on, a wall presses on until the arm stands."""
+        return stopping_m_s((WALL_SHARE - 1.0) * limit_n, self.approach_stiffness_n_m, delay_s + STEP_S)
+
+    def ramp_s(self, speed_m_s: float) -> float:
+        """Return how long it takes to gain or lose a speed."""
+        return ramp_s(speed_m_s, self.acceleration_m_s2, self.jerk_m_s3)
