@@ -99,7 +99,7 @@ PATIENT = {
     'signal_timeout_s': 1.0,
 }
 PATCH = {'patch_x_low_m': -0.02, 'patch_x_high_m': 0.1, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05}
-EMULATED = {'accept_no_timeout': True, 'accept_shared_group': True, 'approach_stiffness_n_m': 5e3}
+EMULATED = {'accept_no_timeout': True, 'accept_shared_group': True, 'approach_stiffness_n_m': 2e4}
 COUNTERS = {'sensor': 'lost', 'feature_extractor': 'lost_samples', 'classifier': 'lost_vectors'}
 ANSWERS_S, RESPAWN_S, SETTLED_S, POLL_S = 120.0, 0.2, 1.0, 0.05
 ATTEMPTS = 3  # a busy machine may abort before the slide, or slide too slowly for a success
