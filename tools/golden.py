@@ -67,7 +67,7 @@ LOOSE = {
     # Cell means that are equal but for rounding are ranked by it, so Spearman's correlation moves by up to 8e-4.
     'kaboli-*': (1e-3, 1e-3),
     # Hundreds of training steps in single precision: probabilities move by up to 2e-3.
-    **dict.fromkeys(('default', 'fast', 'two-fingers', 'vibration-and-taxels'), (TOLERANCE, 1e-2)),
+    **dict.fromkeys(('default', 'two-fingers', 'vibration-and-taxels'), (TOLERANCE, 1e-2)),
     # On one simulated channel its log-probabilities of -80 move by 2e-4 of themselves; the cause was not traced.
     'any-speed': (TOLERANCE, 1e-3),
     # Levenberg-Marquardt steps: grades move by up to 7e-6.
@@ -99,11 +99,8 @@ SOURCES = {
             'any-place',
             'any-place-and-taxels',
             'default',
-            'fast',
             'peaks-naive-bayes',
             'any-speed',
-            'taxels',
-            'taxels-changes',
             'vibration-and-taxels',
         ),
         ('glass', 'brushed_metal', 'ridge_1mm', 'ridge_3mm'),
@@ -131,7 +128,7 @@ SOURCES = {
     'jamali': Source(('jamali-*',), ('carpet_1', 'sponge_1', 'tile_1', 'vinyl_1'), 'jamali', _plan(0.05, 2.0, 2.2)),
     'hu': Source(('hu-pca-*',), ('linen_1', 'linen_2', 'linen_3', 'linen_5'), 'hu', _plan(0.0255, 1.5, 3.2)),
     'kaboli': Source(
-        ('kaboli-em', 'kaboli-pa', 'kaboli-svm', 'vibration-and-taxels', 'taxels'),
+        ('kaboli-em', 'kaboli-pa', 'kaboli-svm', 'vibration-and-taxels'),
         ('red_ball', 'rough_ball', 'orange', 'sponge_ball'),
         'kaboli',
         _plan(0.02, 0.7, 2.4),
@@ -160,10 +157,8 @@ SOURCES = {
     'biotac20': Source(
         (
             'default',
-            'fast',
             'peaks-naive-bayes',
             'vibration-and-taxels',
-            'taxels',
             'taxels-any-day',
             'kaboli-em',
             'kaboli-svm',
@@ -171,12 +166,7 @@ SOURCES = {
         ('material02', 'material05', 'material09', 'material14'),
         data_set='biotac20',
     ),
-    'ntp21': Source(
-        ('any-speed', 'taxels-signal'), ('texture01', 'texture05', 'texture13', 'texture24'), data_set='ntp21'
-    ),
-    'fabricslide': Source(
-        ('taxels', 'taxels-changes'), ('BeigeCotton', 'Canvas', 'Denim', 'Linen'), data_set='fabricslide'
-    ),
+    'ntp21': Source(('any-speed',), ('texture01', 'texture05', 'texture13', 'texture24'), data_set='ntp21'),
 }
 
 
@@ -322,7 +312,7 @@ def _recognised(name: str, bags: Sequence[Path]) -> dict[str, Any]:
             'final': rounded(
                 {
                     'label': final.label,
-                    'known': final.known,
+                    'accepted': final.accepted,
                     'decided': final.decided,
                     'confidence': final.confidence,
                     'probabilities': final.probabilities,

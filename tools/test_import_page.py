@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from texture_bringup.command import main
-from texture_recordings.tables import mapping_from
+from texture_recordings.mapping import mapping_from
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = (ROOT / 'docs' / 'recordings.md').read_text()
@@ -67,7 +67,7 @@ def test_the_page_shows_what_the_import_prints(said: str) -> None:
 def test_a_reader_ends_with_figures_charts_and_a_file(said: str) -> None:
     for name in ('figure.png', 'figures.json', 'slides.parquet'):
         assert Path(name).stat().st_size > 200, name
-    assert "'mine' against 'fast' on 36 slides" in said
+    assert "'mine' against 'default' on 36 slides" in said
     assert '36 (250, 3)' in said
     assert "36 ['cork_thick', 'linen', 'oak board']" in said
 

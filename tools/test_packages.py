@@ -119,7 +119,7 @@ LAYERS: Mapping[str, Layer] = {
         of('msgs', 'core', 'features'),
         tests=of('drivers'),
         never=LEARNING | DRAWING | SCIPY,
-        late={'texture_recordings.public_sets': SCIPY, 'texture_recordings.tables': SCIPY},
+        late={'texture_recordings.public_sets': SCIPY, 'texture_recordings.readers': SCIPY},
     ),
     'texture_simulation': Layer(of('msgs', 'core', 'drivers', 'recordings'), never=LEARNING | DRAWING),
     'texture_exploration': Layer(of('msgs', 'core'), tests=of('features', 'simulation'), never=LEARNING | DRAWING),

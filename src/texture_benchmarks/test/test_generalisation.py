@@ -1,5 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +9,6 @@ import pytest
 
 from texture_benchmarks import generalisation
 from texture_benchmarks.generalisation import (
-    CONTROLS,
     DECIDED,
     DISTANCE,
     END,
@@ -80,10 +81,29 @@ def test_the_worst_time_counts_for_accepted_but_wrong() -> None:
 def test_a_control_tells_surfaces_that_were_slid_over_in_different_directions() -> None:
     made = slides(count=8, direction_rad=[0.0, 1.5] * 4)
     names = made.names.tolist()
-    trials = TrialSet('t', tuple(CONTROLS), made, [Trial('', names, {('halves', 'same'): names})])
+    trials = TrialSet('t', made, [Trial('', names, {('halves', 'same'): names})])
     [(cell, answers)] = answers_of(trials, 0, recipe_of, 'direction alone')
     assert cell == ('halves', 'same', 'direction alone', '')
     assert all(one.ends[END][0] == one.surface for one in answers)
+
+
+def test_what_is_trained_from_either_end_lies_in_no_test_of_another_stretch() -> None:
+    trained, rows = generalisation.GAPS[1]
+    made = generalisation._stretches(rows, trained, slides(8.0, count=80))
+    [first, turned, *_] = made.trials
+    [places] = [{name.rpartition(' part ')[2] for name in one} for one in first.tested.values()]
+    assert {name.rpartition(' part ')[2] for name in first.trained} == {'0-4/10'}
+    assert places == {'6-10/10'} == {name.rpartition(' part ')[2] for name in turned.trained}
+
+
+def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_path: Path) -> None:
+    options = BenchmarkOptions(tmp_path, quick=True, workers=1)
+    cell = figures([ended('cork', 'cork', accepted=True, cluster='a')])
+    line = {'piece': f'simulated halves, {SVC}', 'cells': [[DISTANCE, '0', SVC, cell]]}
+    (tmp_path / generalisation.FINISHED).write_text(json.dumps(line) + '\n')
+    result = generalisation.run(replace(options, budget_s=0.01))
+    assert result.numbers['missing'] == ['simulated halves, default']
+    assert result.numbers[DISTANCE]['0'] == {SVC: json.loads(json.dumps(cell))}
 
 
 def test_names_are_of_the_places_asked_for() -> None:
@@ -93,9 +113,9 @@ def test_names_are_of_the_places_asked_for() -> None:
 def test_a_reduced_run_tests_recipe_and_peer_near_and_far(tmp_path: Path) -> None:
     result = generalisation.run(BenchmarkOptions(tmp_path, quick=True))
     for row in ('0', '1'):
-        assert set(result.numbers[DISTANCE][row]) == {'fast', SVC}
+        assert set(result.numbers[DISTANCE][row]) == {'default', SVC}
     assert (tmp_path / 'generalisation.png').exists()
-    near, far = (result.numbers[DISTANCE][row]['fast'] for row in ('0', '1'))
+    near, far = (result.numbers[DISTANCE][row]['default'] for row in ('0', '1'))
     assert near['accuracy'] > 0.8
     assert near['accepted_correct'] + near['accepted_wrong'] + sum(near['rejections'].values()) / near['slides'] == (
         pytest.approx(1.0)

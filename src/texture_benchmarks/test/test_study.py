@@ -9,8 +9,21 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from texture_benchmarks.study import BenchmarkOptions, imported, map_forked, share_interval
+from texture_benchmarks.study import BenchmarkOptions, finished_forked, imported, map_forked, share_interval
 from texture_core.errors import InvalidData
+
+
+def test_a_job_that_fails_or_lasts_too_long_leaves_the_others(capsys) -> None:
+    def work(job):
+        if job == 'waits':
+            threading.Event().wait()
+        return 1 / job
+
+    found = dict(finished_forked(work, [1, 0, 'waits', 2], workers=3, budget_s=5.0))
+    assert found == {1: 1.0, 2: 0.5}
+    printed = capsys.readouterr().out
+    assert '0 failed: ZeroDivisionError' in printed
+    assert 'ended after 5 s' in printed
 
 
 @pytest.mark.parametrize('data', [True, False])

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections import Counter, defaultdict
@@ -21,8 +22,17 @@ from sklearn.preprocessing import StandardScaler
 
 from texture_benchmarks import peers
 from texture_benchmarks.peers import SVC, recipe_of
-from texture_benchmarks.study import DATA, BenchmarkOptions, BenchmarkResult, imported, map_forked, trained_apart
+from texture_benchmarks.study import (
+    DATA,
+    BenchmarkOptions,
+    BenchmarkResult,
+    finished_forked,
+    imported,
+    map_forked,
+    trained_apart,
+)
 from texture_benchmarks.trust import TRAINED, simulate
+from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, Phase, TextureEstimate, join_batches
 from texture_estimation.recipe import FAST_TOPIC, Recipe
 from texture_estimation.training import train
@@ -46,35 +56,31 @@ BETWEEN, THERE = 'between', 'at trained places'
 # Slides trained and tested: three draws, each trained before it is tested.
 DRAWS = {'1-20 → 21-30': ('1-20', '21-30'), '11-30 → 31-40': ('11-30', '31-40'), '1-20 → 31-40': ('1-20', '31-40')}
 FIRST_DRAW = next(iter(DRAWS))
-# Parts of ten of the track that are trained, and those at the end of it that are tested then; the other way round, too.
+# Parts of ten of the track that are trained, and those that are tested then; from the other end, too.
 PARTS = 10
-GAPS = {
-    'same half': ((0, 5), (0, 5)),
-    'no gap': ((0, 5), (5, 10)),
-    'gap of 2.2 cm': ((0, 4), (6, 10)),
-    'control of 2.2 cm': ((1, 5), (5, 9)),
-    'gap of 4.4 cm': ((0, 3), (7, 10)),
-    'control of 4.4 cm': ((2, 5), (5, 8)),
-}
+Span = tuple[int, int]
+GAPS: Sequence[tuple[Span, Mapping[str, Span]]] = (
+    ((0, 5), {'same half': (0, 5), 'no gap': (5, 10)}),
+    ((0, 4), {'gap of 2.2 cm': (6, 10)}),
+    ((1, 5), {'control of 2.2 cm': (5, 9)}),
+    ((0, 3), {'gap of 4.4 cm': (7, 10)}),
+    ((2, 5), {'control of 4.4 cm': (5, 8)}),
+)
+QUARTER = 'three quarters, the fourth tested'
 # Controls that see no signal: whether the textures differ in how the robot slid over them.
 CONTROLS: Mapping[str, Callable[[LabelledSlide], tuple[float, ...]]] = {
     'force and speed alone': lambda one: (one.force_n, one.speed_m_s),
     'direction alone': lambda one: (math.cos(one.direction_rad), math.sin(one.direction_rad)),
 }
-TAXELS = ('taxels-any-day', 'fast', SVC)  # `fast` and the peer read the taxels as channels of a vibration
+TAXELS = ('default', 'taxels-any-day', SVC)  # `default` and the peer read the taxels as channels of a vibration
 FABRICS, DATES = ('BlackPolymer', 'BlackWool', 'GreenVelvet', 'NavyDenim'), ('2021-05-27', '2021-05-31', '2021-06-01')
 LONGEST_S = 8.0  # of a slide over taxels
 SPIDER_HZ, SPIDER_TRAINED = 15.6, '2024-02-13'
 SPIDER = {'2024-02-13b': 'same day', '2024-02-20am1': 'other day', '2024-02-20am2': 'other day',
           '2024-02-21_sensor2': 'other specimen'}  # fmt: skip
 BOREAL_HZ, BOREAL_S, BOREAL_SLIDES, BOREAL_TRAINED = 100.0, 5.0, 12, 0.6  # slides of a run at most, and trained runs
-QUICK_RECIPES = (
-    'any-place-and-taxels',
-    'any-place',
-    SVC,
-    'force and speed alone',
-    'direction alone',
-)  # for every draw; networks take ten times as long
+# For every draw; networks take ten times as long.
+QUICK_RECIPES = ('any-place-and-taxels', 'any-place', SVC, 'force and speed alone', 'direction alone')
 LONG_NS = 2_000_000_000  # slides from here on have enough windows 0.5 s apart
 PEER_WINDOWS = WindowParams(length_s=0.5, hop_s=0.25)
 
@@ -93,7 +99,6 @@ class TrialSet:
     """Slides whose features are computed once for each recipe, and the trials among them."""
 
     name: str
-    recipes: Sequence[str]
     slides: SlideDataset
     trials: Sequence[Trial]
 
@@ -109,9 +114,13 @@ class Answer(NamedTuple):
 
 END, DECIDED = 'end', 'decided'
 Cell = tuple[str, str, str, str]  # table, row, recipe, draw
+Figures = tuple[str, str, str, dict[str, Any]]  # table, row, recipe, figures
+Readers = Mapping[str, Callable[[BenchmarkOptions], SlideDataset]]
+FINISHED = 'generalisation.jsonl'  # a line for each recipe on each set, as it is finished
+SLOW = ('default', 'vibration-and-taxels')  # begin first; the convolutional network last
 
 
-def run(options: BenchmarkOptions) -> BenchmarkResult:
+def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkResult:
     """Train recipes and peers at some places, days or fingers, and test them on other slides there and elsewhere.
 
     Accuracy at the end of a slide, slides accepted and correct, and accepted but wrong; the largest fraction accepted
@@ -119,18 +128,61 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     as accepted. 95 % intervals by bootstrap over surface × part, date or run: slides over one track are no independent
     draws.
     """
-    found: defaultdict[Cell, list[Answer]] = defaultdict(list)
-    for make in (_simulated_halves,) if options.quick else SETS:
-        for trials in make(options):
-            for (table, row, recipe, draw), answers in _tried(trials, options.seed):
-                found[table, row, recipe, draw] += answers
-    return result_of(found, options)
+    sets = REDUCED if options.quick else SETS
+    read = {name: _read(name, options, readers or READERS) for name in {one.data for one in sets.values()}}
+    slides = {name: found for name, found in read.items() if found is not None}
+    pieces = [(name, recipe) for name, one in sets.items() for recipe in one.recipes if one.data in slides]
+    if not peers.available(peers.CNN):
+        pieces = [piece for piece in pieces if piece[1] != peers.CNN]
+    # What was finished before, in the same folder, is not computed again.
+    path = options.out / FINISHED
+    options.out.mkdir(parents=True, exist_ok=True)
+    found = _finished(path)
+    left = [piece for piece in pieces if ', '.join(piece) not in found]
+    left.sort(key=lambda piece: (piece[1] == peers.CNN, piece[1] not in SLOW))
+    work = partial(_piece, slides, options.seed)
+    with path.open('a', encoding='utf-8') as file:
+        for piece, cells in finished_forked(work, left, options.workers, options.budget_s):
+            found[', '.join(piece)] = cells
+            file.write(json.dumps({'piece': ', '.join(piece), 'cells': cells}) + '\n')
+            file.flush()
+    missing = [piece for piece in map(', '.join, pieces) if piece not in found]
+    missing += [f'{name} (no recordings)' for name, one in sets.items() if one.data not in slides]
+    return result_of(found, missing, options)
 
 
-def _tried(trials: TrialSet, seed: int) -> Iterator[tuple[Cell, list[Answer]]]:
-    names = [*trials.recipes, *([peers.CNN] if 'biotac20' in trials.name and peers.available() else [])]
-    for found in map_forked(partial(answers_of, trials, seed, recipe_of), names):
-        yield from found
+def _read(name: str, options: BenchmarkOptions, readers: Readers) -> SlideDataset | None:
+    try:
+        return readers[name](options)
+    except InvalidData as error:
+        print(f'generalisation: {error}', flush=True)
+        return None
+
+
+def _finished(path: Path) -> dict[str, list[Figures]]:
+    """Return the figures of the pieces in a file, by their names."""
+    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
+    return {line['piece']: line['cells'] for line in map(json.loads, lines)}
+
+
+def _piece(slides: Mapping[str, SlideDataset], seed: int, piece: tuple[str, str]) -> list[Figures]:
+    """Return table, row and figures of each cell of one recipe on one set."""
+    name, recipe = piece
+    source = {**SETS, **REDUCED}[name]
+    found: defaultdict[tuple[str, str], dict[str, list[Answer]]] = defaultdict(lambda: defaultdict(list))
+    for (table, row, _, draw), answers in answers_of(source.make(slides[source.data]), seed, recipe_of, recipe):
+        found[table, row][draw] += answers
+    return [(table, row, recipe, _pooled(draws)) for (table, row), draws in found.items()]
+
+
+def _pooled(draws: Mapping[str, Sequence[Answer]]) -> dict[str, Any]:
+    """Return the figures of all draws together, and the main ones of each."""
+    cell = figures([one for answers in draws.values() for one in answers])
+    if len(draws) > 1:
+        keys = ('accuracy', 'accepted_correct', 'accepted_wrong', 'most_accepted_wrong')
+        each = {draw: figures(answers) for draw, answers in draws.items()}
+        cell['draws'] = {draw: {key: own[key] for key in keys} for draw, own in each.items()}
+    return cell
 
 
 # --------------------
@@ -190,11 +242,11 @@ def _answer(surface: str, result: Any, accepts_all: bool) -> Answer:
     """Return the answer of a recipe to a slide."""
 
     def of(estimate: TextureEstimate) -> tuple[str, bool]:
-        return estimate.label, accepts_all or estimate.known
+        return estimate.label, accepts_all or estimate.accepted
 
     ends = {f'{s:g}': of(end) for s in TIMES_S if (end := result.after(s)) is not None}
     early = result.early()
-    if early.decided and early.known:
+    if early.decided and early.accepted:
         ends[DECIDED] = of(early)
     ends[END] = of(result.end)
     return Answer('', surface, ends, '' if ends[END][1] else result.end.rejection.name.lower())
@@ -246,14 +298,9 @@ def names_of(slides: SlideDataset, numbers: str, *places: str) -> list[str]:
     return [x.name for x in slides.select(numbers, where=lambda one: not places or one.place in places)]
 
 
-def _biotac20(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    with imported(options, 'biotac20') as bags:
-        slides = SlideDataset.from_bags(bags)
-    yield TrialSet('cells of biotac20', (*PLACE_RECIPES, SVC), cells := slides.in_parts(CELLS), _cells(cells))
-    for row, spans in GAPS.items():
-        joined, trials = _halves(slides, row, *spans)
-        controls = CONTROLS if row == 'no gap' else ()
-        yield TrialSet(f'halves of biotac20, {row}', (*PLACE_RECIPES, SVC, *controls), joined, trials)
+def _cells_of(slides: SlideDataset) -> TrialSet:
+    cells = slides.in_parts(CELLS)
+    return TrialSet('cells of biotac20', cells, _cells(cells))
 
 
 def _cells(slides: SlideDataset) -> list[Trial]:
@@ -278,24 +325,43 @@ def _cells(slides: SlideDataset) -> list[Trial]:
     return trials
 
 
-def _halves(
-    slides: SlideDataset, row: str, trained: tuple[int, int], tested: tuple[int, int]
-) -> tuple[SlideDataset, list[Trial]]:
-    """Return the parts of a track joined to what is trained and tested, and a training from either end."""
+def _stretches(spans: Mapping[str, Span], trained: Span, slides: SlideDataset) -> TrialSet:
+    """Return a training on one stretch of a track from either end, tested on others by their rows."""
     parts = slides.in_parts(PARTS)
     joined: dict[str, LabelledSlide] = {}
     for mirrored in (False, True):
-        for low, high in {trained, tested}:
-            span = (PARTS - high, PARTS - low) if mirrored else (low, high)
-            joined |= {one.name: one for one in _joined(parts, span)}
+        for span in {trained, *spans.values()}:
+            joined |= {one.name: one for one in _joined(parts, _turned(span, mirrored))}
     both = SlideDataset(tuple(joined.values()))
     trials = []
     for draw, (before, after) in DRAWS.items():
         for mirrored in (False, True):
-            there, here = (_place((PARTS - x[1], PARTS - x[0]) if mirrored else x) for x in (trained, tested))
-            tested_at = {(HALVES, row): names_of(both, after, here)}
-            trials.append(Trial(draw, names_of(both, before, there), tested_at, draw == FIRST_DRAW))
-    return both, trials
+            there = names_of(both, before, _place(_turned(trained, mirrored)))
+            tested = {
+                (HALVES, row): names_of(both, after, _place(_turned(span, mirrored))) for row, span in spans.items()
+            }
+            trials.append(Trial(draw, there, tested, draw == FIRST_DRAW))
+    return TrialSet(f'biotac20, {", ".join(spans)}', both, trials)
+
+
+def _quarters(slides: SlideDataset) -> TrialSet:
+    """Return trainings on three quarters of a track, tested on the fourth."""
+    parts, places = slides.in_parts(4), [f'{number}/4' for number in range(1, 5)]
+    trials = [
+        Trial(
+            draw,
+            names_of(parts, before, *(other for other in places if other != place)),
+            {(HALVES, QUARTER): names_of(parts, after, place)},
+            draw == FIRST_DRAW,
+        )
+        for draw, (before, after) in DRAWS.items()
+        for place in places
+    ]
+    return TrialSet('quarters of biotac20', parts, trials)
+
+
+def _turned(span: Span, mirrored: bool) -> Span:
+    return (PARTS - span[1], PARTS - span[0]) if mirrored else span
 
 
 def _place(span: tuple[int, int]) -> str:
@@ -319,13 +385,14 @@ def _joined(parts: SlideDataset, span: tuple[int, int]) -> Iterator[LabelledSlid
 SCENE, SPEED_M_S, FORCE_N, SLIDE_S = 'varying', 0.022, 2.0, 2.5
 ASTRAY_M = 5e-4  # standard deviation of where a slide over a track begins
 PATCH_M, PLACES, NEW_PLACES = 0.1, 6, 8  # side of the patch; places trained and tested of each surface
+FIRST_OF_TRACK = PLACES + NEW_PLACES
 # From the begin of what is trained to that of what is tested.
 ANCHOR = {'simulated, same half': 0.0, 'simulated, no gap': 0.055, 'simulated, gap of 2.2 cm': 0.077}
 ANCHORED = 12  # slides of each half of a simulated track
 
 
-def _simulated(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    """Yield six slides of one track or of six places trained and new places tested, and the halves of a track."""
+def _read_places(options: BenchmarkOptions) -> SlideDataset:
+    """Simulate slides at places of a patch, and over one track."""
     scene, rng = load_scene(SCENE), np.random.default_rng(options.seed)
     n_surfaces = len(scene.surfaces)
     places_m = rng.uniform(0.0, PATCH_M, (2, n_surfaces, PLACES + NEW_PLACES))
@@ -335,11 +402,15 @@ def _simulated(options: BenchmarkOptions) -> Iterator[TrialSet]:
         slides_at(scene, places_m, turned, rng),
         slides_at(scene, astray_m, 0.0 * turned[:, :PLACES], rng),
     )
-    first = PLACES + NEW_PLACES
-    slides = SlideDataset(
+    return SlideDataset(
         (*(replace(one, place=f'at {one.number}') for one in scattered),
-         *(replace(one, number=first + one.number, place='track') for one in track))
+         *(replace(one, number=FIRST_OF_TRACK + one.number, place='track') for one in track))
     )  # fmt: skip
+
+
+def _places(slides: SlideDataset) -> TrialSet:
+    """Return six slides of one track, or of six places, trained and new places tested."""
+    first = FIRST_OF_TRACK
     new = names_of(slides, f'{PLACES + 1}-{first}')
     trials = [
         Trial(
@@ -349,15 +420,22 @@ def _simulated(options: BenchmarkOptions) -> Iterator[TrialSet]:
         ),
         Trial('', names_of(slides, f'1-{PLACES}'), {(OTHER, 'simulated, new places from six'): new}),
     ]
-    yield TrialSet('simulated places', ('default', SVC), slides, trials)
+    return TrialSet('simulated places', slides, trials)
+
+
+def _read_track(options: BenchmarkOptions) -> SlideDataset:
+    """Simulate slides over the halves of a track."""
+    scene, rng = load_scene(SCENE), np.random.default_rng([options.seed, 1])
+    n_surfaces = len(scene.surfaces)
     starts_m = np.stack([np.repeat(list(ANCHOR.values()), ANCHORED)] * n_surfaces)
     starts_m = np.stack([starts_m, 0.0 * starts_m]) + ASTRAY_M * rng.standard_normal((2, *starts_m.shape))
     halves = slides_at(scene, starts_m, 0.0 * starts_m[0], rng)
-    halves = SlideDataset(tuple(replace(x, place=list(ANCHOR)[(x.number - 1) // ANCHORED]) for x in halves))
+    return SlideDataset(tuple(replace(x, place=list(ANCHOR)[(x.number - 1) // ANCHORED]) for x in halves))
+
+
+def _track(halves: SlideDataset) -> TrialSet:
     tested = {(HALVES, row): names_of(halves, _last(number), row) for number, row in enumerate(ANCHOR)}
-    yield TrialSet(
-        'simulated halves', (SVC, 'default'), halves, [Trial('', names_of(halves, f'1-{ANCHORED * 2 // 3}'), tested)]
-    )
+    return TrialSet('simulated track', halves, [Trial('', names_of(halves, f'1-{ANCHORED * 2 // 3}'), tested)])
 
 
 def _last(half: int) -> str:
@@ -383,9 +461,13 @@ def slides_at(scene: Scene, places_m: Any, directions_rad: Any, rng: np.random.G
     )
 
 
-def _simulated_halves(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    """Yield the halves of few simulated slides, for a reduced run."""
-    slides = simulate(TRAINED, 9, np.random.default_rng(options.seed), conditions=True).in_parts(2)
+def _read_halves(options: BenchmarkOptions) -> SlideDataset:
+    return simulate(TRAINED, 9, np.random.default_rng(options.seed), conditions=True)
+
+
+def _simulated_halves(whole: SlideDataset) -> TrialSet:
+    """Return the halves of few simulated slides, for a reduced run."""
+    slides = whole.in_parts(2)
     trained, there, here = (names_of(slides, *which) for which in (('1-6', '1/2'), ('7-9', '1/2'), ('7-9', '2/2')))
     tested = {
         (DISTANCE, '0'): there,
@@ -393,24 +475,29 @@ def _simulated_halves(options: BenchmarkOptions) -> Iterator[TrialSet]:
         (SPACING, f'1, 7: {BETWEEN}'): here,
         (OTHER, 'simulated'): here,
     }
-    yield TrialSet('simulated halves', ('fast', SVC), slides, [Trial('', trained, tested)])
+    return TrialSet('simulated halves', slides, [Trial('', trained, tested)])
 
 
 # --------------------
 # Other days, fingers, runs and speeds.
 
 
-def _fingersense(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    """Yield each date left out in turn; before the first of them levels are twenty times lower."""
+def _read_fingersense(options: BenchmarkOptions) -> SlideDataset:
+    """Read the dates from which on levels are alike: before, they are twenty times lower."""
     with imported(options, 'fingersense') as bags:
         slides = SlideDataset.from_bags(bags).select(labels=FABRICS, where=lambda one: one.session >= DATES[0])
-    slides, trials = _middles(slides), []
+    return _middles(slides)
+
+
+def _dates(slides: SlideDataset) -> TrialSet:
+    """Return each date left out in turn."""
+    trials = []
     for date in DATES:
         trained = [one for one in slides if one.session != date]
         surfaces = {one.surface for one in trained}
         left = [one.name for one in slides if one.session == date and one.surface in surfaces]
         trials.append(Trial('', [one.name for one in trained], {(OTHER, 'fingersense, another date'): left}))
-    yield TrialSet('dates of fingersense', TAXELS, slides, trials)
+    return TrialSet('dates of fingersense', slides, trials)
 
 
 def _middles(dataset: SlideDataset) -> SlideDataset:
@@ -439,15 +526,18 @@ def _of_sessions(
     return SlideDataset(tuple(replace(x, bag=Path(session)) for x, (_, session, _) in zip(made, runs, strict=True)))
 
 
-def _spider(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    """Yield one session of sandpapers trained, and sessions of the same day, other days and another specimen tested."""
+def _read_spider(options: BenchmarkOptions) -> SlideDataset:
     with np.load(options.recordings('spider_sandpaper') / 'slides.npz', allow_pickle=False) as file:
         runs = [
             (parts[1], parts[0], file[key][:, 4:])
             for key in file.files
             if (parts := key.split('/'))[0] in (SPIDER_TRAINED, *SPIDER)
         ]
-    slides = _of_sessions(runs, 'signal_static', SPIDER_HZ, 'spider/cells')
+    return _of_sessions(runs, 'signal_static', SPIDER_HZ, 'spider/cells')
+
+
+def _sessions(slides: SlideDataset) -> TrialSet:
+    """Return one session of sandpapers trained, or two of a day, and other sessions tested."""
     rows: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for one in slides:
         if one.session in SPIDER:
@@ -455,51 +545,55 @@ def _spider(options: BenchmarkOptions) -> Iterator[TrialSet]:
     trained = [one.name for one in slides if one.session == SPIDER_TRAINED]
     days = [one.name for one in slides if one.session in (SPIDER_TRAINED, '2024-02-13b')]
     two = {(OTHER, f'{row}, two sessions trained'): names for (_, row), names in rows.items() if 'same day' not in row}
-    yield TrialSet('sessions of spider_sandpaper', TAXELS, slides, [Trial('', trained, rows), Trial('', days, two)])
+    return TrialSet('sessions of spider_sandpaper', slides, [Trial('', trained, rows), Trial('', days, two)])
 
 
-def _borealtc(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    """Yield the first runs of a wheeled robot over each ground trained, and its later runs at other places tested."""
-    pieces, trained_runs = [], set()
+def _read_borealtc(options: BenchmarkOptions) -> SlideDataset:
+    """Cut the runs of a wheeled robot into slides."""
+    pieces = []
     length = round(BOREAL_S * BOREAL_HZ)
     with np.load(options.recordings('borealtc') / 'runs.npz', allow_pickle=False) as file:
         keys = sorted(key for key in file.files if key.endswith('/imu'))
         for ground, group in groupby(keys, key=lambda key: key.split('/')[0]):
-            own = list(group)
-            for number, key in enumerate(own):
+            for key in group:
                 samples = file[key][:, 1:]
                 session = key.removesuffix('/imu').replace('/', '-')
-                if number < BOREAL_TRAINED * len(own):
-                    trained_runs.add(session)
                 starts = range(0, len(samples) - length + 1, length)
                 step = -(-len(starts) // BOREAL_SLIDES) or 1
                 pieces += [(ground, session, samples[start : start + length]) for start in starts[::step]]
-    slides = _of_sessions(pieces, 'signal', BOREAL_HZ, 'borealtc/imu')
-    trained = [one.name for one in slides if one.session in trained_runs]
-    tested = [one.name for one in slides if one.session not in trained_runs]
-    trial = Trial('', trained, {(OTHER, 'borealtc, other runs'): tested})
-    yield TrialSet('runs of borealtc', ('default', 'fast', SVC), slides, [trial])
+    return _of_sessions(pieces, 'signal', BOREAL_HZ, 'borealtc/imu')
 
 
-def _lmt29(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    with imported(options, 'lmt29') as bags:
-        slides = SlideDataset.from_bags(bags)
+def _runs(slides: SlideDataset) -> TrialSet:
+    """Return the first runs over each ground trained, and its later runs at other places tested."""
+    trained: list[str] = []
+    tested: list[str] = []
+    for _, group in groupby(slides, key=lambda one: one.surface):
+        own = list(group)
+        runs = list(dict.fromkeys(one.session for one in own))
+        earlier = set(runs[: math.ceil(BOREAL_TRAINED * len(runs))])
+        for one in own:
+            (trained if one.session in earlier else tested).append(one.name)
+    return TrialSet('runs of borealtc', slides, [Trial('', trained, {(OTHER, 'borealtc, other runs'): tested})])
+
+
+def _strokes(slides: SlideDataset) -> TrialSet:
     trial = Trial('', names_of(slides, '1-4'), {(OTHER, 'lmt29, other strokes by hand'): names_of(slides, '5-6')})
-    yield TrialSet('strokes of lmt29', ('default', SVC), slides, [trial])
+    return TrialSet('strokes of lmt29', slides, [trial])
 
 
-def _ntp21(options: BenchmarkOptions) -> Iterator[TrialSet]:
-    """Yield each speed left out in turn, and one half of the path with one of four forces out."""
-    with imported(options, 'ntp21') as bags:
-        slides = SlideDataset.from_bags(bags)
-    names = slides.names
-    speeds = slides.condition('speed')
+def _speeds(slides: SlideDataset) -> TrialSet:
+    """Return each speed left out in turn."""
+    names, speeds = slides.names, slides.condition('speed')
     trials = [
         Trial('', names[speeds != speed].tolist(), {(OTHER, 'ntp21, another speed'): names[speeds == speed].tolist()})
         for speed in np.unique(speeds)
     ]
-    yield TrialSet('speeds of ntp21', ('any-speed', SVC), slides, trials)
-    # Half a faster slide is shorter than the windows.
+    return TrialSet('speeds of ntp21', slides, trials)
+
+
+def _other_half(slides: SlideDataset) -> TrialSet:
+    """Return one half of the path trained, with one of four forces out; half a faster slide is shorter than windows."""
     halves = slides.select(where=lambda one: one.speed_m_s < 0.05).in_parts(2)
     names, forces, places = halves.names, halves.condition('force'), halves.condition('place')
     trials = [
@@ -508,10 +602,64 @@ def _ntp21(options: BenchmarkOptions) -> Iterator[TrialSet]:
         for force in np.unique(forces)
         for place in ('1/2', '2/2')
     ]  # fmt: skip
-    yield TrialSet('halves of ntp21', ('any-speed', SVC), halves, trials)
+    return TrialSet('halves of ntp21', halves, trials)
 
 
-SETS = (_biotac20, _fingersense, _spider, _borealtc, _lmt29, _ntp21, _simulated)
+def _read_bags(name: str, options: BenchmarkOptions) -> SlideDataset:
+    with imported(options, name) as bags:
+        return SlideDataset.from_bags(bags)
+
+
+def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
+    """Read the materials at once, each by a process of its own: one after the other takes minutes."""
+    names = sorted(path.stem for path in options.recordings('biotac20').glob('material*.npz'))
+    return SlideDataset(tuple(one for slides in map_forked(partial(_read_material, options), names) for one in slides))
+
+
+def _read_material(options: BenchmarkOptions, name: str) -> tuple[LabelledSlide, ...]:
+    with imported(options, 'biotac20', materials=[name]) as bags:
+        return SlideDataset.from_bags(bags).slides
+
+
+class Source(NamedTuple):
+    """A set of trials: the recordings that it is of, the recipes that are tried, and what makes the trials."""
+
+    data: str
+    recipes: Sequence[str]
+    make: Callable[[SlideDataset], TrialSet]
+
+
+READERS: Readers = {
+    **{name: partial(_read_bags, name) for name in ('lmt29', 'ntp21')},
+    'biotac20': _read_biotac20,
+    'fingersense': _read_fingersense,
+    'spider_sandpaper': _read_spider,
+    'borealtc': _read_borealtc,
+    'simulated places': _read_places,
+    'simulated track': _read_track,
+    'simulated halves': _read_halves,
+}
+SETS: Mapping[str, Source] = {
+    'cells': Source('biotac20', (*PLACE_RECIPES, SVC, peers.CNN), _cells_of),
+    **{
+        ', '.join(spans): Source(
+            'biotac20',
+            (*PLACE_RECIPES, SVC, peers.CNN, *(CONTROLS if 'no gap' in spans else ())),
+            partial(_stretches, spans, trained),
+        )
+        for trained, spans in GAPS
+    },
+    'quarters': Source('biotac20', (*PLACE_RECIPES, SVC), _quarters),
+    'dates': Source('fingersense', TAXELS, _dates),
+    'sessions': Source('spider_sandpaper', TAXELS, _sessions),
+    'runs': Source('borealtc', ('default', SVC), _runs),
+    'strokes': Source('lmt29', ('default', SVC), _strokes),
+    'speeds': Source('ntp21', ('any-speed', SVC), _speeds),
+    'other half': Source('ntp21', ('any-speed', SVC), _other_half),
+    'simulated places': Source('simulated places', ('default', SVC), _places),
+    'simulated track': Source('simulated track', ('default', SVC), _track),
+}
+REDUCED: Mapping[str, Source] = {'simulated halves': Source('simulated halves', ('default', SVC), _simulated_halves)}
 
 
 # --------------------
@@ -542,19 +690,14 @@ def figures(answers: Sequence[Answer]) -> dict[str, Any]:
     }
 
 
-def result_of(found: Mapping[Cell, Sequence[Answer]], options: BenchmarkOptions) -> BenchmarkResult:
-    """Return the figures of all cells, pooled over the draws and of each, and their chart."""
-    pooled: defaultdict[tuple[str, str, str], dict[str, Sequence[Answer]]] = defaultdict(dict)
-    for (table, row, name, draw), answers in found.items():
-        pooled[table, row, name][draw] = answers
+def result_of(
+    found: Mapping[str, Sequence[Figures]], missing: Sequence[str], options: BenchmarkOptions
+) -> BenchmarkResult:
+    """Return the figures of all cells, their chart, and the pieces that are missing."""
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
-    for (table, row, name), draws in pooled.items():
-        cell = figures([one for answers in draws.values() for one in answers])
-        if len(draws) > 1:
-            keys = ('accuracy', 'accepted_correct', 'accepted_wrong', 'most_accepted_wrong')
-            each = {draw: figures(answers) for draw, answers in draws.items()}
-            cell['draws'] = {draw: {key: own[key] for key in keys} for draw, own in each.items()}
+    for table, row, name, cell in (one for cells in found.values() for one in cells):
         numbers[table].setdefault(row, {})[name] = cell
+    numbers['missing'] = list(missing)
     return BenchmarkResult(
         name='generalisation',
         measured=run.__doc__,

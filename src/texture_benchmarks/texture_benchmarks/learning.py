@@ -116,7 +116,7 @@ def _score(model: TextureModel, examples: LabelledFeatures) -> Score:
     return Score(
         windows=float((log_probabilities.argmax(axis=1) == truth).mean()),
         slides=float(np.mean([final.label == label for label, final in finals])),
-        known=float(np.mean([final.known for _, final in finals])),
+        known=float(np.mean([final.accepted for _, final in finals])),
         certain_and_wrong=float(np.mean([final.decided and final.label != label for label, final in finals])),
     )
 

@@ -49,11 +49,11 @@ OURS, PAPERS, PEERS = 'this suite', 'papers, word for word', 'general classifier
 RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
     VIBRATION: {
         PAPERS: ('hu-pca-svm', 'ets-fine-svm', 'ets-linear-svm', 'jamali-naive-bayes-5'),
-        OURS: ('default', 'fast', 'any-place'),
+        OURS: ('default', 'any-place'),
         PEERS: (SVC,),
     },
     ALL_CHANNELS: {
-        OURS: ('vibration-and-taxels', 'any-place-and-taxels', 'taxels-changes'),
+        OURS: ('vibration-and-taxels', 'any-place-and-taxels'),
         PAPERS: ('kaboli-svm', 'kaboli-pa'),
     },
 }

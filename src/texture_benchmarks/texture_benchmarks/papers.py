@@ -70,7 +70,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     for place, other in (PLACES, PLACES[::-1]):
         tested = {('', shift): names_of(slides, later, where) for shift, where in ((SAME, place), (PLACE, other))}
         trials.append(Trial(place, names_of(slides, earlier, place), tested))
-    halves = TrialSet('halves of biotac20', names, slides, trials)
+    halves = TrialSet('halves of biotac20', slides, trials)
     found: defaultdict[tuple[str, str], list[Answer]] = defaultdict(list)
     for answered in map_forked(partial(answers_of, halves, options.seed, recipe_of), names):
         for (_, shift, name, _), answers in answered:

@@ -22,7 +22,6 @@ from texture_recordings.dataset import LabelledSlide
 
 SVC = 'SVC on log bands'  # the typical spectrum of each window; it has no rejection of its own
 PACKAGES = 'TEXTURE_PEERS'  # environment variable: the folder of the packages that `make peers` installs
-NEEDED = ('aeon', 'torch')
 MINIROCKET, QUANT, CNN = 'MiniRocket', 'QUANT', 'convolutional network'
 CLASSIFIERS: Mapping[str, str] = {
     MINIROCKET: 'aeon.classification.convolution_based:MiniRocketClassifier',  # Dempster et al. 2021
@@ -37,18 +36,22 @@ def recipe_of(name: str) -> Recipe:
     """Return a released recipe, or the support vector machine."""
     if name != SVC:
         return load_recipe(name)
-    _, content = read_recipe('fast')
+    _, content = read_recipe('default')
     inputs = {FAST_TOPIC: {'features': [{'mean_log_bands': {'bands': 32}}]}}
-    plain = {'inputs': inputs, 'learner': {'svm_rbf': {'c': 10.0}}, 'evidence': 'soft_vote'}
+    plain = {
+        'inputs': inputs,
+        'learner': {'sklearn': {'estimator': 'sklearn.svm:SVC', 'C': 10.0}},
+        'evidence': 'soft_vote',
+    }
     return Recipe.from_mapping({**content, **plain, 'training': {'hop_s': 0.25}}, name)
 
 
-def available() -> bool:
-    """Return whether the packages of the peers are there, and make them importable."""
+def available(*names: str) -> bool:
+    """Return whether the packages of these peers, of all if none is named, are there, and make them importable."""
     folder = os.environ.get(PACKAGES)
     if folder and folder not in sys.path:
         sys.path.append(folder)  # behind those of the suite, which stay as they are
-    return all(find_spec(name) for name in NEEDED)
+    return all(find_spec('torch' if name == CNN else 'aeon') for name in names or CLASSIFIERS)
 
 
 def classifier(name: str, seed: int) -> Any:
@@ -97,26 +100,29 @@ class SpectrumNetwork:
         self.classes_, codes = np.unique(labels, return_inverse=True)
         spectra = self._spectra(windows)
         self._mean, self._scale = spectra.mean(axis=(0, 2), keepdims=True), spectra.std(axis=(0, 2), keepdims=True)
-        X, y = torch.from_numpy((spectra - self._mean) / (self._scale + 1e-6)), torch.from_numpy(codes)
+        self._device = 'cuda' if torch.cuda.is_available() else 'cpu'
+        X = torch.from_numpy((spectra - self._mean) / (self._scale + 1e-6)).float().to(self._device)
+        y = torch.from_numpy(codes).to(self._device)
         bands, channels = SEGMENT // 2 + 1, X.shape[1]
         self._net = nn.Sequential(
             nn.Conv1d(channels, WIDTH, 3, padding=1), nn.BatchNorm1d(WIDTH), nn.ReLU(),
             nn.Conv1d(WIDTH, WIDTH, 3, padding=1), nn.BatchNorm1d(WIDTH), nn.ReLU(),
             nn.AdaptiveAvgPool1d(1), nn.Flatten(), nn.Dropout(0.3), nn.Linear(WIDTH, len(self.classes_)),
-        )  # fmt: skip
+        ).to(self._device)  # fmt: skip
         steps = -(-len(X) // BATCH) * EPOCHS
         optimiser = torch.optim.AdamW(self._net.parameters(), 2e-3, weight_decay=0.01)
         schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps)
         self._net.train()
-        gain_of = torch.from_numpy((GAIN / (self._scale + 1e-6)).astype(np.float32))
+        gain_of = torch.from_numpy((GAIN / (self._scale + 1e-6)).astype(np.float32)).to(self._device)
         gain_of[:, bands:] = 0.0
         for _ in range(EPOCHS):
-            for rows in torch.randperm(len(X)).split(BATCH):
-                copies = X[rows] + gain_of * torch.randn(len(rows), 1, 1) + NOISE * torch.randn(X[rows].shape)
-                first = torch.randint(bands - MASKED, (len(rows), 1, 1))
-                number = torch.arange(channels)[None, :, None]
+            for rows in torch.randperm(len(X), device=self._device).split(BATCH):
+                gains = torch.randn(len(rows), 1, 1, device=self._device)
+                copies = X[rows] + gain_of * gains + NOISE * torch.randn_like(X[rows])
+                first = torch.randint(bands - MASKED, (len(rows), 1, 1), device=self._device)
+                number = torch.arange(channels, device=self._device)[None, :, None]
                 copies = copies.masked_fill((number >= first) & (number < first + MASKED), 0.0)
-                loss = nn.functional.cross_entropy(self._net(copies.float()), y[rows], label_smoothing=0.05)
+                loss = nn.functional.cross_entropy(self._net(copies), y[rows], label_smoothing=0.05)
                 optimiser.zero_grad()
                 loss.backward()
                 optimiser.step()
@@ -128,8 +134,8 @@ class SpectrumNetwork:
         """Return the probability of each label, (n, n_labels)."""
         torch: Any = import_module('torch')
         with torch.no_grad():
-            X = torch.from_numpy((self._spectra(windows) - self._mean) / (self._scale + 1e-6))
-            found: Array = torch.softmax(self._net(X), dim=1).numpy().astype(np.float64)
+            X = torch.from_numpy((self._spectra(windows) - self._mean) / (self._scale + 1e-6)).float()
+            found: Array = torch.softmax(self._net(X.to(self._device)), dim=1).cpu().numpy().astype(np.float64)
         return found
 
     @staticmethod

@@ -11,7 +11,7 @@ import os
 import platform
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -45,6 +45,8 @@ class BenchmarkOptions:
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
+    workers: int = 0  # Processes of a study that can be cut into pieces; 0: one for each core
+    budget_s: float = math.inf  # After so long such a study ends with the pieces that it has
 
     def recordings(self, name: str) -> Path:
         """Return the folder of a recorded data set, by its name; InvalidData says that it is missing."""
@@ -105,6 +107,30 @@ def map_forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> list[Out]:
         except BrokenProcessPool as error:
             sentence = 'a measurement ended without an answer; see above, or give it more memory'
             raise DeviceError(sentence) from error
+
+
+def finished_forked(
+    work: Callable[[Job], Out], jobs: Sequence[Job], workers: int = 0, budget_s: float = math.inf
+) -> Iterator[tuple[Job, Out]]:
+    """Yield jobs with work(job) as they are finished; what fails is named, what lasts beyond the budget is ended."""
+    context = multiprocessing.get_context('fork')
+    count = min(len(jobs), workers or len(os.sched_getaffinity(0)))
+    if not count:
+        return
+    pool = ProcessPoolExecutor(count, context, _begin, (work,))
+    futures = {pool.submit(_do, job): job for job in jobs}
+    try:
+        for future in as_completed(futures, None if math.isinf(budget_s) else budget_s):
+            if (error := future.exception()) is not None:
+                print(f'{futures[future]} failed: {type(error).__name__}: {error}', flush=True)
+            else:
+                yield futures[future], future.result()
+    except TimeoutError:
+        print(f'ended after {budget_s:g} s', flush=True)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():
+            process.terminate()
 
 
 def _begin(work: Callable[[Any], Any]) -> None:

@@ -212,7 +212,7 @@ class Outcome:
         measured = [result for result in results if result.estimates]
         first = [(next((e for e in result.estimates if e.decided), None), result) for result in measured]
         early = [estimate.label == result.surface for estimate, result in first if estimate is not None]
-        final = [result.end.label == result.surface for result in measured if result.end.known]
+        final = [result.end.label == result.surface for result in measured if result.end.accepted]
         labels = [bool(result.estimates) and result.end.label == result.surface for result in results]
         return cls(
             slides=len(results),
@@ -339,8 +339,8 @@ def _unknown_materials(options: BenchmarkOptions, trained: SlideDataset, tested:
                 for one in predict_slides(train(recipe, examples.of_slides(known)), features).values()
                 if (end := one.after(UNKNOWN_S)) is not None
             ]
-            accepted.append(float(np.mean([end.known for surface, end in ends if surface in unknown])))
-            rejected.append(float(np.mean([not end.known for surface, end in ends if surface not in unknown])))
+            accepted.append(float(np.mean([end.accepted for surface, end in ends if surface in unknown])))
+            rejected.append(float(np.mean([not end.accepted for surface, end in ends if surface not in unknown])))
             print(f'trust, unknown materials, {name}: {draw + 1} of {DRAWS} trainings', flush=True)
         found[name] = {'accepted': accepted, 'false_rejection_rate': float(np.mean(rejected))}
     return found

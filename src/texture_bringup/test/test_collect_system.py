@@ -44,7 +44,7 @@ def operator(folder):
     params = folder / 'patient.yaml'
     params.write_text(f'/**: {{ros__parameters: {{{PATIENT}, {PATCH}}}}}')
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
-    given = {'devices': folder, 'scene': 'varying', 'surface': 'cork', 'recipe': 'fast', 'explorer_params': params}
+    given = {'devices': folder, 'scene': 'varying', 'surface': 'cork', 'recipe': 'default', 'explorer_params': params}
     before = os.environ.get('ROS_DOMAIN_ID')
     os.environ['ROS_DOMAIN_ID'] = str(DOMAIN)  # of the recorder and the commands
     with (
@@ -74,7 +74,7 @@ def test_a_surface_is_collected_at_places_that_training_can_leave_out(operator, 
     operator.set_parameters('emulator', {'surface': 'sandpaper_240'})
     end, other = collect_surface(operator, 'sandpaper', folder / 'bags', QUICK, lambda text, slides: told.append(text))
     assert 'left-out places correct' in end.message, end.message
-    train_from_bags('fast', [bag, other], out=folder / 'two')
+    train_from_bags('default', [bag, other], out=folder / 'two')
 
 
 @pytest.fixture

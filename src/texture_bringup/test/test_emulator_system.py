@@ -146,11 +146,3 @@ def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operat
         for _ in range(1000):
             operator.wait_for_signal(DEADLINE_S)
     assert not any(is_running(pid) for pid in pids.values())
-
-
-def test_a_wrong_launch_argument_ends_the_launch_with_a_sentence_of_the_node(folder) -> None:
-    with launched(folder, scene='twelve_texture') as launcher:
-        assert launcher.wait(DEADLINE_S) == 1
-        lines = launcher.log.read_text().splitlines()
-    assert any(line.startswith('[left/') and "did you mean 'twelve_textures'?" in line for line in lines), lines
-    assert any('died with exit code 2' in line for line in lines), lines

@@ -35,7 +35,7 @@ def trained(folder, directions):
             folder / f'bags{number}', replace(PLAN, direction_rad=direction), rng, 'oriented', TEXTURES
         )
     ]
-    train_from_bags('fast', bags, out=folder / 'model')
+    train_from_bags('default', bags, out=folder / 'model')
     return str(folder / 'model.npz')
 
 
@@ -52,7 +52,9 @@ def bench(tmp_path, monkeypatch):
     (tmp_path / 'patient.yaml').write_text(PATIENT)
     given = {'devices': tmp_path, 'scene': 'oriented', 'surface': 'ridges_x'}
     given['explorer_params'] = tmp_path / 'patient.yaml'
-    with ChildLauncher('emulator', {**given, 'recipe': 'fast'}, dict(os.environ), tmp_path / 'nodes.log') as launcher:
+    with ChildLauncher(
+        'emulator', {**given, 'recipe': 'default'}, dict(os.environ), tmp_path / 'nodes.log'
+    ) as launcher:
         with Operator('', DOMAIN, launcher.check) as operator:
             operator.wait_for_explorer(DEADLINE_S)
             operator.wait_for_signal(DEADLINE_S)

@@ -47,8 +47,8 @@ from texture_exploration.presets import load_preset
 from texture_features.feature_set import FeatureSet, LabelledFeatures
 from texture_recordings.bags import TYPES, BagWriter, decode, encode
 from texture_recordings.dataset import SlideDataset
+from texture_recordings.mapping import load_mapping
 from texture_recordings.public_sets import import_biotac20
-from texture_recordings.tables import load_mapping
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))

@@ -251,7 +251,7 @@ class Feed:
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'known': estimate.known}
+        reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'accepted': estimate.accepted}
         if estimate.exploration_id in self._past:
             self._note(estimate.exploration_id, reported)
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
@@ -335,7 +335,7 @@ class Feed:
         fits = (estimate.model, estimate.revision) == (model.model, model.revision)  # else the labels come in a moment
         labels = model.labels if fits else ()
         pairs = sorted(zip(estimate.probabilities, labels, strict=False), reverse=True)[:MAX_LABELS]
-        shown = {name: _plain(value) for name, value in asdict(estimate).items()} | {'known': estimate.known}
+        shown = {name: _plain(value) for name, value in asdict(estimate).items()} | {'accepted': estimate.accepted}
         shown['missing'] = '' if estimate.label or estimate.message else self._missing('estimate', 'classifier')
         shown['labels'] = [label for _, label in pairs]
         shown['probabilities'] = _numbers(probability for probability, _ in pairs)

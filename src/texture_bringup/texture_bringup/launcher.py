@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import dataclasses
-import math
 import os
 import re
 import selectors
@@ -76,11 +75,6 @@ class ChildLauncher:
         """Raise LaunchFailed, with what the log says, if the nodes have ended."""
         if self._process is not None and self._process.poll() is not None:
             raise LaunchFailed(f'{self._reason()}; everything the nodes said is in {self.log}')
-
-    def wait(self, deadline_s: float) -> int:
-        """Wait until the nodes have ended by themselves; return the exit code of the launcher."""
-        assert self._process is not None
-        return self._process.wait(deadline_s)
 
     def stop(self) -> None:
         """Stop the nodes and wait until none is left."""
@@ -668,24 +662,13 @@ def _truth(text: str, where: str) -> bool:
     return value
 
 
-def _number(text: str, name: str, lowest: float) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not lowest <= number < math.inf:
-        raise InvalidLaunch(f"'{name}' of <node> is '{text}'; a number from {lowest:g} is needed")
-    return number
-
-
 def _wanted(element: Element, scope: Scope) -> bool:
-    given = [name for name in CONDITIONS if name in element.attrib]
-    if len(given) > 1:
-        raise InvalidLaunch(f"<{element.tag}> has both 'if' and 'unless'; give one of them")
-    if not given:
-        return True
-    met = _truth(scope.expand(element.attrib[given[0]]), f"'{given[0]}' of <{element.tag}>")
-    return met == (given[0] == 'if')
+    """Return whether its conditions are met."""
+    return all(
+        _truth(scope.expand(element.attrib[name]), f"'{name}' of <{element.tag}>") == (name == 'if')
+        for name in CONDITIONS
+        if name in element.attrib
+    )
 
 
 class _Reader:
@@ -781,8 +764,8 @@ class _Reader:
                 parameters=tuple(_parameter(item, scope) for item in element.findall('param')),
                 remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
                 respawn=_truth(texts['respawn'] or 'false', "'respawn' of <node>"),
-                respawn_delay_s=_number(texts['respawn_delay'] or '0', 'respawn_delay', 0.0),
-                respawn_max_retries=int(_number(texts['respawn_max_retries'] or '-1', 'respawn_max_retries', -1.0)),
+                respawn_delay_s=parameter_value(texts['respawn_delay'] or '0', 'float'),
+                respawn_max_retries=parameter_value(texts['respawn_max_retries'] or '-1', 'int'),
                 needed=texts['on_exit'] == 'shutdown',
                 environment=dict(scope.environment),
             )

@@ -62,6 +62,7 @@ def middleware() -> str:
 # Wait in a coroutine for what ROS answers in its own thread.
 
 FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
+SOON_S = 1.0  # within which an explorer that runs is usually discovered
 
 
 async def ready(is_ready: Callable[[], bool], node: str) -> None:
@@ -188,17 +189,7 @@ class ExplorationResult:
 
 
 class Operator:
-    """A client of the nodes of one namespace; use it in a `with` block, from one thread.
-
-    Parameters
-    ----------
-    namespace
-        Where the nodes live; '' for the root.
-    domain_id
-        ROS domain; None for that of the environment.
-    guard
-        Called while waiting; it raises if waiting has become senseless.
-    """
+    """A client of the nodes of one namespace; use it in a `with` block, from one thread."""
 
     def __init__(
         self, namespace: str = '', domain_id: int | None = None, guard: Callable[[], None] = lambda: None
@@ -210,7 +201,6 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
-        self._stop = self._node.create_client(Trigger, 'explorer/stop')
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
         self._heard_s = 0.0  # of the explorer
         self._states: Any = None  # nobody listens yet
@@ -228,24 +218,12 @@ class Operator:
         self._context.try_shutdown()
 
     def wait_for_explorer(self, deadline_s: float) -> None:
-        """Wait until explorations can be asked for.
-
-        Raises
-        ------
-        LaunchFailed
-            If the explorer does not appear in time.
-        """
-        self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulator '
-                    'with `texture launch emulator`')  # fmt: skip
+        """Wait until explorations can be asked for."""
+        missing = 'no explorer answers; start one, such as the emulator with `texture launch emulator`'
+        self._until(self._explore.server_is_ready, deadline_s, missing, quiet_s=SOON_S)
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
-        """Wait until a node of the namespace is there.
-
-        Raises
-        ------
-        LaunchFailed
-            If it does not appear in time.
-        """
+        """Wait until a node of the namespace is there."""
         namespace = self._node.get_namespace()
         missing = f"node '{namespace.rstrip('/')}/{name}' is not there; look at its output"
         self._until(lambda: (name, namespace) in self._node.get_node_names_and_namespaces(), deadline_s, missing)
@@ -260,22 +238,7 @@ class Operator:
             self._node.destroy_subscription(subscription)
 
     def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
-        """Wait until each topic has so many subscriptions, and they had time to be found; `guard` is called meanwhile.
-
-        Parameters
-        ----------
-        topics
-            Names of the topics.
-        number
-            Number of subscriptions that each needs.
-        guard
-            Called while waiting; what it raises ends the waiting.
-
-        Raises
-        ------
-        LaunchFailed
-            If they do not appear in time.
-        """
+        """Wait until topics have so many subscriptions, which had time to be found; `guard` is called meanwhile."""
 
         def all_listen() -> bool:
             guard()
@@ -291,15 +254,7 @@ class Operator:
     def explore(
         self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
     ) -> ExplorationResult:
-        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on.
-
-        Raises
-        ------
-        MotionAborted
-            If the explorer vanishes meanwhile.
-        KeyboardInterrupt
-            After Ctrl-C; its sentence is how the exploration ended.
-        """
+        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on."""
 
         def on_feedback(message: Any) -> None:
             self._heard_s = time.monotonic()
@@ -346,13 +301,7 @@ class Operator:
     def explore_with_features(
         self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
     ) -> tuple[ExplorationResult, list[FeatureVector]]:
-        """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration.
-
-        Raises
-        ------
-        LaunchFailed
-            If nobody publishes features.
-        """
+        """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration."""
         vectors = self._listen_to_features()
         vectors.clear()
         explored = self.explore(request, on_progress)
@@ -365,33 +314,12 @@ class Operator:
         self._until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
         return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
 
-    def stop(self, deadline_s: float = 5.0) -> str:
+    def stop(self) -> str:
         """Stop whatever moves; return what the explorer says."""
-        self._until(self._stop.service_is_ready, deadline_s, 'no explorer answers')
-        future = self._stop.call_async(Trigger.Request())
-        self._until(future.done, deadline_s, 'the explorer does not answer')
-        return str(future.result().message)
+        return self.call('explorer/stop', 'start an explorer')[1]
 
     def call(self, service: str, advice: str) -> tuple[bool, str]:
-        """Call a service without values, and return whether it succeeded and its sentence.
-
-        Parameters
-        ----------
-        service
-            Name of the service, a `std_srvs/Trigger`.
-        advice
-            What to do when no node offers it.
-
-        Returns
-        -------
-        (bool, str)
-            `success` and `message` of the answer.
-
-        Raises
-        ------
-        LaunchFailed
-            If no node offers the service within `OFFERED_S`, or the answer takes longer than `ANSWER_S`.
-        """
+        """Call a `Trigger`; return whether it succeeded, and its sentence; `advice` is for one that no node offers."""
         name = f"the service '{self._node.resolve_service_name(service)}'"
         missing = f'no node offers {name}; {advice}'
         silent = f'{name} does not answer; look at the robot, and at the output of its node'
@@ -399,25 +327,7 @@ class Operator:
         return bool(answer.success), str(answer.message)
 
     def set_active(self, node: str, active: bool) -> str:
-        """Bring a lifecycle node to the state 'active', over 'inactive', or from it back to 'inactive'.
-
-        Parameters
-        ----------
-        node
-            Name of the node.
-        active
-            Whether it shall work.
-
-        Returns
-        -------
-        str
-            Its state then.
-
-        Raises
-        ------
-        LaunchFailed
-            If there is no such node, it does not answer, or it refuses.
-        """
+        """Bring a lifecycle node to the state 'active', over 'inactive', or from it back to 'inactive'."""
         missing = f"no lifecycle node '{node}' answers; start it, or give its --namespace"
         silent = f"node '{node}' does not answer; look at its output"
         for _ in range(3):  # two transitions at most, and a look at the state behind them
@@ -434,43 +344,13 @@ class Operator:
         return label
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
-        """Add an exploration, the last one if '', to a texture; return its number of windows and a message.
-
-        Parameters
-        ----------
-        label
-            Label of the texture.
-        exploration_id
-            Id of the exploration; '' for the last one.
-        deadline_s
-            Longest time to wait for the answer.
-
-        Returns
-        -------
-        (int, str)
-            Number of windows of the texture, of the training and added, and a sentence.
-
-        Raises
-        ------
-        LaunchFailed
-            If no classifier answers.
-        InvalidData
-            If it could not be added, with the reason.
-        """
+        """Add an exploration, the last one if '', to a texture; return its number of windows and a sentence."""
         request = srv.AddTexture.Request(label=label, exploration_id=exploration_id)
         answer = self._ask_classifier(srv.AddTexture, 'classifier/add_texture', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
     def remove(self, label: str, deadline_s: float = 30.0) -> str:
-        """Remove all slides that were added as a texture; return what happened in a sentence.
-
-        Raises
-        ------
-        LaunchFailed
-            If no classifier answers.
-        InvalidData
-            If none could be removed, with the reason.
-        """
+        """Remove all slides that were added as a texture; return what happened in a sentence."""
         request = srv.RemoveTexture.Request(label=label)
         return str(self._ask_classifier(srv.RemoveTexture, 'classifier/remove_texture', request, deadline_s).message)
 
@@ -527,59 +407,17 @@ class Operator:
         return future.result()
 
     def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
-        """Set parameters of a node.
-
-        Parameters
-        ----------
-        node
-            Name of the node.
-        values
-            Values by the names of the parameters.
-        deadline_s
-            Longest time to wait for the answer.
-
-        Raises
-        ------
-        LaunchFailed
-            If the node does not answer.
-        InvalidParameter
-            If it refuses one, with its reason.
-        """
+        """Set parameters of a node."""
         client = self._parameters_of(node, deadline_s)
         self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
 
     def parameters(self, node: str, names: Sequence[str], deadline_s: float = 10.0) -> list[float]:
-        """Return numbers that a node holds as parameters, in the order of their names.
-
-        Raises
-        ------
-        LaunchFailed
-            If the node does not answer.
-        """
+        """Return numbers that a node holds as parameters, in the order of their names."""
         client = self._parameters_of(node, deadline_s)
         return [one.double_value for one in self._answer(node, client.get_parameters(list(names))).values]
 
     def set_from_texts(self, node: str, texts: Mapping[str, str], deadline_s: float = 10.0) -> None:
-        """Set parameters of a node from texts, which are read as the types that the node has declared.
-
-        Parameters
-        ----------
-        node
-            Name of the node.
-        texts
-            Values by the names of the parameters.
-        deadline_s
-            Longest time to wait for the node.
-
-        Raises
-        ------
-        LaunchFailed
-            If the node does not answer.
-        UnknownName
-            If it has no such parameter, with the nearest name.
-        InvalidParameter
-            If a text is no value of the type, or the node refuses it, with its reason.
-        """
+        """Set parameters of a node from texts, read as the types that it has declared; UnknownName with the nearest."""
         client = self._parameters_of(node, deadline_s)
         known = self._answer(node, client.list_parameters([], 10)).result.names
         for name in texts:
@@ -625,9 +463,10 @@ class Operator:
         deadline_s: float,
         complaint: str,
         error: type[TextureError] = LaunchFailed,
+        quiet_s: float | None = None,
     ) -> None:
         deadline = time.monotonic() + deadline_s
-        with task(f'waiting; so far {complaint}'):
+        with task(f'waiting; so far {complaint}', quiet_s=quiet_s):
             while not condition():
                 if time.monotonic() > deadline:
                     raise error(f'{complaint} (waited {deadline_s:.0f} s)')

@@ -107,8 +107,8 @@ def show_progress() -> None:
 
 
 @contextmanager
-def task(what: str, total: int = 0, quiet_s: float = QUIET_S) -> Iterator[Callable[[], None]]:
-    """Say, while a `with` block takes longer than `quiet_s`, what it does, how far it is and how long it has taken.
+def task(what: str, total: int = 0, quiet_s: float | None = None) -> Iterator[Callable[[], None]]:
+    """Say, while a `with` block takes longer than `quiet_s` (3 s), what it does, how far it is and how long it took.
 
     On a terminal one line changes in place and goes at the end; elsewhere a line is written every 10 s. Of nested tasks
     the outermost is shown.
@@ -116,6 +116,7 @@ def task(what: str, total: int = 0, quiet_s: float = QUIET_S) -> Iterator[Callab
     if not _Shown.wanted or _Shown.busy:
         yield lambda: None
         return
+    quiet_s = QUIET_S if quiet_s is None else quiet_s
     _Shown.busy = True
     began_s, done, over = time.monotonic(), 0, threading.Event()
     terminal = sys.stderr.isatty()

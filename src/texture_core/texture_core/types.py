@@ -303,7 +303,7 @@ class TextureEstimate:
     revision: int = 0
 
     @property
-    def known(self) -> bool:
+    def accepted(self) -> bool:
         """Whether the label may be used: it is not rejected."""
         return self.rejection is Rejection.NONE
 

@@ -3,6 +3,8 @@
 """Acceptance against what is known of the distributions that slides are drawn from, and that no model is without it."""
 
 import dataclasses
+import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from texture_core.types import Rejection
 from texture_estimation.acceptance import (
     LEAST_SLIDES_A_LABEL,
     LEVELS,
+    TRIALS,
     Acceptance,
     HeldOutSlide,
     Rates,
@@ -23,7 +26,8 @@ from texture_estimation.domain import Domain
 from texture_estimation.evidence_rules import SoftVote
 from texture_estimation.gaussians import ClassDistance
 from texture_estimation.learners.learner import log_softmax
-from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.model import AddedSlide, load_model
+from texture_estimation.recipe import DecisionParams, Recipe, load_recipe
 from texture_estimation.training import train
 
 LABELS, COUNTS = 6, np.array(LEVELS)
@@ -247,8 +251,42 @@ def test_few_slides_reject_every_surface_and_enough_accept_those_trained_and_har
     )
 
     ends = [(label, estimates_of(many, values, hop_s=0.5)[-1]) for label, values in known]
-    assert np.mean([end.known and end.label == label for label, end in ends]) > 0.7
-    assert np.mean([estimates_of(many, values, hop_s=0.5)[-1].known for _, values in novel]) <= 0.1
+    assert np.mean([end.accepted and end.label == label for label, end in ends]) > 0.7
+    assert np.mean([estimates_of(many, values, hop_s=0.5)[-1].accepted for _, values in novel]) <= 0.1
+
+
+def test_added_slides_pass_the_same_acceptance_and_fewer_than_needed_none(make_examples, estimates_of):
+    labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
+    everything = make_examples(labels=labels, slides=24, features=12)
+    trained = everything.take(~np.isin(everything.labels, ('glass', 'paper')))
+    number = np.array([int(name.split('/')[1]) for name in trained.groups])
+    model = train(load_recipe('default'), trained.take(number < 14))
+
+    def accepted_of(label, added):
+        slides = tuple(AddedSlide('glass', f'{n}', everything.values[everything.groups == f'glass/{n}']) for n in added)
+        more = model.with_added_slides(slides)
+        tested = of_slides(everything, [f'{label}/{n}' for n in range(14, 24)])
+        return [estimates_of(more, values, hop_s=0.5)[-1] for _, values in tested]
+
+    few = accepted_of('glass', range(LEAST_SLIDES_A_LABEL - 1))
+    assert {end.rejection for end in few if end.label == 'glass'} == {Rejection.TOO_LITTLE_TRAINING}
+    assert "too little training: 4 added; to accept 'glass' 5 are needed" in few[-1].message
+    enough = accepted_of('glass', range(14))
+    assert np.mean([end.accepted and end.label == 'glass' for end in enough]) > 0.5
+    assert np.mean([end.accepted for end in accepted_of('paper', range(14))]) <= 0.2
+    assert np.mean([end.accepted and end.label == 'cork' for end in accepted_of('cork', range(14))]) > 0.6
+
+
+def test_code_card_and_page_name_the_same_numbers_of_slides(make_examples, tmp_path):
+    needed = math.ceil(slides_needed(DecisionParams().max_accepted_wrong) / TRIALS)
+    assert (needed, LEAST_SLIDES_A_LABEL) == (45, 5)
+    asked = f'to accept a label {needed} are needed, and {LEAST_SLIDES_A_LABEL} of each surface'
+    path = train(load_recipe('default'), make_examples(slides=4)).save(tmp_path / 'few')
+    assert asked in load_model(path).acceptance.reason
+    pages = Path(__file__).parents[3] / 'docs'
+    said = f'fewer than {needed} held-out slides, or fewer than {LEAST_SLIDES_A_LABEL} of a surface'
+    assert said in (pages / 'recipes.md').read_text(encoding='utf-8')
+    assert asked in (pages / 'integrate.md').read_text(encoding='utf-8')
 
 
 def test_a_label_with_fewer_slides_than_needed_is_named(make_examples):

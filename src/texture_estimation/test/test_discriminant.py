@@ -94,7 +94,7 @@ def test_a_model_of_one_place_says_so_where_it_rejects(make_examples):
     strange = replace(examples, values=examples.values + 50.0)
     evidence = EvidenceAccumulator(model)
     final = [evidence.update(vector) for vector in strange.vectors('cork/0')][-1]
-    assert not final.known
+    assert not final.accepted
     assert ONE_PLACE in final.message
     of_two = train(RECIPE, of_days(examples))
     assert of_two.acceptance.domain.reach['cork'] == {'sessions': 2, 'places': 1, 'fingers': 1}
@@ -116,7 +116,7 @@ def test_the_load_is_no_part_of_the_discriminant_and_a_load_never_seen_is_outsid
     evidence = EvidenceAccumulator(model)
     final = [evidence.update(vector) for vector in light.vectors('cork/0')][-1]
     assert final.label == 'cork'
-    assert not final.known
+    assert not final.accepted
     assert 'signal level 20 of signal_static, trained 300' in final.message
 
 

@@ -60,7 +60,7 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert [estimate.windows for estimate in estimates] == [1, 2, 3, 4, 5, 6, 7, 8, 8]
     assert [estimate.final for estimate in estimates] == [False] * 8 + [True]
     assert estimates[-1].label == 'felt'
-    assert estimates[-1].known
+    assert estimates[-1].accepted
     assert estimates[-1].confidence == max(estimates[-1].probabilities)
     assert sum(estimates[-1].probabilities) == pytest.approx(1.0)
     assert len(estimates[-1].probabilities) == len(model.labels)
@@ -98,7 +98,7 @@ def test_outside_what_was_trained_nothing_is_known_or_decided_and_every_estimate
     sentence = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
     assert any(estimate.decided for estimate in predict(unlimited(model), slow))
     for estimate in predict(trained_at(unlimited(model), 0.05), slow):
-        assert (estimate.known, estimate.decided, estimate.prediction_set) == (False, False, ())
+        assert (estimate.accepted, estimate.decided, estimate.prediction_set) == (False, False, ())
         assert (estimate.label, estimate.message) == ('felt', sentence)
 
 
@@ -106,7 +106,7 @@ def test_the_mean_speed_of_the_exploration_counts_not_that_of_one_window(model, 
     first, *rest = under(vectors(examples), speed_m_s=0.05)
     estimates = predict(trained_at(model, 0.05), [dataclasses.replace(first, speed_m_s=0.035), *rest])
     assert [bool(estimate.message) for estimate in estimates[:3]] == [True, True, False]
-    assert estimates[-1].known
+    assert estimates[-1].accepted
 
 
 def test_a_new_exploration_begins_again_even_without_an_end(model, examples):

@@ -201,7 +201,7 @@ def test_what_was_fitted_for_acceptance_is_the_same_after_it_was_saved(model, tm
         ('slides', True, 'slides is True'),
         ('slides', 12.5, 'slides is 12.5'),
         ('slides', -1, 'acceptance has -1 slides'),
-        ('by_distance', 3, 'by_distance is 3'),
+        ('added', 3, 'added is 3'),
         ('domain', 'any', "domain is 'any'; the entries motions"),
     ],
 )

@@ -19,7 +19,7 @@ from texture_features.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 # Where nothing distinguishes surfaces, these find all equally probable; votes between pairs go to one of them.
-EVEN = frozenset({'mlp', 'svm_rbf'})
+EVEN = frozenset({'mlp'})
 FLOORED = frozenset({'any-speed'})
 RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
 

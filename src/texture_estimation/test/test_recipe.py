@@ -35,10 +35,10 @@ def test_training_windows_have_the_hop_of_the_training():
 @pytest.mark.parametrize(
     ('more', 'sentence'),
     [
-        ({'learnr': 'svm_rbf'}, "did you mean 'learner'"),
-        ({'learner': 'svm_rb'}, "did you mean 'svm_rbf'"),
-        ({'learner': {'svm_rbf': {'c': -1}}}, "parameter 'c'"),
-        ({'learner': ['svm_rbf']}, 'is written'),
+        ({'learnr': 'mlp'}, "did you mean 'learner'"),
+        ({'learner': 'mpl'}, "did you mean 'mlp'"),
+        ({'learner': {'mlp': {'noise': -1}}}, "parameter 'noise'"),
+        ({'learner': ['mlp']}, 'is written'),
         ({'evidence': 'vote'}, 'soft_vote'),
         ({'training': {'hop_s': 'x'}}, 'a number is needed'),
         ({'training': 3}, 'a mapping'),
@@ -62,8 +62,8 @@ def test_augmentation_is_a_section_of_training_that_only_a_network_takes():
     assert recipe.augmentation.copies == 4
     assert Recipe.from_mapping(recipe.as_mapping(), 'default') == recipe
     assert 'augmentation' not in load_recipe('kaboli-svm').as_mapping()['training']
-    content = {'inputs': {'signal': {'features': ['hjorth']}}, 'training': {'augmentation': {'copies': 3}}}
-    with pytest.raises(TextureError, match="learner 'svm_rbf' cannot be trained so; use 'mlp'"):
+    content = {**INPUTS, 'learner': 'discriminant', 'training': {'augmentation': {'copies': 3}}}
+    with pytest.raises(TextureError, match="learner 'discriminant' cannot be trained so; use 'mlp'"):
         Recipe.from_mapping(content, 'mine')
     wrong = {**content, 'learner': 'mlp', 'training': {'augmentation': {'copy': 3}}}
     with pytest.raises(TextureError, match=r"recipe 'mine', training, augmentation: .*'copies'"):
@@ -112,4 +112,4 @@ def test_an_input_states_a_tare_exactly_if_its_features_see_the_level(name: str)
 
 def test_features_that_see_the_level_are_found() -> None:
     seen = {name for name, inputs in RECIPES.items() if any(map(sees_level, inputs))}
-    assert seen == {'any-speed', 'jamali-amplitude', 'taxels', 'taxels-any-day', 'taxels-changes', 'taxels-signal'}
+    assert seen == {'any-speed', 'jamali-amplitude', 'taxels-any-day'}

@@ -36,7 +36,7 @@ def test_a_single_texture_cannot_be_trained_on(graded_windows) -> None:
 @pytest.mark.parametrize(
     ('more', 'sentence'),
     [
-        ({'learner': 'svm_rbf'}, "no key 'learner'"),
+        ({'learner': 'mlp'}, "no key 'learner'"),
         ({'regressor': 'gaussian_proces'}, "did you mean 'gaussian"),
         ({'training': {'fold': 5}}, "did you mean 'folds'"),
     ],

@@ -14,7 +14,7 @@ from texture_features.augmentation import Augmentation
 from texture_features.feature_set import AugmentedFeatures, FeatureCopies, LabelledFeatures
 
 RECIPE = load_recipe('default')
-RECIPE_OF_PAIRS = load_recipe('any-speed')
+ANY_SPEED = load_recipe('any-speed')
 
 
 def accuracy(model, examples):
@@ -88,7 +88,7 @@ def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_
     model = train(recipe, pick(examples, examples.labels != 'glass'))
     new = make_examples(labels=labels, slides=12, features=8, seed=4)
     known = {
-        label: [e.known for n in range(12) for e in estimates_of(model, new.values[new.groups == f'{label}/{n}'])]
+        label: [e.accepted for n in range(12) for e in estimates_of(model, new.values[new.groups == f'{label}/{n}'])]
         for label in labels
     }
     assert np.mean(known.pop('glass')) < 0.2
@@ -134,11 +134,11 @@ def test_windows_of_other_lengths_train_the_learner_and_decide_nothing_else(make
     examples, shorter = make_examples(), make_examples(seed=1, labels=('cork', 'felt', 'wood', 'slate'), windows=3)
     moved = dataclasses.replace(shorter, values=shorter.values + 10.0)
     both = dataclasses.replace(examples, resized=moved)
-    alone, wider = train(RECIPE_OF_PAIRS, examples), train(RECIPE_OF_PAIRS, both)
+    alone, wider = train(ANY_SPEED, examples), train(ANY_SPEED, both)
     assert accuracy(wider, moved) > 0.9 > accuracy(alone, moved)
     assert wider.training['windows'] == alone.training['windows'] == len(examples.labels)
     kept = dataclasses.replace(both.of_slides(sorted(set(examples.groups) - {'cork/0'})))
-    assert train(RECIPE_OF_PAIRS, kept).training['slides'] == 15  # those of the slide left out are left out, too
+    assert train(ANY_SPEED, kept).training['slides'] == 15  # those of the slide left out are left out, too
 
 
 def test_no_slide_is_on_both_sides_and_parts_are_stretches_of_time():

@@ -296,8 +296,8 @@ class Acceptance:
         Least score at which a slide may end.
     distance
         To the training slides of each label.
-    by_distance
-        Whether slides were added after the training: margins have other ranges then, and the distance alone counts.
+    added
+        The label that it is for, of slides that were added after the training; '' for those of the training.
     """
 
     slides: int
@@ -306,7 +306,7 @@ class Acceptance:
     levels: Array = field(default_factory=lambda: np.empty((0, len(Limits._fields))))
     decided_score: float = NEVER
     distance: ClassDistance | None = None
-    by_distance: bool = False
+    added: str = ''
 
     def __post_init__(self) -> None:
         if not 0 <= self.slides <= MAX_SLIDES:
@@ -336,6 +336,9 @@ class Acceptance:
     @cached_property
     def reason(self) -> str:
         """Why every label is rejected, in one sentence: how many slides there are and how many are needed; else ''."""
+        if self.added:
+            asked = f"to accept '{self.added}' {LEAST_SLIDES_A_LABEL} are needed"
+            return '' if self.slides >= LEAST_SLIDES_A_LABEL else f'too little training: {self.slides} added; {asked}'
         short = {label: count for label, count in self.domain.slides.items() if count < LEAST_SLIDES_A_LABEL}
         needed = math.ceil(slides_needed(self.rates.max_accepted_wrong) / TRIALS)
         if not short and self.slides >= needed:
@@ -389,11 +392,10 @@ class Acceptance:
 
     def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
         """Return what is said of a slide by the margin of its label and the distance to the slides of it."""
-        if self.distance is None:
+        if self.distance is None or (self.added and self.reason):
             return Assessment(Rejection.TOO_LITTLE_TRAINING, decided=False)
         limits = self.limits(effective_windows)
-        accepted = distance <= limits.novel if self.by_distance else limits.accepts(margin, distance)
-        if not accepted:
+        if not limits.accepts(margin, distance):
             return Assessment(Rejection.NOVEL if distance > limits.novel else Rejection.AMBIGUOUS, decided=False)
         decided = not self.decided_reason and limits.score(margin, distance) >= self.decided_score
         return Assessment(Rejection.NONE, decided)
@@ -412,7 +414,7 @@ class Acceptance:
         """Return the acceptance of a model to which slides were added, by what of them is compared, (n, n_compared)."""
         distance = self.distance.with_slides(compared, codes) if self.distance else None
         domain = self.domain.widened(conditions, labels)
-        return replace(self, distance=distance, domain=domain, by_distance=True)
+        return replace(self, distance=distance, domain=domain)
 
     def _fit_decided(self, slides: Sequence[HeldOutSlide]) -> float:
         """Return the least score at which slides end early and rarely with a wrong label, disturbed or not."""

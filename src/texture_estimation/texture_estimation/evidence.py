@@ -11,9 +11,9 @@ import numpy as np
 from texture_core.types import NANOSECONDS, Array, FeatureVector, Rejection, TextureEstimate
 from texture_estimation.acceptance import Acceptance, SlideDistance, margin_of
 from texture_estimation.evidence_rules import GroupedEvidence
-from texture_estimation.gaussians import SlideMoments
+from texture_estimation.gaussians import GaussianClasses, SlideMoments
 from texture_estimation.learners.learner import is_tied
-from texture_estimation.model import TextureModel
+from texture_estimation.model import LEAST_PROBABILITY, TextureModel
 from texture_features.feature_set import RunningConditions, fingerprint_difference
 from texture_features.windows import WindowParams
 
@@ -166,8 +166,11 @@ class EvidenceAccumulator:
         best, single = listed.index(confidence), listed.count(confidence) == 1
         acceptance = model.acceptance_of(best)
         second, first = sorted(mean.tolist())[-2:]  # of some tens of labels quicker than a partition
+        margin = margin_of(first, second)
+        if self._moments is not None and model.slide_gaussians is not None:
+            margin = self._margin_to_added(model, listed, margin, deciding)
         distance = self._distance.to(best) if self._distance else math.inf
-        rejection, decided = acceptance.assess(margin_of(first, second), distance, effective_windows)
+        rejection, decided = acceptance.assess(margin, distance, effective_windows)
         if self._deviation:
             rejection = Rejection.OUTSIDE_TRAINING
         elif not single and rejection is Rejection.NONE:
@@ -191,6 +194,17 @@ class EvidenceAccumulator:
             message=self._explanation(acceptance, final, rejection),
         )
 
+    @staticmethod
+    def _margin_to_added(model: TextureModel, probabilities: list[float], trained: float, deciding: float) -> float:
+        """Return the margin of the best label by the probabilities of all, or among the trained ones if it is less.
+
+        The Gaussians of slides are tempered for the confidence; without that, they are of the size of the evidence.
+        """
+        second, first = (math.log(max(one, LEAST_PROBABILITY)) for one in sorted(probabilities)[-2:])
+        growth = deciding**model.tempering_exponent * GaussianClasses.inverse_temperature
+        margin = margin_of(first / growth, second / growth)
+        return min(trained, margin) if max(probabilities[: model.n_trained]) == max(probabilities) else margin
+
     def _with_added(self, model: TextureModel, trained: Array, effective_windows: float) -> Array:
         """Return the probabilities of all labels from those of the trained textures among themselves."""
         if self._moments is None or model.slide_gaussians is None:
@@ -202,6 +216,7 @@ class EvidenceAccumulator:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
         missing: tuple[str, ...] = ()
         if final and not self._deviation:
+            too_little = rejection is Rejection.TOO_LITTLE_TRAINING
             reach = acceptance.domain.reach_reason if rejection is not Rejection.NONE else ''
-            missing = (acceptance.reason if acceptance.distance is None else acceptance.decided_reason, reach)
+            missing = (acceptance.reason if too_little else acceptance.decided_reason, reach)
         return '; '.join(filter(None, (self._deviation, self._message, *missing)))

@@ -471,8 +471,9 @@ class TextureModel(StoredModel):
         """Return the acceptance for the label of this number: few slides of an added one show little."""
         if number < self.n_trained:
             return self.active_acceptance
-        slides = sum(added.label == self.labels[number] for added in self.added_slides)
-        return replace(self.active_acceptance, slides=slides)
+        label = self.labels[number]
+        slides = sum(added.label == label for added in self.added_slides)
+        return replace(self.active_acceptance, slides=slides, added=label)
 
     @property
     def _overlap(self) -> float:

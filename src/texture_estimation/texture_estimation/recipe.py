@@ -18,7 +18,6 @@ from texture_estimation.learners.discriminant import Discriminant, ForceDiscrimi
 from texture_estimation.learners.learner import Learner, extras_of
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.learners.sklearn_learner import SklearnLearner
-from texture_estimation.learners.svm import SvmRbf
 from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet, choose, entry_of, read_recipe
 from texture_features.windows import WindowParams
@@ -30,7 +29,6 @@ LEARNERS: Mapping[str, type[Learner]] = {
     'mlp': Mlp,  # one hidden layer, softmax, calibrated
     'discriminant': Discriminant,  # Fisher 1936, shrunk as Friedman 1989, calibrated
     'force_discriminant': ForceDiscriminant,  # one for each range of forces
-    'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated
     'sklearn': SklearnLearner,  # any classifier of scikit-learn
 }
 
@@ -113,14 +111,6 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=10.0,
     )
-    touch_s: float = param(
-        0.0,
-        'How much of the touch before the finger moves shows what friction does to the load, which the whitening '
-        'of the learner then takes out; 0: none.',
-        unit='s',
-        low=0.0,
-        high=10.0,
-    )
     speed_margin: float = param(
         0.15,
         'How far the speed of an exploration may lie outside the speeds of the training, relative to them; '
@@ -167,7 +157,7 @@ class Recipe:
 
     Examples
     --------
-    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}, 'learner': 'svm_rbf'}, 'mine')
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}, 'learner': 'mlp'}, 'mine')
     >>> recipe.feature_set.topics, recipe.evidence_name
     (('signal',), 'soft_vote')
     """
@@ -198,7 +188,7 @@ class Recipe:
         """
         where = f"recipe '{name}'"
         check_keys(content, KEYS, where)
-        learner = choose(LEARNERS, content.get('learner', 'svm_rbf'), 'learner', where)
+        learner = choose(LEARNERS, content.get('learner', 'mlp'), 'learner', where)
         evidence = choose(EVIDENCE_RULES, content.get('evidence', 'soft_vote'), 'evidence rule', where)
         training, augmentation = _training(content.get('training') or {}, where)
         if augmentation.copies and 'augmented' not in extras_of(learner[1]):

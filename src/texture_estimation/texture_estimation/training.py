@@ -91,16 +91,6 @@ def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows:
     )
 
 
-def _touch_differences(_recipe: Recipe, examples: LabelledFeatures, _codes: Codes, groups: Codes) -> Array | None:
-    """Return by number of the slide how it differs from its touch before the finger moved; NaN where there is none."""
-    if not examples.touches:
-        return None
-    means = group_means(examples.values, groups)
-    unknown = np.full(means.shape[1], np.nan)
-    touches = [examples.touches.get(slide, unknown) for slide in np.unique(examples.groups).tolist()]
-    return means - np.stack(touches)
-
-
 def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
     """Return how often each window counts, (n,): more often those that begin within the length of the first one.
 
@@ -209,7 +199,6 @@ def _ranks(names: Any, rows: Codes) -> Codes:
 # What learners may declare as their `extras`: keyword arguments of `fit` besides the examples.
 EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
     'augmented': _augmented_examples,
-    'differences': _touch_differences,
 }
 
 

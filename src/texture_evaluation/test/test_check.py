@@ -24,7 +24,7 @@ def trained(tmp_path_factory):
     folder = tmp_path_factory.mktemp('check')
     plan = SlidePlan(slides=6, speed_m_s=0.05, force_n=1.0, slide_s=3.0)
     bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'leather', 'cardboard'))
-    train_from_bags('fast', bags, out=folder / 'three')
+    train_from_bags('default', bags, out=folder / 'three')
     return folder / 'three', SlideDataset.from_bags([folder / 'bags' / 'leather']).slides
 
 
@@ -61,7 +61,7 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
         dataset = SlideDataset((louder(slides[3], 2.0),)).features(feature_set)
         assert dataset.feature_set == corrected.feature_set
         assert set(corrected.decide(dataset.values)) == {'leather'}
-    plain = SlideDataset((slides[3],)).features(FeatureSet.load('fast'))
+    plain = SlideDataset((slides[3],)).features(FeatureSet.load('default'))
     assert plain.feature_set != corrected.feature_set
 
     as_trained, sentence = check(model, slides[4], correct=True)  # the old finger is back

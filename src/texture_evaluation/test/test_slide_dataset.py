@@ -343,6 +343,6 @@ def test_a_slide_of_which_too_little_is_known_or_that_turns_is_no_motion(states:
 def test_slides_in_bags_report_how_they_were_made(tmp_path) -> None:
     plan = SlidePlan(slides=2, slide_s=0.6, speed_m_s=0.05, force_n=1.5, direction_rad=0.5)
     bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=['glass'])
-    examples = SlideDataset.from_bags(bags).features(load_recipe('fast').feature_set)
+    examples = SlideDataset.from_bags(bags).features(load_recipe('default').feature_set)
     made = SlideMotion('linear_slide', 0.5, 0.05, 1.5, pytest.approx(0.6))
     assert examples.motions == {'glass/1': made, 'glass/2': made}

@@ -8,10 +8,7 @@ import pytest
 
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, lost_samples
-from texture_estimation.recipe import load_recipe
-from texture_evaluation.train import training_examples
-from texture_features.features.taxels import LogShares, SpatialBands
-from texture_features.windows import WindowBatch
+from texture_features.features.taxels import SpatialBands
 from texture_recordings.bags import read_bag
 from texture_recordings.dataset import SlideDataset, find_slides
 from texture_recordings.public_sets import IMPORTS, evenly
@@ -156,17 +153,6 @@ def test_a_stroke_by_hand_is_one_channel_of_sound_without_conditions(tmp_path: P
     assert (first.rate_hz, first.samples.shape, second.samples[0, 0]) == (22_050.0, (22_050, 1), 2.0)
     assert math.isnan(first.speed_m_s)
     assert (first.slide.motion, first.slide.motion_name) == (None, '')
-
-
-def test_the_touch_before_a_slide_is_described_for_the_training(tmp_path: Path) -> None:
-    (canvas,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Canvas'])
-    dataset, recipe = SlideDataset.from_bags([canvas]), load_recipe('taxels')
-    touches = training_examples(recipe, dataset).touches
-    assert set(touches) == set(dataset.names)
-    [first] = [slide for slide in dataset.samples('signal_static') if slide.slide.name == dataset.names[0]]
-    rows = round(recipe.training.touch_s * first.rate_hz)
-    expected = LogShares()(WindowBatch(first.before[:rows], first.rate_hz))[:, 0]
-    np.testing.assert_allclose(touches[dataset.names[0]], expected)
 
 
 def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_speed(tmp_path: Path) -> None:

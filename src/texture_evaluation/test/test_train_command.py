@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,8 @@ from texture_evaluation.train import train_from_bags, train_grades_from_bags
 from texture_features.feature_set import LabelledFeatures, read_recipe
 from texture_recordings.bags import BagWriter, read_bag
 from texture_recordings.dataset import SlideDataset
+from texture_recordings.mapping import mapping_from
+from texture_recordings.tables import import_tables
 
 
 @pytest.fixture(scope='module')
@@ -67,6 +70,42 @@ def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureMod
     domain = replace(model.acceptance.domain, slides={'cork': 75, 'felt': 75})
     enough = replace(model, acceptance=replace(model.acceptance, slides=150, domain=domain))
     assert not any('too ' in line for line in summary(enough, Path('model.npz')))
+
+
+@pytest.fixture(scope='module')
+def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return bags of slides over two surfaces that nothing distinguishes."""
+    folder = tmp_path_factory.mktemp('noise')
+    samples = np.random.default_rng(0).normal(size=(40, 150))
+    np.savez(folder / 'a.npz', X=samples[..., None], y=np.tile(['cork', 'felt'], 20))
+    content = {
+        'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 100.0}}, 'label': {'column': 'y'},
+        'slides': {'by': 'column', 'column': 'trial'}, 'conditions': {'speed': {'value': '0.05'}},
+    }  # fmt: skip
+    import_tables(mapping_from(content), folder / 'a.npz', folder / 'bags')
+    return folder / 'bags'
+
+
+@pytest.mark.parametrize(
+    ('hop_s', 'warning'),
+    [
+        (0.1, r'\d+\.\d % of the held-out windows is not above chance, 50\.0 % of 2'),
+        (0.005, 'windows overlap more than'),
+    ],
+)
+def test_a_recipe_that_does_not_fit_the_data_is_named(noise: Path, tmp_path: Path, hop_s: float, warning: str) -> None:
+    (tmp_path / 'mine.yaml').write_text(
+        f'windows: {{length_s: 0.5, hop_s: 0.1}}\ntraining: {{hop_s: {hop_s}}}\n'
+        'inputs: {signal: {features: [mean, hjorth]}}\n'
+        "learner: {sklearn: {estimator: 'sklearn.naive_bayes:GaussianNB'}}\n"
+    )
+    lines = summary(train_from_bags(str(tmp_path / 'mine.yaml'), [noise]), Path('model.npz'))
+    assert any(re.match(f'warning: .*{warning}', line) for line in lines), lines
+
+
+def test_a_recipe_of_taxels_names_the_streams_that_a_recording_of_vibration_has(noise: Path) -> None:
+    with pytest.raises(ModelMismatch, match="has no 'signal_static', only signal; the windows need signal_static"):
+        train_from_bags('taxels', [noise])
 
 
 GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')

@@ -185,7 +185,7 @@ def _between(low: float, high: float, fraction: float) -> float:
 # --------------------
 # Accuracy and acceptance at places that were left out of a training on all others, by their distance from these.
 
-RECIPE, SHRINKAGE = 'fast', 0.5  # few slides show no correlations
+RECIPE, SHRINKAGE = 'default', 0.5  # few slides show no correlations
 CONFIDENCE = 0.9
 # Within which other places of the surface are left out, too: neighbours show more than a new place will.
 GAPS_M = (0.01, 0.03, 0.06)
@@ -279,7 +279,7 @@ def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
             correct, nearest_m = label == surface, min(distances_m[other] for other in kept)
             far_m = next((far_m for far_m in BANDS_M if nearest_m <= far_m), None)
             if far_m:
-                bands[far_m].append((correct, correct and all(end.known for end in ends)))
+                bands[far_m].append((correct, correct and all(end.accepted for end in ends)))
             before = kept
     right = labels.pop(surface, 0)
     counted = tuple(Band(far_m, len(x), *np.sum(x, axis=0).tolist()) for far_m, x in bands.items() if x)

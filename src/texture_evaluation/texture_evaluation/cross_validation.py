@@ -119,8 +119,8 @@ def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = Non
     counts = {
         'window_accuracy': window_counts(results),
         'slide_accuracy': slide_counts(results),
-        'accepted_correct': _counted([one.end.known and one.end.label == one.surface for one in results]),
-        'accepted_wrong': _counted([one.end.known and one.end.label != one.surface for one in results]),
+        'accepted_correct': _counted([one.end.accepted and one.end.label == one.surface for one in results]),
+        'accepted_wrong': _counted([one.end.accepted and one.end.label != one.surface for one in results]),
     }
     at_s, intervals_at_s, n_at_s = {}, {}, {}
     for seconds in metrics.TIMES_S:
@@ -691,7 +691,7 @@ def cross_validate(
     ]
     # Computed once for all folds: windows as the recipe classifies them, and as it is trained on.
     tested = trained = dataset.features(recipe.feature_set)
-    further = recipe.augmentation.copies or recipe.training.touch_s or recipe.training.slowest_m_s
+    further = recipe.augmentation.copies or recipe.training.slowest_m_s
     if recipe.training_windows != recipe.feature_set.windows or further:
         trained = training_examples(recipe, dataset)
     folds = Parallel(n_jobs=n_jobs)(

@@ -277,7 +277,7 @@ def summary(report: EvaluationReport) -> list[str]:
             ]
         ),
         f'as soon as decided: accuracy {percent(early["accuracy"])}, after {early["mean_s"]:.2f} s on average'
-        if any(estimate.decided and estimate.known for result in report.known for estimate in result.estimates)
+        if any(estimate.decided and estimate.accepted for result in report.known for estimate in result.estimates)
         else 'as soon as decided: never decided',
         f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]

@@ -48,7 +48,7 @@ class SlideResult:
 
     def early(self) -> TextureEstimate:
         """Return the first estimate that is decided and known, else the last one."""
-        return next((e for e in self.estimates if e.decided and e.known), self.estimates[-1])
+        return next((e for e in self.estimates if e.decided and e.accepted), self.estimates[-1])
 
 
 def window_accuracy(results: Sequence[SlideResult]) -> float:
@@ -122,18 +122,18 @@ def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
 
 def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over trained surfaces that were rejected at the end; None without any."""
-    return _share([not result.end.known for result in results])
+    return _share([not result.end.accepted for result in results])
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over surfaces without training that were accepted; None without any."""
-    return _share([result.end.known for result in results])
+    return _share([result.end.accepted for result in results])
 
 
 def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides that were accepted but wrong, over any surfaces; None without slides."""
-    early = [e.known and e.decided and e.label != surface for surface, e in _early_ends(results)]
-    final = [result.end.known and result.end.label != result.surface for result in results]
+    early = [e.accepted and e.decided and e.label != surface for surface, e in _early_ends(results)]
+    final = [result.end.accepted and result.end.label != result.surface for result in results]
     return {'early': _share(early), 'final': _share(final)}
 
 
@@ -142,20 +142,20 @@ def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
 
     A slide that is never decided goes on to its end: there its last estimate counts as early, too.
     """
-    early = [not estimate.known for _, estimate in _early_ends(results)]
-    return {'early': _share(early), 'final': _share([not result.end.known for result in results])}
+    early = [not estimate.accepted for _, estimate in _early_ends(results)]
+    return {'early': _share(early), 'final': _share([not result.end.accepted for result in results])}
 
 
 def rejections(results: Sequence[SlideResult]) -> Mapping[str, int]:
     """Return how many slides were rejected at their end for each reason, such as 'novel', the most frequent first."""
     ends = [result.end for result in results if result.estimates]
-    return dict(Counter(end.rejection.name.lower() for end in ends if not end.known).most_common())
+    return dict(Counter(end.rejection.name.lower() for end in ends if not end.accepted).most_common())
 
 
 def _early_ends(results: Sequence[SlideResult]) -> list[tuple[str, TextureEstimate]]:
     """Return surface and estimate at the end of each slide that ends as soon as it is decided and known."""
     return [
-        (result.surface, early if early.known and early.decided else result.end)
+        (result.surface, early if early.accepted and early.decided else result.end)
         for result in results
         for early in [result.early()]
     ]

@@ -86,7 +86,7 @@ def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
     windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
-    return dataset.features(windows, recipe.augmentation, recipe.training.touch_s, distances_m)
+    return dataset.features(windows, recipe.augmentation, distances_m)
 
 
 def slide_digest(slide: LabelledSlide) -> str:

@@ -141,9 +141,9 @@ def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(t
     assert (end.stamp_ns - begin.stamp_ns) * 1e-9 < 0.15
 
 
-def test_a_force_that_never_settles_aborts_with_what_was_waited_for(make_table, monkeypatch):
+def test_a_force_that_never_settles_aborts_with_what_was_waited_for(table, monkeypatch):
     monkeypatch.setattr(SafetyLimits, 'contact_timeout_s', 0.5)
-    table = make_table(SimulatedArmParams(admittance_m_s_n=1e-4))
+    monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 1e-4)
     outcome = table.explore(ExplorationRequest('linear_slide', force_n=3.0))
     assert outcome.error is ExplorationError.MOTION_FAILED
     assert outcome.message.startswith('waited 0.5 s for the force to settle at 3 N; the force is')

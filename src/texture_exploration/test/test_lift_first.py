@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmState
-from texture_exploration.lift_first import CalmDown, WrongWay
+from texture_exploration.lift_first import CalmDown, Detour
 from texture_exploration.motions import MOTIONS
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.touch import TouchParams
@@ -164,7 +164,7 @@ def rested(force_n_at):
 
 @pytest.mark.parametrize('offset_n', [0.0, 1.5], ids=['no offset', 'an offset'])
 def test_a_contact_that_grows_while_the_finger_stands_still_forbids_the_next_rise(offset_n):
-    with pytest.raises(WrongWay, match=r'the finger met something .*, [0-3]\.\d\d N'):
+    with pytest.raises(Detour, match=r'the finger met something .*, [0-3]\.\d\d N'):
         rested(lambda seconds: offset_n + min(3.0, 6.0 * seconds))
 
 

@@ -15,11 +15,7 @@ from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.motions import (
     DEFAULTS,
     MOTIONS,
-    circular,
     cross_slide,
-    in_hand_random,
-    in_hand_sliding,
-    linear_slide,
 )
 from texture_exploration.paths import CircularPath, PathFollower, StraightPath, ramp_s, ramps_m, random_strokes, smooth
 from texture_exploration.safety import SafetyLimits
@@ -127,57 +123,51 @@ def test_speed_is_gained_smoothly_and_within_the_acceleration_limit(make_table):
     assert gained[0] < 0.5 * max(gained)
 
 
-def linear_refusal(**numbers):
-    request = ExplorationRequest('linear_slide', **numbers)
+INVALID, UNUSED, OUTSIDE = (
+    ExplorationError.INVALID_REQUEST,
+    ExplorationError.UNUSED_FIELD,
+    ExplorationError.OUTSIDE_WORKSPACE,
+)
+REFUSED = [
+    ('linear_slide', {'speed_m_s': 2.0}, INVALID, 'linear_slide: speed_m_s is 2; allowed is 0.002 to 0.25 m/s'),
+    ('linear_slide', {'force_n': -1.0}, INVALID, 'linear_slide: force_n is -1; allowed is 0.1 to 6 N'),
+    ('linear_slide', {'direction_rad': 1e3}, INVALID, 'direction_rad is 1000; allowed is -100 to 100 rad'),
+    ('linear_slide', {'direction_rad': math.inf}, INVALID, 'direction_rad is inf'),
+    ('linear_slide', {'distance_m': math.nan}, INVALID, 'distance_m is nan'),
+    ('linear_slide', {'radius_m': 0.02, 'turns': 2.0}, UNUSED, 'knows no radius_m and no turns; leave it at 0'),
+    ('linear_slide', {'distance_m': 0.9}, OUTSIDE, 'distance_m is 0.9, which'),
+    # 0.2 m of room, less the ramp of 0.1 s and the steady 0.05 s at 0.05 m/s.
+    ('linear_slide', {'distance_m': 2.0, 'speed_m_s': 0.05}, OUTSIDE, "0.192 m from x 0.000 and y 0.000 m, as 'x_high"),
+    ('linear_slide', {'distance_m': 0.195, 'speed_m_s': 0.05, 'direction_rad': math.pi}, OUTSIDE, 'at most 0.192 m'),
+    ('circular', {'radius_m': 0.5}, INVALID, 'circular: radius_m is 0.5; allowed is 0.005 to 0.1 m'),
+    ('circular', {'distance_m': 0.1}, UNUSED, 'circular knows no distance_m; leave it at 0'),
+    ('circular', {'radius_m': 0.005, 'speed_m_s': 0.2}, INVALID, 'at most 0.158 m/s'),
+    ('circular', {'radius_m': 0.1}, OUTSIDE, 'at most 0.05 m'),
+    ('in_hand_sliding', {'speed_m_s': 0.1, 'distance_m': 0.01}, INVALID, 'of a stroke, is 0.01; allowed is 0.0'),
+    # A random stroke may be half as long, so the shortest that turns is twice that.
+    ('in_hand_random', {'speed_m_s': 0.05, 'distance_m': 0.02}, INVALID, 'of a stroke, is 0.02; allowed is 0.0'),
+]
+
+
+@pytest.mark.parametrize(('motion', 'numbers', 'error', 'sentence'), REFUSED)
+def test_what_cannot_be_done_is_refused_with_what_can_and_names_the_field(motion, numbers, error, sentence):
+    limits = SafetyLimits(x_low_m=-0.05) if numbers == {'radius_m': 0.1} else LIMITS
     with pytest.raises(MotionRefused) as refused:
-        linear_slide(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
-    return str(refused.value)
+        MOTIONS[motion](ExplorationRequest(motion, **numbers), (0.0, 0.0, 0.01), TouchParams(), limits)
+    assert sentence in str(refused.value)
+    assert refused.value.error == error
+    assert refused.value.field in numbers
 
 
-def test_a_refusal_names_the_allowed_range():
-    assert linear_refusal(speed_m_s=2.0) == 'linear_slide: speed_m_s is 2; allowed is 0.002 to 0.25 m/s'
-    assert linear_refusal(force_n=-1.0) == 'linear_slide: force_n is -1; allowed is 0.1 to 6 N'
+def test_a_whole_stroke_turns_where_a_random_one_is_too_short():
+    request = ExplorationRequest('in_hand_sliding', speed_m_s=0.05, distance_m=0.02)
+    MOTIONS['in_hand_sliding'](request, (0.0, 0.0, 0.01), TouchParams(), LIMITS)
 
 
 def test_a_default_beyond_a_limit_is_the_limit():
     hard = SafetyLimits(min_force_n=3.0, max_force_n=8.0, max_speed_m_s=0.02)
     request = hard.complete(ExplorationRequest('linear_slide'), {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1})
     assert (request.speed_m_s, request.force_n, request.distance_m) == (0.02, 3.0, 0.1)
-
-
-@pytest.mark.parametrize(
-    ('numbers', 'error', 'field'),
-    [
-        ({'speed_m_s': 2.0}, ExplorationError.INVALID_REQUEST, 'speed_m_s'),
-        ({'direction_rad': 1e3}, ExplorationError.INVALID_REQUEST, 'direction_rad'),
-        ({'radius_m': 0.02}, ExplorationError.UNUSED_FIELD, 'radius_m'),
-        ({'distance_m': 0.9}, ExplorationError.OUTSIDE_WORKSPACE, 'distance_m'),
-    ],
-)
-def test_a_refusal_has_a_code_and_names_the_field(numbers, error, field):
-    with pytest.raises(MotionRefused) as refused:
-        linear_slide(ExplorationRequest('linear_slide', **numbers), (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
-    assert (refused.value.error, refused.value.field) == (error, field)
-
-
-def test_a_distance_beyond_both_limits_is_refused_with_the_smaller_one_at_once():
-    assert 'distance_m is 2, which' in linear_refusal(distance_m=2.0, speed_m_s=0.05)
-    refusal = linear_refusal(distance_m=2.0, speed_m_s=0.05)
-    assert "at most 0.192 m from x 0.000 and y 0.000 m, as 'x_high_m' is 0.2 m" in refusal
-
-
-def test_numbers_that_are_none_are_refused():
-    assert 'distance_m is nan' in linear_refusal(distance_m=math.nan)
-    assert 'direction_rad is inf' in linear_refusal(direction_rad=math.inf)
-
-
-def test_a_slide_out_of_the_workspace_is_refused_with_the_longest_possible_one():
-    # 0.2 m of room, less the ramp of 0.1 s and the steady 0.05 s at 0.05 m/s.
-    assert 'at most 0.192 m' in linear_refusal(speed_m_s=0.05, distance_m=0.195, force_n=1.0, direction_rad=math.pi)
-
-
-def test_a_number_of_another_motion_is_refused():
-    assert linear_refusal(radius_m=0.02, turns=2.0) == 'linear_slide knows no radius_m and no turns; leave it at 0'
 
 
 # --------------------
@@ -224,19 +214,6 @@ def test_the_path_is_a_circle_and_its_direction_the_tangent():
     assert circle.length_m == pytest.approx(0.04 * math.pi)
     assert circle.place(circle.length_m / 4) == pytest.approx((-0.02, 0.02))
     assert math.cos(circle.direction_rad(circle.length_m / 4)) == pytest.approx(-1.0)
-
-
-def circular_refusal(limits=LIMITS, **numbers):
-    with pytest.raises(MotionRefused) as refused:
-        circular(ExplorationRequest('circular', **numbers), (0.0, 0.0, 0.01), TouchParams(), limits)
-    return str(refused.value)
-
-
-def test_what_cannot_be_done_is_refused_with_what_can():
-    assert circular_refusal(radius_m=0.5) == 'circular: radius_m is 0.5; allowed is 0.005 to 0.1 m'
-    assert circular_refusal(distance_m=0.1) == 'circular knows no distance_m; leave it at 0'
-    assert 'at most 0.158 m/s' in circular_refusal(radius_m=0.005, speed_m_s=0.2)
-    assert 'at most 0.05 m' in circular_refusal(SafetyLimits(x_low_m=-0.05), radius_m=0.08)
 
 
 def test_an_offset_of_the_force_before_it_is_zeroed_is_no_touch(table):
@@ -394,12 +371,6 @@ def test_no_turn_exceeds_the_acceleration(table):
     assert max(abs(b - a) / 0.02 for a, b in pairwise(speeds)) < 1.1
 
 
-def test_a_stroke_too_short_to_turn_is_refused():
-    request = ExplorationRequest('in_hand_sliding', speed_m_s=0.1, distance_m=0.01)
-    with pytest.raises(MotionRefused, match=r'the length of a stroke, is 0\.01; allowed is 0\.0'):
-        in_hand_sliding(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
-
-
 def turning_places(table):
     """Return where the finger turned, as seen from the start, m."""
     along = [place[0] for _, place in sliding(table)]
@@ -424,18 +395,6 @@ def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
     assert min(along) > -0.0005 and max(along) < 0.0205
     places = turning_places(table)
     assert len({round(place, 4) for place in places}) > 4  # without chance it turns at two; chance may repeat one
-
-
-def test_a_random_stroke_may_be_half_as_long_so_the_shortest_that_turns_is_twice_that():
-    request = ExplorationRequest('in_hand_random', speed_m_s=0.05, distance_m=0.02)
-    in_hand_sliding(
-        ExplorationRequest('in_hand_sliding', speed_m_s=0.05, distance_m=0.02),
-        (0.0, 0.0, 0.01),
-        TouchParams(),
-        SafetyLimits(),
-    )
-    with pytest.raises(MotionRefused, match=r'in_hand_random: distance_m, the length of a stroke, is 0\.02; allowed'):
-        in_hand_random(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
 
 
 # --------------------

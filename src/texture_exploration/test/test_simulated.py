@@ -42,13 +42,13 @@ def test_the_force_is_stiffness_times_depth(clock):
 
 
 def test_the_force_error_decays_with_the_time_constant_of_the_admittance(clock):
-    arm = make(clock, stiffness_n_m=2000.0, admittance_m_s_n=0.01, start_height_m=0.0)
+    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0)
     run(arm, clock, ArmCommand(force_n=1.0), 0.1)  # two time constants of 1 / (2000 · 0.01) s
     assert arm.state().force_n == pytest.approx(1 - math.exp(-2), rel=1e-3)
 
 
 def test_force_control_is_stable_however_stiff_the_surface_and_long_the_step(clock):
-    arm = make(clock, stiffness_n_m=1e5, start_height_m=0.0, command_timeout_s=1.0)
+    arm = make(clock, stiffness_n_m=1e5, start_height_m=0.0)
     run(arm, clock, ArmCommand(force_n=1.0), 5.0, dt=0.1)
     assert arm.state().force_n == pytest.approx(1.0)
 
@@ -60,7 +60,7 @@ def test_above_the_surface_force_control_comes_down(clock):
 
 
 def test_an_arm_that_slept_moves_no_longer_than_a_command_holds(clock):
-    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0, command_timeout_s=0.1)
+    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0)
     clock.now_ns += 500_000_000
     arm.command(ArmCommand(normal_m_s=-0.02))  # of one who sees an old state
     arm.step(0.5)
@@ -90,7 +90,7 @@ def test_a_velocity_comes_into_effect_late_and_does_not_hold_for_ever():
 
 
 def test_a_command_moves_the_arm_no_longer_than_it_holds_however_late_the_step(clock):
-    arm = make(clock, command_timeout_s=0.1)
+    arm = make(clock)
     arm.command(ArmCommand(normal_m_s=0.02))
     clock.now_ns += 1_000_000_000
     arm.step(1.0)

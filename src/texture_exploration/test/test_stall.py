@@ -139,8 +139,8 @@ def test_turns_are_no_part_of_the_speed_that_was_asked_for():
 
 
 @pytest.mark.parametrize('share', [1.86, 3.0])
-def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(make_table, share):
-    table = make_table(SimulatedArmParams(admittance_m_s_n=7e-4))  # it gives way slowly
+def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(table, share, monkeypatch):
+    monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 7e-4)  # it gives way slowly
     table.when[Phase.SLIDE] = lambda: setattr(table, 'pressed_ns', table.now_ns)
     table.pressed_ns, go_on = None, table.pace
 

@@ -34,19 +34,12 @@ REST_STEP_M = 1e-5  # way between two states of an arm at rest
 PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so where it stands
 
 
-class WrongWay(MotionAborted):
-    """To rise makes it worse: the finger goes back the way it came instead, as far as the force was as before."""
+class Detour(MotionAborted):
+    """What ends a stage is left by other stages, and the motion ends with them."""
 
-    def __init__(self, reason: str, before_n: Vector) -> None:
-        super().__init__(reason)
-        self.before_n = before_n
-
-
-class WrongSign(MotionAborted):
-    """The force rises while the finger does; what touches it is left by rising all the same."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason, ExplorationError.FORCE_SENSOR)
+    def __init__(self, reason: str, *stages: Stage, error: ExplorationError = ExplorationError.MOTION_FAILED) -> None:
+        super().__init__(reason, error)
+        self.stages = stages
 
 
 class Rise(Stage):
@@ -59,7 +52,7 @@ class Rise(Stage):
     commands = ('rest', 'up')
     ends = 'the force stayed the same over the clearance'
     on_error = 'GoBack, Rise again, or end at rest'
-    ahead = True
+    ahead = stays = True
 
     def __init__(
         self,
@@ -92,12 +85,6 @@ class Rise(Stage):
         """Return a rise that comes after this one, whatever the sign of the force; it counts from the same zero."""
         return Rise(*self._given, signed=False, zero_n=self._zero_n)
 
-    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
-        """Go back what made it worse, rise on with a force of the wrong sign, or stay."""
-        if isinstance(error, WrongWay):
-            return (GoBack(error.before_n, self._touch),)
-        return (self.again(),) if isinstance(error, WrongSign) else ()
-
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Note height and force at the start."""
         super().begin(time_ns, arm)
@@ -119,10 +106,10 @@ class Rise(Stage):
                 ExplorationError.FORCE_SENSOR,
             )
         if math.dist(arm.force_vector_n, self._zero_n or self._first.force_vector_n) > self._most_n:
-            raise WrongWay(
+            raise Detour(
                 f'the force changed by more than {self._most_n:g} N while the finger rose by {1e3 * risen_m:.2f} mm: '
                 'it is pressed harder than it may be, or something is above it; free it by hand',
-                self._first.force_vector_n,
+                GoBack(self._first.force_vector_n, self._touch),
             )
         if self._signed and risen_m >= PROBE_M / 2:
             self._check_sign(arm)
@@ -158,18 +145,21 @@ class Rise(Stage):
             f'the arm moved by ({1e3 * x:.2f}, {1e3 * y:.2f}, {1e3 * up:.2f}) mm in the frame of the surface where it '
             'was told to rise along z; check the frame and the sign of its velocities'
         )
-        raise WrongWay(reason, self._first.force_vector_n) if astray else MotionAborted(reason)
+        back = GoBack(self._first.force_vector_n, self._touch)
+        raise Detour(reason, back) if astray else MotionAborted(reason)
 
     def _check_sign(self, arm: ArmState) -> None:
         first = self._first
         if arm.force_n - first.force_n > self._touch.contact_force_n:
-            raise WrongSign(
+            raise Detour(
                 f'the force went from {first.force_n:.2f} to {arm.force_n:.2f} N while the finger rose: its sign is '
-                'wrong, the z axis of the surface does not point away from it, or it is not steady'
+                'wrong, the z axis of the surface does not point away from it, or it is not steady',
+                self.again(),
+                error=ExplorationError.FORCE_SENSOR,
             )
 
     def _watch_growth(self, arm: ArmState) -> float:
-        """Return the stiffness of what the finger leaves, N/m, 0 in the air; WrongWay if it meets something.
+        """Return the stiffness of what the finger leaves, N/m, 0 in the air; Detour if it meets something.
 
         A surface that is left lets the force change less and less; what is met changes it more in the second half of
         the way than in the first.
@@ -182,10 +172,10 @@ class Rise(Stage):
         middle_n, noise_n = self._forces_n[max(0, half)], self._touch.contact_force_n
         newly_n, before_n = math.dist(force_n, middle_n), math.dist(middle_n, self._forces_n[0])
         if height_m - self._heights_m[0] >= PROBE_M / 2 and newly_n > MET_GROWTH * before_n + noise_n:
-            raise WrongWay(
+            raise Detour(
                 f'the finger met something while it rose, the force changed by {newly_n:.2f} N; see what is above it, '
                 'and that the z axis of the surface points away from it',
-                middle_n,
+                GoBack(middle_n, self._touch),
             )
         last = max(0, bisect_right(self._heights_m, height_m - PROBE_M) - 1)
         changed_n = math.dist(force_n, self._forces_n[last])
@@ -199,16 +189,12 @@ class GoBack(Stage):
     commands = ('down',)
     ends = 'the force is as before the rise'
     on_error = 'end, at rest'
-    ahead = True
+    ahead = stays = True
 
     def __init__(self, before_n: Vector, touch: TouchParams) -> None:
         super().__init__(Phase.LIFT, GO_BACK_S + 1.0, 'the finger to go back')
         self._before_n = before_n
         self._touch = touch
-
-    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
-        """Stay: no direction helps."""
-        return ()
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go down for a short time at most."""
@@ -242,10 +228,6 @@ class CalmDown(Stage):
         self._free_n = (0.0, 0.0, 0.0)
         self._before: ArmState | None = None
 
-    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
-        """Go back from what the finger met."""
-        return (GoBack(error.before_n, self._touch),) if isinstance(error, WrongWay) else None
-
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Note when and where the arm came to rest."""
         super().begin(time_ns, arm)
@@ -272,10 +254,10 @@ class CalmDown(Stage):
             return ArmCommand()
         met_n = math.dist(arm.force_vector_n, self._free_n)
         if met_n > self._touch.contact_force_n and not self._zeroed():
-            raise WrongWay(
+            raise Detour(
                 f'the finger met something while it rose for its force sensor to be zeroed, {met_n:.2f} N; see what is '
                 'above it, and that the z axis of the surface points away from it',
-                self._free_n,
+                GoBack(self._free_n, self._touch),
             )
         if height_m - self._rest_m < self._touch.clearance_m:
             return ArmCommand(normal_m_s=self._speed_m_s)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from texture_core.errors import ExplorationError, MotionAborted, MotionRefused
 from texture_core.types import ExplorationRequest, Phase
 from texture_exploration.arms.arm import ArmCommand, ArmState, Vector
-from texture_exploration.lift_first import CalmDown, GoBack, Rise
+from texture_exploration.lift_first import CalmDown, Detour, GoBack, Rise
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.stages import (
     AccelerateStage,
@@ -200,8 +200,10 @@ class Motion:
         if stage is self._lift:
             before = f'{self._abort_reason}; ' if self._abort_reason else ''
             self._abort_reason = f'{before}the finger was not lifted: {reason}'
-        elif (way := stage.way_out(error)) is not None:
-            self._end_ahead(reason, *way)
+        elif isinstance(error, Detour):
+            self._end_ahead(reason, *error.stages)
+        elif stage.stays:
+            self._end_ahead(reason)
         else:
             self.abort(reason)
 

@@ -45,6 +45,12 @@ def stated(given: float, value: float) -> str:
     return f'{value:g}' if given else f'{value:g} (the default of the motion)'
 
 
+def _edge(value: float, which: str) -> Any:
+    """Declare an edge of the workspace."""
+    text = f'{which} coordinate of the workspace in the surface frame; leaving it aborts.'
+    return param(value, text, unit='m', low=-2.0, high=2.0)
+
+
 @dataclass(frozen=True)
 class SafetyLimits:
     """Limits of what is asked, of what is measured, and of how long each phase may take."""
@@ -90,48 +96,12 @@ class SafetyLimits:
     frozen_force_s = 0.06  # of a reading that stays the same where it should change: six states at 100 Hz
     force_drift_fraction = 0.3  # of the wanted force, that the force in free air may change over an exploration
     max_turning_m_s2 = 5.0  # centripetal acceleration on a circle: half of what an arm of 1 kg turns by with 10 N
-    x_low_m: float = param(
-        -0.2,
-        'Lowest x coordinate of the workspace in the surface frame; leaving it aborts.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    x_high_m: float = param(
-        0.2,
-        'Highest x coordinate of the workspace in the surface frame; leaving it aborts.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    y_low_m: float = param(
-        -0.2,
-        'Lowest y coordinate of the workspace in the surface frame; leaving it aborts.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    y_high_m: float = param(
-        0.2,
-        'Highest y coordinate of the workspace in the surface frame; leaving it aborts.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    z_low_m: float = param(
-        -0.02,
-        'Lowest z coordinate of the workspace in the surface frame; leaving it aborts.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    z_high_m: float = param(
-        0.2,
-        'Highest z coordinate of the workspace in the surface frame; leaving it aborts.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
+    x_low_m: float = _edge(-0.2, 'Lowest x')
+    x_high_m: float = _edge(0.2, 'Highest x')
+    y_low_m: float = _edge(-0.2, 'Lowest y')
+    y_high_m: float = _edge(0.2, 'Highest y')
+    z_low_m: float = _edge(-0.02, 'Lowest z')
+    z_high_m: float = _edge(0.2, 'Highest z')
     surface_tolerance_m: float = param(
         0.02,
         'Largest distance of a contact from the declared surface, upwards or downwards; a contact farther away aborts. '
@@ -338,30 +308,20 @@ def _range(what: str, value: float, low: float, high: float, unit: str) -> str:
 # The part of the surface on which an exploration may be told to begin.
 
 
+def _patch_edge(which: str) -> Any:
+    """Declare an edge of the patch."""
+    text = f'{which} coordinate of the surface patch; touches set it; one without extent is none.'
+    return param(0.0, text, unit='m', low=-2.0, high=2.0)
+
+
 @dataclass(frozen=True)
 class SurfacePatch:
     """The rectangle of the surface frame in which an exploration with a start stays; not taught without extent."""
 
-    patch_x_low_m: float = param(
-        0.0, 'Lowest x coordinate of the surface patch; touches set it.', unit='m', low=-2.0, high=2.0
-    )
-    patch_x_high_m: float = param(
-        0.0,
-        'Highest x coordinate of the surface patch; one that is not above the lowest means no patch.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
-    patch_y_low_m: float = param(
-        0.0, 'Lowest y coordinate of the surface patch; touches set it.', unit='m', low=-2.0, high=2.0
-    )
-    patch_y_high_m: float = param(
-        0.0,
-        'Highest y coordinate of the surface patch; one that is not above the lowest means no patch.',
-        unit='m',
-        low=-2.0,
-        high=2.0,
-    )
+    patch_x_low_m: float = _patch_edge('Lowest x')
+    patch_x_high_m: float = _patch_edge('Highest x')
+    patch_y_low_m: float = _patch_edge('Lowest y')
+    patch_y_high_m: float = _patch_edge('Highest y')
 
     def start(self, request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> Vector:
         """Return where an exploration begins: at `home`, or above its start at the same height."""

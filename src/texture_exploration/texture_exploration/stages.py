@@ -26,10 +26,11 @@ STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed an
 class Stage:
     """One part of a motion.
 
-    `ahead`: it lifts before the motion begins. `free`: whether it found the finger free, None if it did not look.
+    `ahead`: it lifts before the motion begins. `stays`: after an error of its own the finger stays where it is, as no
+    direction is known to help. `free`: whether it found the finger free, None if it did not look.
     """
 
-    ahead = False
+    ahead = stays = False
     free: bool | None = None
     # One row of the state machine (docs/motion.md): kinds of what it commands, what ends it, where an error leads.
     commands: tuple[str, ...] = ()
@@ -57,10 +58,6 @@ class Stage:
 
     def see(self, arm: ArmState) -> None:
         """Take note of a state after the end."""
-
-    def way_out(self, error: MotionAborted) -> tuple[Stage, ...] | None:
-        """Return which stages follow an error of this one, none if the finger stays where it is; None: the lift."""
-        return None
 
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return what to do now; MotionAborted also if the stage takes too long."""

@@ -626,7 +626,6 @@ class LabelledFeatures:
     conditions: Mapping[str, SlideConditions] = field(default_factory=dict)
     augmented: AugmentedFeatures | None = None
     resized: LabelledFeatures | None = None
-    touches: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))

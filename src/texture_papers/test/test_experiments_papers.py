@@ -10,11 +10,11 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidParameter
+from texture_core.errors import InvalidParameter, TextureError
 from texture_estimation.learners.sklearn_learner import SklearnPredictor
 from texture_estimation.recipe import load_recipe
 from texture_papers import report
-from texture_papers.catalogue import EXPERIMENTS, PROTOCOLS, run_experiment
+from texture_papers.catalogue import EXPERIMENTS, PROTOCOLS, run_experiment, run_searches
 from texture_papers.jamali import MeanAmplitude
 from texture_papers.protocol import (
     VERDICTS,
@@ -122,6 +122,13 @@ def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_
     assert seen['linear slides', 'ets-linear-svm'].tested.sum() == figures['scans']
     found = load_recipe(str(tmp_path / 'ets-linear-svm-tuned-linear-slides.yaml'))
     assert all(0.01 <= pair.learner.box_constraint <= 10.0 for pair in found.learner.pairs)
+    searches = (tmp_path / 'searches.jsonl').read_text()
+    assert len(searches.splitlines()) == 2 * 6  # whole scans and their parts
+    run_experiment('ets-linear', Experiment(tmp_path, seed=1, quick=True, tune=True))
+    assert (tmp_path / 'searches.jsonl').read_text() == searches  # what is done is not searched again
+    late = Experiment(tmp_path, seed=2, quick=True, tune=True)
+    with pytest.raises(TextureError, match='12 of 12 searches are left; the same command goes on'):
+        run_searches('ets-linear', late, until_s=0.0)
 
 
 def test_two_directions_are_joined_into_one_vector_with_components_of_their_own() -> None:
@@ -309,7 +316,7 @@ def test_recipe_learner_scene_motion_split_and_the_code_of_a_feature_each_change
 
 
 def test_a_definition_that_changes_has_another_digest() -> None:
-    assert len({digest_of(name) for name in ('fast', 'default', 'kaboli-pa', 'kaboli-em', 'roughness')}) == 5
+    assert len({digest_of(name) for name in ('any-place', 'default', 'kaboli-pa', 'kaboli-em', 'roughness')}) == 5
 
 
 @pytest.mark.parametrize('name', STORED)

@@ -24,14 +24,12 @@ baseline
     Here: `MeanAmplitude`, the mean of |s|, the reading nearest to the words and to 65.75 %.
 future work
     Paper: Short-term Fourier and wavelet transform, symbols (VII), without figures.
-    Here: `jamali-stft`, `-wavelets`, `-symbols`; what of them is taken is ours.
+    Here: Left out.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import combinations, permutations
 from typing import ClassVar
 
 import numpy as np
@@ -140,119 +138,3 @@ class MeanAmplitude:
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of the absolute signal."""
         return np.add.reduce(np.abs(windows.rows), axis=-1, keepdims=True) / windows.rows.shape[-1]
-
-
-# Scaling filter of Daubechies' wavelet with four vanishing moments: Daubechies 1992, table 6.1, to double precision.
-DB4 = np.array([
-    0.23037781330885523, 0.7148465705525415, 0.6308807679295904, -0.02798376941698385,
-    -0.18703481171888114, 0.030841381835986965, 0.032883011666982945, -0.010597401784997278,
-])  # fmt: skip
-# The wavelet filter is the scaling filter backwards with alternating signs.
-FILTERS = np.stack((DB4, DB4[::-1] * np.array([1.0, -1.0] * 4)), axis=1)
-
-
-@dataclass(frozen=True)
-class WaveletEnergy:
-    """Logarithm of the mean power in each octave of Daubechies' wavelet 'db4', the finest first, and in the rest.
-
-    Octave k reaches about from rate / 2^(k+1) to rate / 2^k. A window is continued periodically, after its last sample
-    is repeated where their number is odd. Octaves that a window is too short for hold no power.
-    """
-
-    per_channel: ClassVar[bool] = True
-
-    octaves: int = param(6, 'Number of octaves of the wavelet transform; more reach lower frequencies.', low=1, high=20)
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
-    )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number of the octave, from 1, and 'rest' for what lies below the last."""
-        return (*(str(octave + 1) for octave in range(self.octaves)), 'rest')
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return log(power + floor)."""
-        rows = windows.centred_rows
-        return np.log(wavelet_energies(rows, self.octaves) / rows.shape[-1] + self.floor)
-
-
-def wavelet_energies(rows: Array, octaves: int) -> Array:
-    """Return the sum of squares of the coefficients of each octave, the finest first, and of the rest."""
-    energies = np.zeros((*rows.shape[:-1], octaves + 1))
-    for octave in range(octaves):
-        if rows.shape[-1] == 1:
-            break
-        both = _halve(rows)
-        detail = both[..., 1]
-        energies[..., octave] = np.add.reduce(detail * detail, axis=-1)
-        rows = np.ascontiguousarray(both[..., 0])
-    energies[..., -1] = np.add.reduce(rows * rows, axis=-1)
-    return energies
-
-
-def _halve(rows: Array) -> Array:
-    """Return the two halves of the spectrum of rows at half the rate, (..., ceil(n_samples / 2), 2)."""
-    half = (rows.shape[-1] + 1) // 2
-    taps = np.minimum((2 * np.arange(half)[:, None] + np.arange(len(DB4)) - 3) % (2 * half), rows.shape[-1] - 1)
-    return np.take(rows, taps, axis=-1) @ FILTERS
-
-
-_PATTERNS = {length: tuple(permutations(range(length))) for length in range(2, 6)}
-
-
-@dataclass(frozen=True)
-class OrdinalPatterns:
-    """Share of each order of `length` samples, `delay` apart, such as rising, falling or peaked.
-
-    Neither an offset nor a gain of the sensor changes it. Of equal samples the earlier counts as the lower; a window
-    too short for one pattern has 0 everywhere.
-
-    Source: Bandt & Pompe 2002.
-    """
-
-    per_channel: ClassVar[bool] = True
-
-    length: int = param(4, 'Number of samples in a pattern; there are factorial(length) patterns.', low=2, high=5)
-    delay: int = param(
-        2,
-        'Distance between the samples of a pattern, in samples; a larger one describes lower frequencies.',
-        low=1,
-        high=10_000,
-    )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Rank of each sample of the pattern from the lowest, 0: '012' rises."""
-        return tuple(''.join(map(str, ranks)) for ranks in permutations(range(self.length)))
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return the shares."""
-        rows = windows.rows
-        count = len(_PATTERNS[self.length])
-        symbols = _symbols(rows, self.length, self.delay)
-        if not symbols.shape[-1]:
-            return np.zeros((*rows.shape[:-1], count))
-        of_row = np.arange(symbols.size // symbols.shape[-1]).reshape(*symbols.shape[:-1], 1)
-        found = np.bincount((symbols + count * of_row).ravel(), minlength=count * of_row.size)
-        return found.reshape(*rows.shape[:-1], count) / symbols.shape[-1]
-
-
-def _symbols(rows: Array, length: int, delay: int) -> NDArray[np.intp]:
-    """Return the number of the pattern that begins at each sample, (..., n_samples - (length - 1) · delay)."""
-    count = max(0, rows.shape[-1] - (length - 1) * delay)
-    samples = [rows[..., item * delay : item * delay + count] for item in range(length)]
-    code = np.zeros((*rows.shape[:-1], count), dtype=np.intp)
-    for bit, (earlier, later) in enumerate(combinations(range(length), 2)):
-        code |= (samples[earlier] > samples[later]).astype(np.intp) << bit
-    return _pattern_of_code(length)[code]
-
-
-@lru_cache
-def _pattern_of_code(length: int) -> NDArray[np.intp]:
-    """Return the number of the pattern whose falling pairs are the bits of each code; codes of no pattern give 0."""
-    table = np.zeros(1 << (length * (length - 1) // 2), dtype=np.intp)
-    for number, ranks in enumerate(_PATTERNS[length]):
-        pairs = enumerate(combinations(ranks, 2))
-        table[sum((earlier > later) << bit for bit, (earlier, later) in pairs)] = number
-    return table

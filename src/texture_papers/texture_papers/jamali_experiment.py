@@ -21,7 +21,6 @@ from texture_simulation.path import SimulatedSlide
 TASK = 'eight surfaces'
 SLIDE_S = 2.0
 THREE, FIVE, AMPLITUDE = 'jamali-naive-bayes-3', 'jamali-naive-bayes-5', 'jamali-amplitude'
-FUTURE = ('jamali-stft', 'jamali-wavelets', 'jamali-symbols')  # section VII, without figures
 VINYLS = ('vinyl_1', 'vinyl_2')
 ALIKE = (('carpet_1', 'carpet_2'), ('tile_1', 'tile_2'), VINYLS)
 
@@ -58,7 +57,6 @@ PROTOCOL = PaperProtocol(
                 Method(THREE, Figures(test=0.78)),
                 Method(FIVE, Figures(test=0.835)),
                 Method(AMPLITUDE, Figures(test=0.6575)),
-                *(Method(name) for name in FUTURE),
             ),
         ),
     ),

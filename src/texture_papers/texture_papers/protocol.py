@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import lru_cache
 from importlib.metadata import version
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,8 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness import load_roughness_recipe
 from texture_features.feature_set import InputFeatures
 from texture_papers.roberge import UNDECIDED, decided_by_slide, fitted_predictor
-from texture_papers.search import SearchParams, Tuned, tune, variables_of
-from texture_papers.slides import Mask, Slides, Visits, gather, kinds_of
+from texture_papers.search import Found, Individual, SearchParams, Tuned, search, tuned_pairs
+from texture_papers.slides import Mask, SlideArrays, Slides, Visits, gather, kinds_of
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
 
@@ -311,6 +312,7 @@ class Experiment:
     quick: bool = False
     tune: bool = False
     search: SearchParams | None = None
+    found: Mapping[PairSearch, Found] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -341,7 +343,7 @@ class ExperimentResult:
                 error = figures.get('over_seeds', [figures['error'] or math.nan])[0]
                 yield f'  {name}, {part} textures: error {error:.2f} grades{shown}'
         for name, facts in self.numbers.get('tuning', {}).items():
-            yield f'  searched {name}: {facts["size"]}, {facts["seconds"]:.0f} s'
+            yield f'  searched {name}: {facts["size"]}'
         for finding in self.numbers['findings']:
             value, low, high = finding.get('over_seeds', finding['interval'])
             yield f'  {finding["verdict"]:14} {finding["claim"]}: {value:+.3f} ({low:+.3f} to {high:+.3f})'
@@ -403,7 +405,7 @@ def versions() -> str:
     return ', '.join(f'{name} {".".join(version(name).split(".")[:parts])}' for name, parts in LIBRARIES.items())
 
 
-def digest_of_row(protocol: PaperProtocol, task: RecognitionTask, method: Method) -> str:
+def digest_of_row(protocol: PaperProtocol, task: RecognitionTask, method: Method, *, tuned: bool = False) -> str:
     """Return eight letters of all that decides a row of figures, but for the seed.
 
     The recipe as it is run, the motions, the slides of each split of seed 0; and of a few slides of each kind the
@@ -420,7 +422,13 @@ def digest_of_row(protocol: PaperProtocol, task: RecognitionTask, method: Method
         outcome = evaluate_method(recipe, few, half[None], method.views, training=method.training)
     values, _ = few.extract(recipe.feature_set, method.views)
     definition = {key: value for key, value in _decisive(recipe.as_mapping()).items() if key != 'training'}
-    settings = [method.training, method.views, sorted(method.sets), recipe.training.hop_s, str(method.search)]
+    settings = [
+        method.training,
+        method.views,
+        sorted(method.sets),
+        recipe.training.hop_s,
+        str(method.search if tuned else None),
+    ]
     visits = [{**asdict(one), 'sliding': _set(one.sliding)} for one in task.visits]
     return hash_of([definition, visits, settings, hashlib.sha256(trained_on.tobytes()).hexdigest(), levels,
                      strength(values), outcome.decided.tolist()])  # fmt: skip
@@ -510,30 +518,71 @@ def of_task(
         yield method.name, evaluate_method(recipe, slides, splits, method.views, training=method.training)
 
 
-def searched(protocol: PaperProtocol, scene: Scene, experiment: Experiment) -> TunedRecipes:
-    """Return recipes with variables for each pair, found on what the first split is trained on."""
-    found: dict[tuple[str, str], Tuned] = {}
+@dataclass(frozen=True)
+class PairSearch:
+    """A search for the variables of one pair of textures: what names it in the file of those that are done."""
+
+    protocol: str
+    task: str
+    method: str
+    after: str  # the method with whose individuals it begins, if any
+    pair: tuple[str, ...]
+    params: SearchParams
+    quick: bool
+    digest: str  # of the row of figures
+
+    @property
+    def kind(self) -> tuple[str, str, tuple[str, ...], int]:
+        """What another search must share to begin with its individuals."""
+        return self.task, self.method, self.pair, self.params.seed
+
+
+def pair_searches(protocol: PaperProtocol, experiment: Experiment) -> Iterator[PairSearch]:
+    """Yield the searches of one seed."""
     for task in protocol.tasks:
-        slides, trained_on = _gathered(protocol, task, scene, experiment.seed, quick=experiment.quick)
-        scans = slides.views[0].of(trained_on[0])
+        pairs = list(combinations(sorted(task.surfaces or load_scene(protocol.scene).surfaces), 2))
         for method in task.methods:
-            if not (method.search and variables_of(method.recipe)):
-                continue
-            if method.of_whole:
-                whole = found[task.name, method.of_whole]
-                recipe = in_parts(whole.recipe, recipe_of(method))
-                found[task.name, method.name] = replace(whole, recipe=recipe, seconds=0.0)
-                continue
-            params = replace(experiment.search or method.search, seed=experiment.seed)
-            found[task.name, method.name] = tune(recipe_of(method), scans, params)
-    return found
+            if method.search:
+                params = replace(method.search.within(experiment.search), seed=experiment.seed)
+                digest = digest_of_row(protocol, task, method, tuned=True)
+                for pair in pairs:
+                    names = (protocol.name, task.name, method.name, method.of_whole)
+                    yield PairSearch(*names, pair, params, experiment.quick, digest)
 
 
-def in_parts(whole: Recipe, parts: Recipe) -> Recipe:
-    """Return the recipe of parts that vote with the variables that were found for whole scans."""
-    content = parts.as_mapping()
-    shared = {key: content[key] for key in ('windows', 'evidence', 'training')}
-    return Recipe.from_mapping({**whole.as_mapping(), **shared}, f'{parts.name}-pairs')
+def search_pair(protocol: PaperProtocol, wanted: PairSearch, start: Sequence[Individual], until_s: float) -> Found:
+    """Return the variables found for one pair on what the first split is trained on."""
+    task = next(one for one in protocol.tasks if one.name == wanted.task)
+    method = next(one for one in task.methods if one.name == wanted.method)
+    scans = _training_scans(protocol, task, wanted.params.seed, quick=wanted.quick)
+    scans = scans.of(np.isin(scans.labels, wanted.pair))
+    return search(recipe_of(method), scans, wanted.params, start=start, until_s=until_s)
+
+
+def _training_scans(protocol: PaperProtocol, task: RecognitionTask, seed: int, *, quick: bool) -> SlideArrays:
+    """Return what the first split is trained on; the last is kept, as one is searched pair by pair."""
+    key = (protocol.name, task.name, seed, quick)
+    if key not in _TRAINING:
+        slides, trained_on = _gathered(protocol, task, load_scene(protocol.scene), seed, quick=quick)
+        _TRAINING.clear()
+        _TRAINING[key] = slides.views[0].of(trained_on[0])
+    return _TRAINING[key]
+
+
+_TRAINING: dict[tuple[str, str, int, bool], SlideArrays] = {}
+
+
+def searched(protocol: PaperProtocol, experiment: Experiment) -> TunedRecipes:
+    """Return the recipes with variables for each pair, of the searches that are done."""
+    recipes = {(task.name, m.name): recipe_of(m) for task in protocol.tasks for m in task.methods if m.search}
+    wanted = list(pair_searches(protocol, experiment))
+    tuned = {}
+    for key, recipe in recipes.items():
+        own = [one for one in wanted if (one.task, one.method) == key]
+        task = next(one for one in protocol.tasks if one.name == key[0])
+        scans = len(_training_scans(protocol, task, experiment.seed, quick=experiment.quick).labels)
+        tuned[key] = tuned_pairs(recipe, own[0].params, {one.pair: experiment.found[one] for one in own}, scans)
+    return tuned
 
 
 def _gathered(

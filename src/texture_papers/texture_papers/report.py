@@ -32,7 +32,6 @@ from texture_papers.protocol import (
     share,
     versions,
 )
-from texture_papers.search import QUICK
 from texture_simulation.scene import load_scene
 
 Pair = tuple[str, str]
@@ -127,29 +126,36 @@ def _of_errors(part: Array, outcome: MethodResult) -> str:
     return f'{100 * part.sum() / wrong:.0f} %' if wrong else 'none'
 
 
-def accuracy_chart(
-    panels: Mapping[str, Mapping[str, tuple[float | None, Interval]]], title: str, path: str | Path, drawn: str
+SHARES, ERRORS = ('test slides recognised (%)', 100.0), ('mean error (grades)', 1.0)
+
+
+def figures_chart(
+    panels: Mapping[str, Mapping[str, tuple[float | None, Interval]]],
+    title: str,
+    path: str | Path,
+    drawn: str,
+    unit: tuple[str, float] = SHARES,
 ) -> Path:
-    """Draw the accuracy of each method: the paper's as a cross, the simulated with its interval."""
+    """Draw the figure of each method: the paper's as a cross, the simulated with its interval."""
     heights = [len(methods) + 1 for methods in panels.values()]
     with chart(path, (7.0, 1.2 + 0.3 * sum(heights)), title) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (task, methods) in zip(rows, panels.items(), strict=True):
-            _bars(axes, methods, drawn)
+            _bars(axes, methods, drawn, unit[1])
             axes.set_title(task)
-        rows[-1].set_xlabel('test slides recognised (%)')
+        rows[-1].set_xlabel(unit[0])
         rows[0].legend(loc='lower right', bbox_to_anchor=(1.0, 1.0))
     return Path(path)
 
 
-def _bars(axes: Any, methods: Mapping[str, tuple[float | None, Interval]], drawn: str) -> None:
+def _bars(axes: Any, methods: Mapping[str, tuple[float | None, Interval]], drawn: str, scale: float) -> None:
     at = np.arange(len(methods))
     ours = [interval for _, interval in methods.values()]
-    values = 100 * np.array([interval.value for interval in ours])
-    reach = 100 * np.array([[i.value - i.low for i in ours], [i.high - i.value for i in ours]])
+    values = scale * np.array([interval.value for interval in ours])
+    reach = scale * np.array([[i.value - i.low for i in ours], [i.high - i.value for i in ours]])
     axes.errorbar(values, at, xerr=reach, fmt='o', markersize=4, color=COLOURS[0], label=f'simulated: {drawn}')
     reported = [
-        (100 * paper, place) for place, (paper, _) in zip(at, methods.values(), strict=True) if paper is not None
+        (scale * paper, place) for place, (paper, _) in zip(at, methods.values(), strict=True) if paper is not None
     ]
     axes.plot(*zip(*reported, strict=True), 'x', color=COLOURS[5], label='paper') if reported else None
     axes.set_yticks(at, list(methods))
@@ -163,8 +169,7 @@ SEARCHED = '; the first alone, whose slides for training the search was given'
 def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
     """Rebuild a paper's experiment on simulated surfaces; with a search, by the recipes that it finds."""
     scene = load_scene(protocol.scene)
-    size = experiment.search or (QUICK if experiment.quick else None)
-    tuned = searched(protocol, scene, replace(experiment, search=size)) if experiment.tune else NONE
+    tuned = searched(protocol, experiment) if experiment.tune else NONE
     found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
     name = f'{protocol.name}{TUNED if tuned else ""}'
     methods = {task.name: [m for m in task.methods if (task.name, m.name) in found] for task in protocol.tasks}
@@ -200,7 +205,7 @@ def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
 def digests(protocol: PaperProtocol, *, tuned: bool = False) -> dict[str, str]:
     """Return the digest of each row of figures, by task and method, as it is now, and the versions of the libraries."""
     rows = {
-        f'{task.name}, {m.name}': digest_of_row(protocol, task, m)
+        f'{task.name}, {m.name}': digest_of_row(protocol, task, m, tuned=tuned)
         for task in protocol.tasks
         for m in task.methods
         if m.search or not tuned
@@ -278,8 +283,6 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
 def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, out: Path) -> tuple[Path, ...]:
     """Draw the figures of an experiment's JSON: the means over seeds with their intervals, where there are several."""
     stem = f'experiment_{name.replace("-", "_")}'
-    seeds = len(numbers.get('seeds', [0]))
-    drawn = f'mean of {seeds} seeds, 95 % interval' if seeds > 1 else 'one seed, 95 % interval over slides'
     panels: dict[str, dict[str, tuple[float | None, Interval]]] = {}
     for task in protocol.tasks:
         panels[task.name] = {}
@@ -288,7 +291,15 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
             for part, own in figures.get('sets', {}).items():
                 panels[task.name][f'{method.name}: {part}'] = (None, _interval(own))
-    return (accuracy_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png', drawn),)
+    return (
+        figures_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png', drawn(numbers)),
+    )
+
+
+def drawn(numbers: Mapping[str, Any]) -> str:
+    """Return what the intervals of a chart are."""
+    seeds = len(numbers.get('seeds', [0]))
+    return f'mean of {seeds} seeds, 95 % interval' if seeds > 1 else 'one seed, 95 % interval over slides'
 
 
 def _interval(figures: Mapping[str, Any]) -> Interval:

@@ -33,14 +33,15 @@ from texture_papers.protocol import (
     Experiment,
     ExperimentResult,
     Finding,
+    Interval,
     hash_of,
     mean,
     mean_over_seeds,
     strength,
     versions,
 )
-from texture_papers.report import finding_as_json
-from texture_papers.search import QUICK, SearchParams, grading, tune
+from texture_papers.report import ERRORS, drawn, figures_chart, finding_as_json
+from texture_papers.search import QUICK, SearchParams, Tuned, grading, search, varied
 from texture_papers.slides import ArrayStream, Mask, SlideArrays
 from texture_simulation.offline import simulate_slides
 from texture_simulation.path import SimulatedSlide
@@ -180,6 +181,19 @@ class SimulatedTextures:
         """Return what a model says of the textures that it was trained on ('seen'), and of the others ('unseen')."""
         parts = {'seen': self.grades.used_for(TRAIN), 'unseen': self.grades.used_for(TEST)}
         return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
+
+
+def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
+    """Draw the error of each regressor, the means over seeds, beside the paper's."""
+    panels = {
+        f'{part} textures': {
+            name: (paper[part], Interval(*numbers['regressors'][name][part]['over_seeds']))
+            for name, paper in numbers['paper'].items()
+        }
+        for part in ('seen', 'unseen')
+    }
+    title = 'roughness: errors of grades, paper and simulation'
+    return figures_chart(panels, title, out / 'experiment_roughness.png', drawn(numbers), ERRORS)
 
 
 SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
@@ -333,7 +347,7 @@ def _better(claim: str, first: Mapping[str, Answers], second: Mapping[str, Answe
 
 
 SEARCHED_SCANS = 40  # of each texture, of the 200, for a search
-OF_HEADS = SearchParams(10, 6, 10)  # measured; the paper has 20, 30 and 20 (`--search`)
+OF_HEADS = SearchParams()  # the paper's
 
 
 def _after_search(
@@ -344,14 +358,15 @@ def _after_search(
     The recipes that were found are written next to the result.
     """
     train, test = simulated.grades.used_for(TRAIN), simulated.grades.used_for(TEST)
-    size = experiment.search or (QUICK if simulated.quick else OF_HEADS)
-    params = replace(size, seed=simulated.seed)
+    most = experiment.search or (QUICK if simulated.quick else None)
+    params = replace(OF_HEADS.within(most), seed=simulated.seed)
     scans = simulated.slides(train, min(SEARCHED_SCANS, simulated.scans), SPEED_M_S, FORCE_N)
     # As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
-    tuned = {
-        name: tune(checkless(recipe), scans, params, grading(simulated.grades)) for name, recipe in recipes.items()
-    }
-    answers = {}
+    tuned, answers = {}, {}
+    for name, recipe in recipes.items():
+        base = checkless(recipe)
+        found = search(base, scans, params, grading(simulated.grades))
+        tuned[name] = Tuned(varied(base, found.individual), params, {'': found}, len(scans.labels))
     for name, one in tuned.items():
         one.write(experiment.out / f'{RECIPES[name]}-tuned.yaml')
         model = train_grades(

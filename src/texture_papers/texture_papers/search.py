@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 import copy
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,11 @@ import yaml
 from texture_core.config import library, writing
 from texture_core.errors import InvalidParameter
 from texture_core.types import AnyArray, Array
+from texture_estimation.learners.learner import Codes, log_softmax, standardisation
 from texture_estimation.recipe import Recipe
 from texture_estimation.roughness import ROUGH, SMOOTH, Grades
 from texture_features.feature_set import AGAIN
-from texture_papers.roberge import decided_by_slide, fitted_predictor
+from texture_papers.roberge import SvmPairs, by_frequency, decided_by_slide, fitted_predictor, pairs_won
 from texture_papers.slides import Mask, SlideArrays
 
 
@@ -32,8 +33,6 @@ class SearchParams:
     population: int = 20
     generations: int = 30
     halves: int = 20
-    search_halves: int = 4  # of the halves, those on which each individual is scored; the finalists on all
-    finalists: int = 3
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -43,11 +42,17 @@ class SearchParams:
                 raise InvalidParameter(f'{name} of a search is {value}; it is at least {least}')
 
     def __str__(self) -> str:
-        few = min(self.search_halves, self.halves)
-        return f'{self.population} individuals, {self.generations} generations, {few} of {self.halves} halves'
+        return f'{self.population} individuals, {self.generations} generations, {self.halves} halves'
+
+    def within(self, most: SearchParams | None) -> SearchParams:
+        """Return the size, no part of it larger than that of another."""
+        if most is None:
+            return self
+        names = ('population', 'generations', 'halves')
+        return replace(self, **{name: min(getattr(self, name), getattr(most, name)) for name in names})
 
 
-QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)
+QUICK = SearchParams(population=4, generations=2, halves=2)
 
 # What is varied: Roberge et al., section IV; Rispal et al., section IV.D. Box constraint and kernel scale have 20
 # values a decade: finer ones are not distinguished by accuracy.
@@ -124,10 +129,35 @@ def recognition(recipe: Any, values: Array, scans: SlideArrays, training: Mask) 
     codes = np.unique(scans.labels, return_inverse=True)[1]
     owner = np.repeat(np.arange(len(codes)), len(values) // len(codes))
     rows = training[owner]
-    predictor = fitted_predictor(recipe.learner, values[rows], codes[owner[rows]], owner[rows])
+    if isinstance(recipe.learner, SvmPairs) and codes.max() == 1:
+        scores = log_softmax(pairs_won(decisions_of_pair(recipe.learner, values, codes[owner], rows)))
+    else:
+        scores = fitted_predictor(recipe.learner, values[rows], codes[owner[rows]], owner[rows])(values)
     windows = recipe.training_windows
-    right = decided_by_slide(predictor(values), len(codes), recipe.evidence, windows.hop_s / windows.length_s) == codes
+    right = decided_by_slide(scores, len(codes), recipe.evidence, windows.hop_s / windows.length_s) == codes
     return float(right[training].mean()), float(right[~training].mean())
+
+
+def decisions_of_pair(learner: SvmPairs, X: Array, y: Codes, rows: Mask) -> Array:
+    """Return the decisions of the machine of two labels that is trained on some rows, (n, 1), as `SvmPairs` has them.
+
+    The kernel is a product of matrices here, which takes a tenth of the time of libsvm's loop.
+    """
+    from sklearn import config_context  # noqa: PLC0415  # scikit-learn takes a second to import
+    from sklearn.svm import SVC  # noqa: PLC0415
+
+    mean, scale = standardisation(X[rows])
+    points = (X - mean) / (scale * learner.kernel_scale)
+    squares, one = np.einsum('ij,ij->i', points, points)[:, None], np.ones((len(X), 1))
+    # exp(-|a - b|²) with -|a - b|² = 2ab - a² - b² as one product.
+    kernel = np.hstack((2.0 * points, -squares, -one)) @ np.hstack((points, one, squares))[rows].T
+    np.exp(np.minimum(kernel, 0.0, out=kernel), out=kernel)
+    with config_context(assume_finite=True, skip_parameter_validation=True):
+        machine = SVC(C=learner.box_constraint, kernel='precomputed').fit(kernel[rows], y[rows])
+    weights = np.zeros(kernel.shape[1])
+    weights[machine.support_] = machine.dual_coef_[0]
+    decided: Array = kernel @ weights + machine.intercept_[0]
+    return -decided[:, None]
 
 
 def grading(grades: Grades) -> Score:
@@ -147,58 +177,98 @@ def grading(grades: Grades) -> Score:
     return score
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Found:
-    """The best individual of a search, its recipe, and mean learning and test score over all halves."""
+    """The best individual of a search, its mean learning and test score, and the best few: another begins with them."""
 
-    recipe: Any
     individual: Individual
     learning: float
     test: float
     tried: int
-
-    def as_json(self) -> dict[str, Any]:
-        """Return scores and variables."""
-        scores = {'learning': round(self.learning, 4), 'test': round(self.test, 4)}
-        return {**scores, 'tried': self.tried, 'variables': dict(self.individual)}
+    best: Sequence[Individual] = ()
 
 
-def search(base: Any, scans: SlideArrays, params: SearchParams, score: Score = recognition) -> Found:
-    """Return the best recipe; the fitness is the mean of learning and test score over some of the halves.
+class Described:
+    """The features of scans by the recipes of a search; what several recipes share is computed once."""
+
+    def __init__(self, base: Any, scans: SlideArrays) -> None:
+        self.base, self.scans = base, scans
+        self._blocks: dict[str, Array] = {}
+
+    def __call__(self, recipe: Any) -> Array:
+        """Return the features of a recipe that differs from the base in features and stretch alone."""
+        section = recipe.as_mapping()['inputs']['signal']
+        stretch = section.get('stretch_to_m_s', 0.0)
+        blocks = [self._values(stretch, *entry) for one in section['features'] for entry in one.items()]
+        return np.concatenate(blocks, axis=1)
+
+    def _values(self, stretch: float, name: str, parameters: Mapping[str, Any]) -> Array:
+        """Return one feature; of peaks the first of the most that are searched for."""
+        if name != PEAKS:
+            return self._block(stretch, {name: parameters})
+        most = max(RANGES['peaks'])
+        all_peaks = self._block(stretch, {name: {**parameters, 'peaks': most, 'order': 'intensity'}})
+        peaks = all_peaks.reshape(len(all_peaks), -1, most, 2)[:, :, : parameters['peaks']]
+        peaks = by_frequency(peaks) if parameters['order'] == 'frequency' else peaks
+        return peaks.reshape(len(peaks), -1)
+
+    def _block(self, stretch: float, feature: Mapping[str, Any]) -> Array:
+        if (key := str((stretch, feature))) not in self._blocks:
+            content = self.base.as_mapping()
+            section = {**content['inputs']['signal'], 'stretch_to_m_s': stretch, 'features': [feature]}
+            recipe = self.base.from_mapping({**content, 'inputs': {'signal': section}}, self.base.name)
+            self._blocks[key] = self.scans.values(recipe)
+        return self._blocks[key]
+
+
+def search(
+    base: Any,
+    scans: SlideArrays,
+    params: SearchParams,
+    score: Score = recognition,
+    *,
+    start: Sequence[Individual] = (),
+    until_s: float = math.inf,
+) -> Found:
+    """Return the best individual by the mean of learning and test score over the halves.
+
+    Individuals of another search may be the first. TimeoutError is raised after a time of the clock `time.time`.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
     """
     names = variables_of(base.name)
     halves = random_halves(scans.labels, params.halves, params.seed)
-    known: dict[tuple[int, ...], float] = {}
+    described = Described(base, scans)
+    known: dict[tuple[int, ...], Array] = {}
 
-    def individual(point: Sequence[float]) -> Individual:
+    def individual(point: Sequence[float]) -> dict[str, Any]:
         return {name: RANGES[name][int(number)] for name, number in zip(names, point, strict=True)}
 
-    def scores(point: Sequence[float], count: int) -> Array:
+    def scores(point: Sequence[float]) -> Array:
         recipe = varied(base, individual(point))
-        values = scans.values(recipe)
-        return np.array([score(recipe, values, scans, half) for half in halves[:count]])
+        values = described(recipe)
+        return np.mean([score(recipe, values, scans, half) for half in halves], axis=0)
 
-    algorithm = _algorithm([len(RANGES[name]) for name in names], params)
+    begun = [[RANGES[name].index(one[name]) for name in names] for one in start]
+    algorithm = _algorithm([len(RANGES[name]) for name in names], params, begun)
     for _ in range(params.generations):
         offspring = algorithm.ask()
         if offspring is None:  # nothing new is left in a small space
             break
         points = [tuple(int(number) for number in point) for point in offspring.get('X')]
         for point in points:
+            if time.time() > until_s:
+                raise TimeoutError
             if point not in known:
-                known[point] = float(scores(point, min(params.search_halves, params.halves)).mean())
-        offspring.set('F', np.array([[-known[point]] for point in points]))
+                known[point] = scores(point)
+        offspring.set('F', np.array([[-known[point].mean()] for point in points]))
         algorithm.tell(infills=offspring)
-    finalists = sorted(known, key=lambda point: (-known[point], point))[: params.finalists]
-    on_all = {point: scores(point, params.halves).mean(axis=0) for point in finalists}
-    best = max(finalists, key=lambda point: float(on_all[point].mean()))
-    learning, test = on_all[best].tolist()
-    return Found(varied(base, individual(best)), individual(best), learning, test, len(known))
+    best = sorted(known, key=lambda point: (-known[point].mean(), point))[: params.population]
+    learning, test = known[best[0]].round(4).tolist()
+    return Found(individual(best[0]), learning, test, len(known), [individual(point) for point in best])
 
 
-def _algorithm(counts: Sequence[int], params: SearchParams) -> Any:
+def _algorithm(counts: Sequence[int], params: SearchParams, begun: Sequence[Sequence[int]]) -> Any:
     """Return pymoo's genetic algorithm over numbers of values; low indices make wide steps, as few values need."""
     library('pymoo', 'searches', 'search')
     from pymoo.algorithms.soo.nonconvex.ga import GA  # noqa: PLC0415
@@ -210,9 +280,10 @@ def _algorithm(counts: Sequence[int], params: SearchParams) -> Any:
     from pymoo.operators.repair.rounding import RoundingRepair  # noqa: PLC0415
 
     Config.warnings['not_compiled'] = False  # its compiled parts would save nothing here
-    drawn = np.floor(np.random.default_rng(params.seed).random((params.population, len(counts))) * counts)
+    drawn = np.floor(np.random.default_rng(params.seed).random((params.population, len(counts))) * counts).astype(int)
+    drawn[: len(begun)] = begun[: params.population] or drawn[:0]
     steps = {'eta': 3.0, 'vtype': float, 'repair': RoundingRepair()}
-    algorithm = GA(pop_size=params.population, sampling=drawn.astype(int), crossover=SBX(prob=0.9, **steps),
+    algorithm = GA(pop_size=params.population, sampling=drawn, crossover=SBX(prob=0.9, **steps),
                    mutation=PM(**steps), eliminate_duplicates=True)  # fmt: skip
     problem = Problem(n_var=len(counts), n_obj=1, xl=0, xu=np.array(counts) - 1, vtype=int)
     algorithm.setup(problem, termination=NoTermination(), seed=params.seed)
@@ -221,18 +292,20 @@ def _algorithm(counts: Sequence[int], params: SearchParams) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Tuned:
-    """A recipe that was searched for, with one set of variables or one for each pair, and what it took."""
+    """A recipe that was searched for, with one set of variables or one for each pair."""
 
     recipe: Any
     params: SearchParams
     found: Mapping[str, Found]  # by pair, such as 'cork / felt'; by '' for all textures
-    seconds: float
     scans: int
 
     def as_json(self) -> dict[str, Any]:
-        """Return size, time, and scores and variables of each pair."""
-        size = {'size': str(self.params), 'scans': self.scans, 'seconds': round(self.seconds, 1)}
-        return {**size, 'found': {pair: one.as_json() for pair, one in self.found.items()}}
+        """Return size, and scores and variables of each pair."""
+        found = {
+            pair: {'learning': one.learning, 'test': one.test, 'tried': one.tried, 'variables': dict(one.individual)}
+            for pair, one in self.found.items()
+        }
+        return {'size': str(self.params), 'scans': self.scans, 'found': found}
 
     def write(self, path: Path) -> Path:
         """Write the recipe as a file that `texture train` reads, the size of the search at its top; return its path."""
@@ -245,16 +318,10 @@ class Tuned:
         return path
 
 
-def tune(base: Any, scans: SlideArrays, params: SearchParams, score: Score | None = None) -> Tuned:
-    """Search for one set of variables by a score; without one, for a set for each pair of textures, then joined."""
-    began = time.perf_counter()
-    if score is not None:
-        found = {'': search(base, scans, params, score)}
-        return Tuned(found[''].recipe, params, found, time.perf_counter() - began, len(scans.labels))
-    pairs = list(combinations(np.unique(scans.labels).tolist(), 2))
-    found = {' / '.join(pair): search(base, scans.of(np.isin(scans.labels, pair)), params) for pair in pairs}
-    recipe = joined_recipe({pair: found[' / '.join(pair)].recipe for pair in pairs}, base)
-    return Tuned(recipe, params, found, time.perf_counter() - began, len(scans.labels))
+def tuned_pairs(base: Any, params: SearchParams, found: Mapping[tuple[str, ...], Found], scans: int) -> Tuned:
+    """Return the recipe in which each pair of textures has the variables that were found for it."""
+    recipes = {pair: varied(base, one.individual) for pair, one in found.items()}
+    return Tuned(joined_recipe(recipes, base), params, {' / '.join(pair): one for pair, one in found.items()}, scans)
 
 
 def joined_recipe(recipes: Mapping[tuple[str, ...], Recipe], base: Recipe) -> Recipe:

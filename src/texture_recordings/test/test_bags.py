@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 
+from texture_core.config import MB
 from texture_core.errors import InvalidData
 from texture_core.types import (
     ExplorationState,
@@ -270,6 +271,19 @@ def test_a_bag_compressed_by_file_or_message_is_read(
         writer.write(connection, 7, encode(batch))
     [(topic, log_ns, read)] = read_bag(tmp_path / 'bag')
     assert (topic, log_ns, read.samples.tolist()) == ('signal', 7, batch.samples.tolist())
+
+
+@pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE, CompressionMode.STORAGE])
+def test_a_bag_that_unpacks_to_more_than_the_limit_is_refused(tmp_path: Path, mode: CompressionMode) -> None:
+    writer = Writer(tmp_path / 'bag', version=8, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    size = 201 * MB if mode is CompressionMode.MESSAGE else 70 * MB
+    with writer:
+        connection = writer.add_connection('/signal', TYPES[TactileSignal], typestore=typestore())
+        for number in range(3):
+            writer.write(connection, number, bytes(size))
+    with pytest.raises(InvalidData, match=r'unpacks from 0\.\d+ MB to more than the 200 MB that are allowed'):
+        list(read_bag(tmp_path / 'bag'))
 
 
 def test_a_folder_of_bags_stands_for_its_bags(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ import pytest
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.export import export_slides, write_parquet
-from texture_recordings.tables import import_tables, load_mapping
+from texture_recordings.mapping import load_mapping
+from texture_recordings.tables import import_tables
 
 parquet = pytest.importorskip('pyarrow.parquet')
 SURFACES = ('cork', 'felt', 'cork', 'oak board')

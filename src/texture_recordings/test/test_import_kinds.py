@@ -16,7 +16,8 @@ from rosbags.typesys import get_types_from_msg
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_recordings.bags import message_types
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.tables import import_tables, mapping_from, template_fields
+from texture_recordings.mapping import mapping_from, template_fields
+from texture_recordings.tables import import_tables
 
 N = 600
 X = np.sin(0.3 * np.arange(N)) + 0.001 * np.arange(N)

@@ -14,15 +14,9 @@ import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData, MissingLibrary
-from texture_recordings.tables import (
-    MAPPED,
-    TableFrame,
-    TableMapping,
-    frames,
-    import_tables,
-    mapping_from,
-    template_fields,
-)
+from texture_recordings.mapping import TableMapping, mapping_from, template_fields
+from texture_recordings.readers import MAPPED, TableFrame, frames
+from texture_recordings.tables import import_tables
 
 pa = pytest.importorskip('pyarrow')
 parquet = pytest.importorskip('pyarrow.parquet')

@@ -14,14 +14,9 @@ from texture_core.types import NANOSECONDS
 from texture_recordings.bags import message_types
 from texture_recordings.commands.convert import source_folder
 from texture_recordings.dataset import SlideDataset
-from texture_recordings.tables import (
-    MAPPED,
-    ImportReport,
-    TableMapping,
-    import_tables,
-    load_mapping,
-    mapping_from,
-)
+from texture_recordings.mapping import TableMapping, load_mapping, mapping_from
+from texture_recordings.readers import MAPPED
+from texture_recordings.tables import ImportReport, import_tables
 
 FIRST_STROKE = 40  # row of the first stroke, after rest
 

@@ -16,7 +16,8 @@ from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import IO, Any, BinaryIO, NamedTuple
+from types import SimpleNamespace
+from typing import IO, Any, BinaryIO, Literal, NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -38,6 +39,8 @@ from texture_core.types import (
 
 try:
     import apsw
+    import lz4.frame
+    import rosbags.rosbag2.reader
     from rosbags.interfaces import (
         Connection,
         MessageDefinitionFormat,
@@ -74,7 +77,7 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 # it ended behind its last whole chunk.
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
-MAX_CHUNK_BYTES = 500 * MB  # that a chunk of an MCAP file declares to unpack to
+MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # a bag may unpack to so much, or to so many times its size
 CHUNK = 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
@@ -83,6 +86,38 @@ MAGIC = b'\x89MCAP0\r\n'
 # The end of a file: the footer with the place of the summary, which is 0 if there is none, and its checksum; the magic.
 END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
 FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
+
+
+class _Unpacked(zstd.ZstdFile):
+    """What zstd packed, up to the limit."""
+
+    def __init__(self, packed: BinaryIO, mode: Literal['rb'] = 'rb') -> None:
+        self._size, self._given = packed.seek(0, io.SEEK_END), 0
+        packed.seek(0)
+        super().__init__(packed, mode)
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Return the next bytes; FileRefused beyond the limit."""
+        part = super().read(max(MAX_UNPACKED_BYTES, MAX_RATIO * self._size) + 1 if size is None or size < 0 else size)
+        self._given += len(part)
+        _check_unpacked(self._given, self._size)
+        return part
+
+
+def _check_unpacked(unpacked: int, size: int) -> None:
+    most = max(MAX_UNPACKED_BYTES, MAX_RATIO * size)
+    if unpacked > most:
+        raise FileRefused(
+            f'it unpacks from {size / MB:.3g} MB to more than the {most / MB:.0f} MB that are allowed; cut or split it'
+        )
+
+
+# rosbags unpacks whatever comes; here it stops at what a chunk declares, or at the limit.
+storage_mcap.DECOMPRESSORS['zstd'] = lambda data, size: _Unpacked(io.BytesIO(data)).read(size + 1)
+storage_mcap.DECOMPRESSORS['lz4'] = lambda data, size: lz4.frame.open(io.BytesIO(data)).read(size + 1)
+vars(rosbags.rosbag2.reader)['zstd'] = SimpleNamespace(
+    open=_Unpacked, decompress=lambda data: _Unpacked(io.BytesIO(data)).read()
+)
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
@@ -159,7 +194,7 @@ def _has_end(file: BinaryIO) -> bool:
 def _end_of_chunks(file: BinaryIO) -> int:
     """Return where the last whole chunk of an MCAP file ends; power that fails may leave one of the right length."""
     size = file.seek(0, io.SEEK_END)
-    chunks = []
+    chunks, unpacked = [], 0
     at = end = len(MAGIC)
     while at + RECORD_HEAD.size <= size:
         file.seek(at)
@@ -168,8 +203,8 @@ def _end_of_chunks(file: BinaryIO) -> int:
         if at > size or not kind:
             break
         if kind == CHUNK:
-            if int.from_bytes(file.read(CHUNK_HEAD.size)[16:24], 'little') > MAX_CHUNK_BYTES:
-                raise FileRefused(f'a chunk unpacks to more than {MAX_CHUNK_BYTES / MB:.0f} MB; record it again')
+            unpacked += int.from_bytes(file.read(CHUNK_HEAD.size)[16:24], 'little')
+            _check_unpacked(unpacked, size)
             chunks.append((at - length, length))
         end = at
     while chunks and not _is_whole(file, *chunks[-1]):
@@ -186,7 +221,7 @@ def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
         packed = CHUNK_HEAD.size + 4 + int.from_bytes(content[CHUNK_HEAD.size :][:4], 'little')
         kind = content[CHUNK_HEAD.size + 4 : packed].decode()
         storage_mcap.decompress(content[packed + 8 :], kind, size, checksum)
-    except (ReaderError, ValueError, struct.error, RuntimeError, zstd.ZstdError):
+    except (ReaderError, ValueError, EOFError, struct.error, RuntimeError, zstd.ZstdError):
         return False
     return True
 

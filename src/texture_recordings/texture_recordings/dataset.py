@@ -698,11 +698,7 @@ class SlideDataset:
             yield slide, _described(slide, feature_set, events)
 
     def features(
-        self,
-        feature_set: FeatureSet,
-        augmentation: Augmentation | None = None,
-        touch_s: float = 0.0,
-        distances_m: Sequence[float] = (),
+        self, feature_set: FeatureSet, augmentation: Augmentation | None = None, distances_m: Sequence[float] = ()
     ) -> LabelledFeatures:
         """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
 
@@ -712,8 +708,6 @@ class SlideDataset:
             Windows, inputs and features.
         augmentation
             Changes of copies of the slides, for training; with None or without copies there are none.
-        touch_s
-            How much of the touch before the finger moves is described, too, s; 0 for none.
         distances_m
             How far the finger slides in further windows, m, which show so much of a surface, or the whole of a shorter
             slide, of slides whose speed is known and that lost no samples; () for none.
@@ -748,7 +742,6 @@ class SlideDataset:
         surfaces = {slide.name: slide.surface for slide in self.slides}
         features = LabelledFeatures.from_vectors(vectors, surfaces)
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
-        touches = self._touches(feature_set, touch_s) if touch_s else {}
         slides = {slide.name: slide for slide in self.slides}
         conditions = {
             name: replace(made, session=slides[name].session, place=slides[name].place)
@@ -760,7 +753,6 @@ class SlideDataset:
             conditions=conditions,
             augmented=augmenter.result() if augmenter is not None else None,
             resized=LabelledFeatures.from_vectors(resized, surfaces) if resized else None,
-            touches=touches,
         )
 
     def tare_faults(self, feature_set: FeatureSet) -> list[str]:
@@ -774,18 +766,6 @@ class SlideDataset:
             tared = {topic: batch.tared for topic, batch in batches.items() if batch.sensor not in ('', topic)}
             faults.update(dict.fromkeys(feature_set.tare_faults(tared)))
         return list(faults)
-
-    def _touches(self, feature_set: FeatureSet, touch_s: float) -> dict[str, Array]:
-        """Return the features of the touch before the finger moves, (n_features,), of slides that hold some of it."""
-        touches = {}
-        for slide in self.slides:
-            inputs = {topic: _touch(slide, topic, touch_s) for topic in feature_set.topics}
-            windows = {topic: window for topic, window in inputs.items() if window is not None}
-            if len(windows) == len(inputs):
-                made = slide.speed_m_s, slide.force_n
-                event = CutWindow(slide.start_ns, slide.name, touch_s, touch_s, windows, *made)
-                touches[slide.name] = feature_set.extract(event).values
-        return touches
 
     def samples(self, topic: str) -> list[SlideSamples]:
         """Return the samples of one topic of each slide without gaps, with speed, force and direction.
@@ -859,16 +839,6 @@ def _stretch(slide: SlideSamples, start_s: float, length_s: float) -> Window:
     first = round(start_s * slide.rate_hz)
     samples = slide.samples[first : first + max(1, round(length_s * slide.rate_hz))]
     return Window(samples, slide.rate_hz, slide.channels)
-
-
-def _touch(slide: LabelledSlide, topic: str, touch_s: float) -> Window | None:
-    """Return the first samples of the touch before the finger moves; None without any, or if samples were lost."""
-    try:
-        samples = SlideSamples.of(slide, topic)
-    except InvalidData:
-        return None
-    before = samples.before[: max(1, round(touch_s * samples.rate_hz))]
-    return Window(before, samples.rate_hz, samples.channels) if np.isfinite(before).all() and len(before) else None
 
 
 def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[WindowEvent]) -> list[FeatureVector]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import time
 from functools import partial
@@ -31,6 +32,16 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help='folder of the recorded data sets (DIR/biotac20); default: $TEXTURE_DATA',
     )
     parser.add_argument('--quick', action='store_true', help='few slides, or simulated ones; not for publishing')
+    parser.add_argument(
+        '--workers', type=int, default=0, metavar='N', help='processes of `generalisation`; 0: all cores'
+    )
+    parser.add_argument(
+        '--minutes',
+        type=float,
+        default=math.inf,
+        metavar='MIN',
+        help='after which `generalisation` ends with what it has',
+    )
     parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
     add_seed(parser)
 
@@ -38,7 +49,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run one benchmark, or all for which the data is there: 1 if one of these fails."""
     options.out.mkdir(parents=True, exist_ok=True)  # not only when the figures are there
-    benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick)
+    benchmark_options = BenchmarkOptions(
+        options.out, options.data, options.seed, options.quick, options.workers, 60.0 * options.minutes
+    )
     if options.name != ALL:
         _run_one(options.name, benchmark_options)
         return 0

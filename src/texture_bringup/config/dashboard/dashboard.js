@@ -212,16 +212,16 @@ function drawCurve() {
 function showTexture(texture) {
   noteCurve(texture);
   drawCurve();
-  at('label').textContent = texture.label ? (texture.known ? texture.label : `${texture.label}?`) : '–';
+  at('label').textContent = texture.label ? (texture.accepted ? texture.label : `${texture.label}?`) : '–';
   at('label').dataset.final = texture.final;
   const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
   const sure = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
-  const strange = texture.label && !texture.known ? `rejected: ${texture.rejection}` : '';
+  const strange = texture.label && !texture.accepted ? `rejected: ${texture.rejection}` : '';
   const missing = texture.label ? '' : texture.missing || texture.message;
   at('estimate-note').textContent = [sure, seen, strange, missing].filter(Boolean).join(' · ');
   const advice = texture.label ? texture.message : '';
   at('advice').hidden = !advice;
-  at('advice').querySelector('summary').textContent = texture.known ? 'Advice' : 'Why';
+  at('advice').querySelector('summary').textContent = texture.accepted ? 'Advice' : 'Why';
   at('advice').querySelector('p').textContent = advice;
   const bars = texture.labels.slice(0, BARS).map((label, k) => [label, texture.probabilities[k]]);
   fill(at('evidence'), bars, ([label, probability]) => {

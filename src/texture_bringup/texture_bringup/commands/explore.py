@@ -125,7 +125,7 @@ def exit_code(result: ExplorationResult) -> int:
         return USER_ERROR
     if not result.success:
         return ABORTED
-    return ACCEPTED if result.texture.known else REJECTED
+    return ACCEPTED if result.texture.accepted else REJECTED
 
 
 OUTCOMES = {ACCEPTED: 'accepted', REJECTED: 'rejected', ABORTED: 'aborted', USER_ERROR: 'refused'}
@@ -221,7 +221,7 @@ def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
 
 def texture_text(estimate: TextureEstimate) -> str:
     """Return a texture estimate in words, with the reason if it is not known."""
-    if not estimate.label or estimate.known:
+    if not estimate.label or estimate.accepted:
         return progress_text(estimate)
     return f'{progress_text(estimate)}: {estimate.message or UNLIKE}'
 
@@ -231,7 +231,7 @@ def progress_text(estimate: TextureEstimate) -> str:
     if not estimate.label:
         return estimate.message or 'none yet'
     nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
-    return nearest if estimate.known else f'unknown (nearest: {nearest})'
+    return nearest if estimate.accepted else f'unknown (nearest: {nearest})'
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:

@@ -64,6 +64,8 @@ def _play(bag: str, rate: float, namespace: str, feed: Feed, show: Callable[[], 
         last_ns = log_ns
         feed.topics[topic][1](value)
         show()
+    time.sleep(FRAME_PERIOD_S)
+    show()  # the end, which came too soon after the frame before
 
 
 # --------------------
@@ -96,14 +98,14 @@ def picture(frame: Frame, peak: float) -> Group:
     rows.add_row('signal', bar(level / peak if peak else 0.0, 'cyan'), named if signal['sensor'] else 'no samples yet')
     rows.add_row(Text(state['phase'], style='bold'), bar(state['progress'] or 0.0, 'white'), finger_text(state))
     rows.add_row()
-    style = 'green' if texture['known'] else 'yellow'
+    style = 'green' if texture['accepted'] else 'yellow'
     for label, probability in list(zip(texture['labels'], texture['probabilities'], strict=True))[:LABELS]:
         rows.add_row(label, bar(probability, style), f'{probability:.2f}')
     faults = [light for light in frame['lights'] if light['colour'] not in ('green', 'grey')]
     return Group(
         rows,
         Text(f'texture    {texture_text(texture)}', style=f'bold {style}'),
-        Text(f'roughness  {roughness_text(roughness)}'),
+        *([Text(f'roughness  {grade}')] if (grade := roughness_text(roughness)) else []),
         *(Text(f'{light["name"]}: {light["message"]}', style=light['colour']) for light in faults),
     )
 
@@ -125,7 +127,7 @@ def _lines(feed: Feed) -> Callable[[], None]:
     def show() -> None:
         nonlocal last
         state, texture, grade = feed.newest()
-        key = state.exploration_id, state.phase, texture.label, texture.rejection, texture.final, grade.valid
+        key = state.exploration_id, state.phase, texture.label, texture.rejection, grade.valid
         if key != last:
             last = key
             print(line(feed.frame(time.monotonic())), flush=True)
@@ -158,7 +160,7 @@ def texture_text(texture: Mapping[str, Any]) -> str:
     """Return the estimate of a frame in words: the label and whether it is accepted, or why there is none."""
     if not texture['label']:
         return str(texture['message'] or texture['missing'] or 'none yet')
-    verdict = 'accepted' if texture['known'] else f'rejected: {texture["rejection"]}'
+    verdict = 'accepted' if texture['accepted'] else f'rejected: {texture["rejection"]}'
     sure = '' if texture['confidence'] is None else f', confidence {texture["confidence"]:.2f}'
     decided = ', decided' if texture['decided'] else ''
     return f'{texture["label"]}{sure} after {texture["evidence_s"]:.1f} s, {verdict}{decided}'
@@ -167,5 +169,5 @@ def texture_text(texture: Mapping[str, Any]) -> str:
 def roughness_text(roughness: Mapping[str, Any]) -> str:
     """Return the grade of a frame in words."""
     if not roughness['valid']:
-        return str(roughness['message'] or '–')
+        return str(roughness['message'])
     return f'{roughness["grade"]:.1f} on the scale from 1 (smooth) to 5 (rough)'

@@ -49,7 +49,7 @@ from texture_evaluation.collection import (
 from texture_features.feature_set import FeatureSet
 from texture_recordings.dataset import SlideDataset
 
-RECIPE = 'fast'  # whose features tell the places apart
+RECIPE = 'default'  # whose features tell the places apart
 RECORDER_S = 30.0  # to start, and to complete the bag
 FLUSHED_S = 20.0  # within which what was recorded can be read: a recorder may be behind
 RECORDED = ('signal', 'exploration')
@@ -57,6 +57,7 @@ PATCH = ('patch_x_low_m', 'patch_x_high_m', 'patch_y_low_m', 'patch_y_high_m')
 LEAST_SPEED_M_S = 0.002  # of every explorer
 LIMITS = ('min_force_n', 'max_force_n', 'max_speed_m_s')
 Tell = Callable[[str, int], None]
+BAGS_LOG = logging.getLogger('texture_recordings.bags')
 
 
 def collect_surface(
@@ -76,7 +77,7 @@ def collect_surface(
     plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))
     folder.mkdir(parents=True, exist_ok=True)
     bag = folder / next_bag([one.name for one in folder.iterdir()], surface)
-    with recorder(operator, bag, namespace) as check, _unfinished(bag):
+    with recorder(operator, bag, namespace) as check:
 
         def explore(request: ExplorationRequest) -> tuple[ExplorationError, str]:
             check()
@@ -96,28 +97,17 @@ def collect_surface(
     return replace(end, message=f'{end.message}; no slide was made, so no bag is kept'), None
 
 
-@contextmanager
-def _unfinished(bag: Path) -> Iterator[None]:
-    """Log, within a `with` block, nothing of a bag that is still being recorded: it has no end yet."""
-
-    def of_others(record: logging.LogRecord) -> bool:
-        return str(bag) not in record.getMessage()
-
-    log = logging.getLogger('texture_recordings.bags')
-    log.addFilter(of_others)
-    try:
-        yield
-    finally:
-        log.removeFilter(of_others)
-
-
 def _evaluate_bag(bag: Path, surface: str, slides: int) -> PlaceAccuracy:
     """Judge all bags of the folder, once the newest one shows so many slides on the disk."""
     feature_set = FeatureSet.load(RECIPE)
     deadline_s = time.monotonic() + FLUSHED_S
     while True:
         time.sleep(1.0)
-        dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        BAGS_LOG.disabled = True  # the bag that is still recorded has no end yet
+        try:
+            dataset = SlideDataset.from_bags([bag.parent], topics=feature_set.topics)
+        finally:
+            BAGS_LOG.disabled = False
         written = sum(one.bag == bag for one in dataset)
         if written >= slides or time.monotonic() > deadline_s:
             return evaluate_places(dataset.features(feature_set), surface)

@@ -110,8 +110,7 @@ def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
     """Return the names of the keyword arguments that `fit` of a learner takes besides the examples.
 
     A learner declares them in its class variable `extras`: 'augmented' for copies of the slides to draw from,
-    'differences' for what sets slides apart without being of their texture, 'parts' for the sessions, places or fingers
-    whose slides are held out together. Most learners take none.
+    'parts' for the sessions, places or fingers whose slides are held out together. Most learners take none.
     """
     return getattr(learner, 'extras', ())
 

@@ -186,22 +186,27 @@ class Arm:
 PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
 
 
+def _place(value: float, axis: str) -> Any:
+    """Declare a coordinate of the surface."""
+    return param(value, f'{axis} of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
+
+
+def _rotation(axis: str) -> Any:
+    """Declare a component of the rotation of the surface."""
+    text = f'{axis} of the rotation vector of the surface frame; its z axis points away from the surface.'
+    return param(0.0, text, unit='rad', low=-7.0, high=7.0)
+
+
 @dataclass(frozen=True)
 class SurfacePoseParams:
     """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
 
-    surface_x_m: float = param(0.4, 'X of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
-    surface_y_m: float = param(0.0, 'Y of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
-    surface_z_m: float = param(0.1, 'Z of the origin of the surface in the base frame.', unit='m', low=-3.0, high=3.0)
-    surface_rx_rad: float = param(
-        0.0,
-        'X of the rotation vector of the surface frame; its z axis points away from the surface.',
-        unit='rad',
-        low=-7.0,
-        high=7.0,
-    )
-    surface_ry_rad: float = param(0.0, 'Y of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
-    surface_rz_rad: float = param(0.0, 'Z of the rotation vector of the surface.', unit='rad', low=-7.0, high=7.0)
+    surface_x_m: float = _place(0.4, 'X')
+    surface_y_m: float = _place(0.0, 'Y')
+    surface_z_m: float = _place(0.1, 'Z')
+    surface_rx_rad: float = _rotation('X')
+    surface_ry_rad: float = _rotation('Y')
+    surface_rz_rad: float = _rotation('Z')
 
     def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
         """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""

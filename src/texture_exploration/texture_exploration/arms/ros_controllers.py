@@ -117,6 +117,10 @@ class RosControllersArm(SurfaceArm):
     Params = RosControllersParams
     _params: RosControllersParams
     _state: ArmState
+    _command: tuple[ArmCommand, int] | None  # and when it came
+    _commanded: Vector
+    _sent_ns: int
+    _pressing: bool
 
     def __init__(
         self,
@@ -135,16 +139,8 @@ class RosControllersArm(SurfaceArm):
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._late = 0
-        self._command: tuple[ArmCommand, int] | None = None  # and when it came
-        self._commanded: Vector = REST
-        self._sent_ns = 0
-        self._pressing = False  # a compliance controller was commanded a force
         self._switched = False  # controllers were switched for this connection
         self._hand_over_fault = ''
-        self._unsafe = ''  # why it may only be lifted, likewise
-        self._state: ArmState
-        self._failed = ''  # with an internal error
-        self._lost = ''  # a fault that stays until the arm is recovered or connected again
         self._restart()
 
     def check(self) -> None:
@@ -327,9 +323,12 @@ class RosControllersArm(SurfaceArm):
         self._command = None
         self._commanded = REST
         self._sent_ns = self._gone_ns = self._halted_ns = 0
-        self._pressing = self._zeroed = False
+        self._pressing = False  # a compliance controller was commanded a force
+        self._zeroed = False
         self._resting_first = True
-        self._lost = self._unsafe = self._failed = ''
+        self._unsafe = ''  # why it may only be lifted, until it is recovered or connected again
+        self._lost = ''  # a fault that stays as long
+        self._failed = ''  # with an internal error
 
     def _take_over(self, topics: ControllerTopics) -> None:
         if self._params.controller_manager:

@@ -141,15 +141,11 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
         2000.0, 'Stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
     )
     edge_m: float = param(0.0, 'Place along x where the surface ends; 0: nowhere.', unit='m', low=0.0, high=1.0)
-    admittance_m_s_n: float = param(
-        0.01, "Normal speed per force error of the arm's force mode.", unit='m/s/N', low=1e-4, high=1.0
-    )
+    admittance_m_s_n = 0.01  # normal speed per force error of the arm's force mode
     start_height_m: float = param(
         0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
     )
-    command_timeout_s: float = param(
-        0.1, 'How long a command holds without a new one; afterwards the arm stands.', unit='s', low=0.02, high=2.0
-    )
+    command_timeout_s = 0.1  # that a command holds without a new one; afterwards the arm stands
     finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
 
 

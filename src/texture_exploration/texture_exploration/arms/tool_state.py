@@ -26,7 +26,7 @@ from texture_exploration.arms.arm import (
 )
 from texture_exploration.force_control import ForceLoopParams
 from texture_exploration.guards import WITHOUT_GAPS
-from texture_exploration.safety import CommandLimits
+from texture_exploration.safety import MOST_FORCE_N, MOST_M, CommandLimits
 
 # --------------------
 # What can be chosen about an arm that is driven by ROS controllers.
@@ -201,7 +201,6 @@ STILL_M_S = 1e-4  # a slower finger is at rest: what remains is the noise of its
 AGREE_NS = 1_000_000_000  # clocks by which a sample is older than this, or comes from the future, do not agree
 SKEW_NS = 5_000_000  # by which a sample may come from the future without a word
 REST: Vector = (0.0, 0.0, 0.0)
-FURTHEST_M, LARGEST_N = 100.0, 1e4  # of a pose and a force: no arm reaches, and no sensor measures, more
 
 
 class ToolState:
@@ -236,7 +235,7 @@ class ToolState:
         norm = math.hypot(*sample.rotation)
         if sample.frame_id != base:
             self._refuse('pose', f"is given in the frame '{sample.frame_id}'; '{base}' is needed ('base_frame_id')")
-        elif not (math.hypot(*sample.position_m) <= FURTHEST_M and abs(norm - 1.0) <= 0.1):  # so NaN is none either
+        elif not (math.hypot(*sample.position_m) <= MOST_M and abs(norm - 1.0) <= 0.1):  # so NaN is none either
             numbers = f'{_shown(sample.position_m)} m, quaternion {_shown(sample.rotation)}'
             self.garbled = f"a pose on '{self._topics['pose']}' is none: {numbers}; see what sends it"
         elif self._is_new('pose', now_ns, sample):
@@ -252,7 +251,7 @@ class ToolState:
             allowed = f"'{params.tool_frame_id}' or '{params.base_frame_id}'"
             self._refuse('force', f"is given in the frame '{sample.frame_id}'; {allowed} is needed ('tool_frame_id')")
             return
-        if not math.hypot(*sample.force_n) <= LARGEST_N:  # so NaN is none either
+        if not math.hypot(*sample.force_n) <= MOST_FORCE_N:  # so NaN is none either
             numbers = f'{_shown(sample.force_n)} N'
             self.garbled = f"a force on '{self._topics['force']}' is none: {numbers}; see what sends it"
             self.came_ns['force'] = now_ns  # the finger can be lifted without a force

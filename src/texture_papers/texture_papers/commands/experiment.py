@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import argparse
+import math
+import time
 from pathlib import Path
 
-from texture_core.cli import add_seed
-from texture_papers.catalogue import EXPERIMENTS, run_experiment, run_over_seeds
+from texture_core.cli import add_seed, core_count
+from texture_papers.catalogue import EXPERIMENTS, run_experiment, run_over_seeds, run_searches
 from texture_papers.protocol import Experiment
 from texture_papers.search import SearchParams
 
@@ -29,7 +31,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=int,
         nargs=3,
         metavar=('INDIVIDUALS', 'GENERATIONS', 'HALVES'),
-        help="size of the search with --tune; the papers' is 20 30 20",
+        help='largest size of a search with --tune; without it, that of the paper',
+    )
+    parser.add_argument('--jobs', type=core_count, default=1, metavar='N', help='cores for the searches of --tune')
+    parser.add_argument(
+        '--minutes', type=float, default=math.inf, metavar='M', help='end the searches then; the same command goes on'
     )
     add_seed(parser)
 
@@ -41,6 +47,8 @@ def run(options: argparse.Namespace) -> int:
         population, generations, halves = options.search
         search = SearchParams(population, generations, halves)
     experiment = Experiment(options.out, options.seed, options.quick, options.tune, search=search)
+    until_s = time.time() + 60.0 * options.minutes
+    experiment = run_searches(options.name, experiment, options.seeds, options.jobs, until_s)
     if options.seeds == 1:
         result, path = run_experiment(options.name, experiment)
     else:

@@ -15,9 +15,11 @@ from texture_core.errors import InvalidParameter
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.export import export_slides
+from texture_recordings.mapping import load_mapping
 from texture_recordings.public_sets import IMPORTS
+from texture_recordings.readers import MAPPED
 from texture_recordings.segment import segment_bags
-from texture_recordings.tables import MAPPED, import_tables, load_mapping
+from texture_recordings.tables import import_tables
 
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 

@@ -91,7 +91,6 @@ class SafetyMode(enum.IntEnum):
     PROTECTIVE_STOP = 3
 
 
-SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2}
 RUNTIME_STATES = {'STOPPED': 1, 'PLAYING': 2, 'PAUSED': 4}
 POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
 ROBOT_RUNNING = 7  # robot_mode
@@ -107,7 +106,6 @@ class ScriptCommand(enum.IntEnum):
     ZERO_FT_SENSOR = 8
     SPEED_L = 10
     SPEED_STOP = 15
-    GET_STEPTIME = 26
     SET_WATCHDOG = 35
     STOP_SCRIPT = 255
 
@@ -262,7 +260,6 @@ class EmulatedRobot:
 # --------------------
 # The emulated controller without its network: registers, program, robot, safety, in steps of its own time.
 
-STARTING_S = 0.05  # between the upload of a program and its start
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
 ENDED = object()
@@ -298,12 +295,10 @@ class EmulatedController:
         self.paused = False
         self._params = params
         self._loaded = ''  # name of the program that `play` starts
-        self._starts_s = math.inf  # when an uploaded program starts
         self._program: Iterator[None] | None = None
         self._watchdog_s = math.inf  # longest silence
         self._heard_s = self._excused_s = 0.0  # when the command register last came; silence that is not the client's
         self._stopped_s = 0.0  # when the protective stop happened
-        self._unknown: set[int] = set()
 
     @property
     def playing(self) -> bool:
@@ -318,8 +313,6 @@ class EmulatedController:
     def tick(self) -> None:
         """Do one cycle."""
         self.time_s += self.step_s
-        if self.time_s >= self._starts_s:
-            self._starts_s, self.program_name, self._program = math.inf, CONTROL_SCRIPT, self._control_script()
         if self.time_s - self._heard_s > self._watchdog_s:
             self.stop_program()
         if self.playing and next(self._program or iter(()), ENDED) is ENDED:
@@ -345,25 +338,22 @@ class EmulatedController:
             self._heard_s, self._excused_s = self.time_s, 0.0
 
     def upload(self, script: str) -> None:
-        """Take over a program, which starts a little later; in a protective stop none starts."""
+        """Start a program; in a protective stop none starts."""
         if CONTROL_SCRIPT in script and self.safety is SafetyMode.NORMAL:
             self.stop_program()
-            self._starts_s = self.time_s + STARTING_S
             first = FIRST_REGISTER.search(script)
             self.first_register = int(first.group(1)) if first else 0
+            self.program_name, self._program = CONTROL_SCRIPT, self._control_script()
 
     def load(self, name: str) -> str:
         """Take note of what `play` runs, and return the answer of the dashboard."""
         self._loaded = name
         return f'Loading program: {name}'
 
-    def play(self) -> str:
-        """Run the loaded program, which takes no commands and does nothing; return the answer of the dashboard."""
-        if not self._loaded:
-            return 'Failed to execute: play'
+    def play(self) -> None:
+        """Run the loaded program, which takes no commands and does nothing."""
         self.stop_program()
         self._program, self.program_name = itertools.repeat(None), self._loaded
-        return 'Starting program'
 
     def pause(self) -> None:
         """Let the program wait."""
@@ -373,8 +363,7 @@ class EmulatedController:
         """End the program, and with it every motion and the watchdog."""
         if self._program is not None:
             self.robot.halt(STOP_DECELERATION)
-        self._program, self.paused = None, False
-        self._starts_s = self._watchdog_s = math.inf
+        self._program, self.paused, self._watchdog_s = None, False, math.inf
 
     def protective_stop(self) -> None:
         """Stop hard; the program ends."""
@@ -434,13 +423,8 @@ class EmulatedController:
                 robot.motion = speeding
         elif number == ScriptCommand.ZERO_FT_SENSOR:
             robot.zero_force()
-        elif number == ScriptCommand.GET_STEPTIME:
-            registers.double_out[0] = self.step_s
         elif number == ScriptCommand.SET_WATCHDOG:  # d0 lowest frequency
             self._watchdog_s, self._heard_s, self._excused_s = 1.0 / doubles[0], self.time_s, 0.0
-        elif number not in self._unknown:
-            self._unknown.add(number)
-            print(f'emulated UR controller: command {number} does nothing here', file=sys.stderr)
 
     def _stop(self, deceleration: float) -> Steps:
         self.robot.motion = motion = stop_move(deceleration)
@@ -502,7 +486,7 @@ class DashboardSession(Session):
             'running': lambda _: f'Program running: {str(controller.playing).lower()}',
             'programstate': lambda _: f'{controller.state} {controller.program_name}',
             'load': controller.load,
-            'play': lambda _: controller.play(),
+            'play': partial(_do, controller.play, 'Starting program'),
             'stop': partial(_do, controller.stop_program, 'Stopped'),
             'pause': partial(_do, controller.pause, 'Pausing program'),
             'unlock protective stop': lambda _: 'Protective stop releasing' if controller.unlock() else TOO_EARLY,
@@ -599,7 +583,7 @@ OUTPUTS: Mapping[str, Variable] = {
     **dict.fromkeys(('actual_TCP_speed', 'target_TCP_speed'), _of_robot('velocity')),
     **dict.fromkeys(('actual_TCP_force', 'ft_raw_wrench'), _of_robot('force')),
     'safety_mode': ('INT32', lambda controller: (int(controller.safety),)),
-    'safety_status_bits': ('UINT32', lambda controller: (SAFETY_BITS[controller.safety],)),
+    'safety_status_bits': ('UINT32', lambda controller: (1 << controller.safety - 1,)),
     'robot_status_bits': ('UINT32', lambda controller: (POWER_ON_BIT | PROGRAM_RUNNING_BIT * controller.playing,)),
     'runtime_state': ('UINT32', lambda controller: (RUNTIME_STATES[controller.state],)),
     **{f'output_int_register_{index}': _of_register('INT32', 'int_out', index) for index in range(REGISTERS)},

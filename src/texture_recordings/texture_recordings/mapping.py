@@ -1,0 +1,261 @@
+# SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
+# SPDX-License-Identifier: Apache-2.0
+"""A mapping file (YAML): which columns of tables are signals, and what labels, slides and conditions come from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+from texture_core.config import find_file, load_yaml, param, tree_from_mapping, unknown_name
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.types import MAX_HZ, MIN_HZ
+from texture_recordings.dataset import STREAMS
+
+FIELD = re.compile(r'\{(\w*)(:d)?\}|\*')
+
+
+def template_fields(template: str, name: str) -> dict[str, str] | None:
+    """Return the fields of a name, None if it is not of the form of the template; InvalidData if it fits in two ways.
+
+    A field in braces is one character or more without '/', `{run:d}` digits alone, '*' and '{}' any text that is not
+    kept.
+    """
+    found: list[dict[str, str]] = []
+    for fields in islice(_fits(template, name), 100):
+        if fields not in found:
+            found.append(fields)
+        if len(found) > 1:
+            one, other = (', '.join(f'{key}={text}' for key, text in fields.items()) for fields in found)
+            raise InvalidData(
+                f"'{name}' fits '{template}' in two ways: {one}; or {other}; write a part that tells them apart, or "
+                'digits as {code:d}, or rename the files'
+            )
+    return found[0] if found else None
+
+
+def _fits(template: str, name: str) -> Iterator[dict[str, str]]:
+    """Yield the fields of a name in each way in which it is of the form of a template."""
+    first, *literals = FIELD.sub('\0', template).split('\0')
+    fields = [(match[1] or '', match[2] is not None) for match in FIELD.finditer(template)]
+    dead: set[tuple[int, int]] = set()  # so that no name takes long
+
+    def rest(number: int, at: int) -> Iterator[dict[str, str]]:
+        if number == len(fields):
+            if at == len(name):
+                yield {}
+            return
+        (field_name, digits), literal = fields[number], literals[number]
+        if (number, at) in dead:
+            return
+        fits, end = False, at + bool(field_name)
+        while (end := name.find(literal, end)) >= 0:
+            text = name[at:end]
+            if '/' in text or (digits and not text.isdigit()):
+                break
+            for others in rest(number + 1, end + len(literal)):
+                fits = True
+                yield {**({field_name: text} if field_name else {}), **others}
+            end += 1
+        if not fits:
+            dead.add((number, at))
+
+    if name.startswith(first):
+        yield from rest(0, len(first))
+
+
+def _checked_template(template: str) -> None:
+    """Refuse a template whose fields follow each other without text between, or that names one twice."""
+    if '' in FIELD.sub('\0', template).split('\0')[1:-1]:
+        raise InvalidParameter(f"the template '{template}' has fields without text between; put text there")
+    names = [match[1] for match in FIELD.finditer(template) if match[1]]
+    if len(set(names)) < len(names):
+        raise InvalidParameter(f"the template '{template}' has a field twice; give each a different name")
+
+
+TIME_UNITS: Mapping[str, float] = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'min': 60.0}
+BORDERS = ('file', 'column', 'pause', 'time', 'row')
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """How a file is read, where its kind does not say it."""
+
+    delimiter: str = param('', "Character between columns of a text file; '' finds one of , ; tab | or space.")
+    decimal: str = param('.', 'Decimal sign of numbers in a text file.', choices=('.', ','))
+    comment: str = param('#', "Lines of a text file that begin with it are skipped; '' skips none.")
+    skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
+    header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
+    transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')
+    reshape: list[int] = param(  # noqa: RUF009 – it gives a field
+        [], 'Shape in which the values of an array are read, for arrays that were stored with mixed up axes.'
+    )
+    axes: list[int] = param(  # noqa: RUF009 – it gives a field
+        [], 'Order of the axes of `reshape` in which the values fill the shape of the array, all from 0.'
+    )
+
+    def __post_init__(self) -> None:
+        if sorted(self.axes) != list(range(len(self.reshape))):
+            raise InvalidParameter(
+                f'format: reshape is {self.reshape} and axes are {self.axes}; each axis of reshape is needed once, '
+                'such as reshape: [75, 6, 10] and axes: [1, 0, 2]'
+            )
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """When the rows were sampled."""
+
+    column: str = param('', "Names the column of time; '' takes rows as evenly spaced at `rate_hz`.")
+    unit: str = param('s', 'Names the unit of the column of time.', choices=tuple(TIME_UNITS))
+
+
+@dataclass(frozen=True)
+class StreamColumns:
+    """The columns of one stream: `signal` for vibration, `signal_static` for slow channels."""
+
+    columns: list[str] = param(  # noqa: RUF009 – it gives a field
+        [], "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8')."
+    )
+    channels: list[str] = param(  # noqa: RUF009 – it gives a field
+        [], 'Names the channels in the bag; [] takes the names of the columns.'
+    )
+    unit: str = param('', "Names the unit of the samples after scaling, such as 'g' or 'Pa'; '' if unknown.")
+    scale: float = param(1.0, 'Factor by which samples are multiplied.')
+    rate_hz: float = param(
+        0.0, 'Sampling rate; 0 takes it from the column of time, or from the file.', unit='Hz', low=0.0, high=MAX_HZ
+    )
+    samples_per_row: int = param(
+        0, 'Number of successive columns that are consecutive samples of one channel; 0 as 1.', low=0, high=1_000_000
+    )
+    time: TimeColumn = field(default_factory=TimeColumn)
+
+    def __post_init__(self) -> None:
+        if 0.0 < self.rate_hz < MIN_HZ:
+            raise InvalidParameter(
+                f"parameter 'rate_hz' is {self.rate_hz:g}; allowed are 0 and {MIN_HZ:g} to {MAX_HZ:g}"
+            )
+
+
+@dataclass(frozen=True)
+class LabelColumn:
+    """Where the surface of a slide is named."""
+
+    column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the label.')
+    value: str = param('', 'Names the label of all slides, in place of a column.')
+    names: Mapping[str, str] = field(
+        default_factory=dict,
+        metadata={
+            'description': 'Names of labels by their codes, such as {0: cork, 1: felt}; others stay as they are.'
+        },
+    )
+
+
+@dataclass(frozen=True)
+class SlideBorders:
+    """Parameters that say where slides begin and end."""
+
+    by: str = param(
+        'file',
+        "Says what ends a slide: 'file' (each file or table is one slide), 'column' (a value changes), 'pause' (time "
+        "jumps by `pause_s` or back), 'time' (every `length_s`) or 'row' (each row is one, see `samples_per_row`).",
+        choices=BORDERS,
+    )
+    column: str = param('', "Names the column whose value changes between slides, for 'column'.")
+    values: list[str] = param(  # noqa: RUF009 – it gives a field
+        [],
+        "Values of the column at which the finger slides, or patterns of them ('pass *'); [] takes all but empty ones.",
+    )
+    pause_s: float = param(0.5, "Shortest pause between slides, for 'pause'.", unit='s', low=0.0)
+    length_s: float = param(5.0, "Length of a slide, for 'time'.", unit='s', low=0.05)
+    start_s: float = param(0.0, 'Time at the start of each slide that is left out.', unit='s', low=0.0)
+    end_s: float = param(0.0, 'Time at the end of each slide that is left out.', unit='s', low=0.0)
+    min_s: float = param(0.2, 'Shortest slide that is kept; shorter ones are counted.', unit='s', low=0.0)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that holds for a slide or changes along it."""
+
+    column: str = param('', 'Names the column, or the field of `files` or `tables`, that holds the number.')
+    value: str = param('', 'Number for all slides, in place of a column.')
+    unit: str = param('', "Unit of the number; '' is the SI unit.")
+
+
+# Factor to the SI unit, by the name of the condition.
+CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
+    'speed': {'m/s': 1.0, 'cm/s': 1e-2, 'mm/s': 1e-3},
+    'force': {'N': 1.0, 'mN': 1e-3, 'gf': 9.80665e-3, 'kgf': 9.80665},
+    'direction': {'rad': 1.0, 'deg': 0.017453292519943295},
+}
+
+
+@dataclass(frozen=True)
+class TableMapping:
+    """Parameters that map the columns of tables to signals and slides."""
+
+    files: str = param('*', "Gives the template of the paths below the source, such as '{material}/run{run}.csv'.")
+    tables: str = param(
+        '', "Gives the template of the arrays in a file that are a slide each, such as '{material}/speed{speed}'."
+    )
+    format: FileFormat = field(default_factory=FileFormat)
+    rows: Mapping[str, str] = field(
+        default_factory=dict,
+        metadata={'description': 'Values of columns, such as {sensor: S1}: only rows that have them are read.'},
+    )
+    streams: Mapping[str, StreamColumns] = field(default_factory=dict)
+    label: LabelColumn = field(default_factory=LabelColumn)
+    slides: SlideBorders = field(default_factory=SlideBorders)
+    conditions: Mapping[str, Quantity] = field(default_factory=dict)  # what is not named is unknown
+    session: str = param('', "Names the column or field by which slides go into bags; '' makes one bag a surface.")
+    sensor: str = param('imported', 'Names the sensor in the bags.')
+    motion: str = param('linear_slide', 'Names the motion in the bags.')
+
+    def __post_init__(self) -> None:
+        for template in filter(None, (self.files, self.tables)):
+            _checked_template(template)
+        for name, quantity in self.conditions.items():
+            if name not in CONDITION_UNITS:
+                raise unknown_name(name, CONDITION_UNITS, 'condition')
+            if quantity.unit and quantity.unit not in CONDITION_UNITS[name]:
+                units = ', '.join(CONDITION_UNITS[name])
+                raise InvalidParameter(f"the unit of {name} is '{quantity.unit}'; use one of {units}")
+            try:
+                float(quantity.value or 0.0)
+            except ValueError as error:
+                raise InvalidParameter(f"the {name} is '{quantity.value}'; write a number, such as 0.05") from error
+        if not self.streams or not set(self.streams) <= set(STREAMS):
+            raise InvalidParameter(
+                f'the streams are {", ".join(self.streams) or "none"}; name {" or ".join(STREAMS)}, or both'
+            )
+        for name, stream in self.streams.items():
+            if not stream.columns:
+                raise InvalidParameter(f"the stream '{name}' has no columns; list their names")
+        if bool(self.label.column) == bool(self.label.value):
+            raise InvalidParameter('the label has not one origin; give `column` or `value` under `label`')
+        if self.slides.by == 'column' and not self.slides.column:
+            raise InvalidParameter('slides end where a column changes, and none is named; give `column` under `slides`')
+
+    def texts(self) -> list[str]:
+        """Return the names of the columns that are read as texts."""
+        by_column = [self.slides.column] * (self.slides.by == 'column')
+        return [name for name in (self.label.column, self.session, *by_column, *self.rows) if name]
+
+    def numbers(self) -> list[str]:
+        """Return the names of the columns that are read as numbers, beside those of the streams."""
+        names = [one.time.column for one in self.streams.values()] + [one.column for one in self.conditions.values()]
+        return [name for name in names if name]
+
+
+def load_mapping(name_or_path: str | Path) -> TableMapping:
+    """Return the mapping in a file, or one that the package ships in config/mappings, by name."""
+    path = find_file(str(name_or_path), 'texture_recordings', 'config/mappings', 'mapping')
+    return mapping_from(load_yaml(path, 'mapping'), f"mapping '{path}'")
+
+
+def mapping_from(content: object, where: str = 'mapping') -> TableMapping:
+    """Return the mapping that plain values describe; InvalidParameter if they are unknown or impossible."""
+    return tree_from_mapping(TableMapping, content, where)
