@@ -22,7 +22,7 @@ from texture_benchmarks.trust import (
 from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
-from texture_recordings.dataset import LabelledSlide
+from texture_recordings.slides import LabelledSlide
 
 pytestmark = pytest.mark.ros
 

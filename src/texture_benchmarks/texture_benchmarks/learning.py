@@ -30,7 +30,8 @@ from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import training_examples
 from texture_features.feature_set import FeatureSet, LabelledFeatures
 from texture_features.windows import CutWindow, WindowBatch
-from texture_recordings.dataset import SlideDataset, SlideSamples
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import SlideSamples
 from texture_simulation.offline import simulate_slides
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene

@@ -45,7 +45,8 @@ from texture_features.augmentation import (
     low_pass,
     other_finger,
 )
-from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
