@@ -2,13 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Endurance: what is required of a run, without nodes; and each fault once, with all of them."""
 
+import json
 import math
 from collections import Counter
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import pytest
 
 pytestmark = pytest.mark.ros
 
+from texture_benchmarks.ros import soak as module
 from texture_benchmarks.ros.soak import ENDINGS, FAULTS, LOOKS, NONE, FaultTrial, check, figures, longest_above_s, soak
 
 CALM = FaultTrial(NONE, True, 'success', 'the motion ended as asked', took_s=5.0, back_s=1.0, peak_n=3.1)
@@ -67,6 +71,25 @@ def test_a_force_above_the_limit_is_timed_without_a_break() -> None:
 def test_sentences_that_differ_in_numbers_are_one() -> None:
     found = figures([FAULT._replace(message=f'waited {seconds} s') for seconds in ('10.0', '9.5')])
     assert (found['messages'], found['aborted'], found['peak_n']) == (['waited … s'], 2, 3.1)
+
+
+def test_after_each_fault_that_ends_an_exploration_calm_ones_come_until_one_succeeds(monkeypatch, tmp_path) -> None:
+    answers = {'guard killed': [FAULT], 'sensor killed': [CALM._replace(fault='sensor killed')]}
+    answers[NONE] = [CALM._replace(ending='aborted'), CALM]
+    rig = SimpleNamespace(
+        run=lambda name, _surface: answers[name].pop(0), start=lambda _name: None, counts=Counter(), memory={}
+    )
+    monkeypatch.setattr(module, 'Rig', lambda *_: nullcontext(rig))
+    for name in ('write_simulated', 'train_from_bags'):
+        monkeypatch.setattr(module, name, lambda *_, **__: None)
+    result = soak(1e-6, 0, lambda _line: None, ('guard killed', 'sensor killed'))
+    numbers = json.loads(result.write(tmp_path).read_text())['numbers']
+    assert {name: one['explorations'] for name, one in numbers['faults'].items()} == {
+        'guard killed': 1,
+        'sensor killed': 1,
+        NONE: 2,
+    }
+    assert all(one['holds'] for one in numbers['requirements'].values())
 
 
 @pytest.mark.benchmark
