@@ -78,8 +78,8 @@ for name in sys.argv[2:]:
 # and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
 OPTIONAL = {
     'texture_recordings': {
-        'python3-scipy': {'public_sets', 'tables'},
-        'texture_features': {'commands.convert', 'dataset', 'segment'},
+        'python3-scipy': {'public_sets', 'readers'},
+        'texture_features': {'commands.convert', 'dataset', 'segment', 'slides'},
     }
 }
 # What launch files need, which no module imports.
