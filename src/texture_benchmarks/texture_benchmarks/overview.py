@@ -45,7 +45,7 @@ from texture_papers.protocol import digest_of
 from texture_recordings.dataset import SlideDataset, cut_slide
 
 VIBRATION, ALL_CHANNELS = 'vibration', 'all channels'
-OURS, PAPERS, PEERS = 'this suite', 'papers, word for word', 'general classifiers'
+OURS, PAPERS, PEERS = 'this suite', 'recipes of papers', 'general classifiers'
 RECIPES: Mapping[str, Mapping[str, Sequence[str]]] = {
     VIBRATION: {
         PAPERS: ('hu-pca-svm', 'ets-fine-svm', 'ets-linear-svm', 'jamali-naive-bayes-5'),
@@ -85,11 +85,12 @@ _Tried = tuple[dict[str, Any], Callable[[], Array]]
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train every method on earlier slides and test it on later ones, each with its own windows.
 
-    Recipes as released, papers word for word, their training windows at least 0.5 s apart; peers with windows of 0.5 s
-    that do not overlap. Share of slides recognised over the sliding time, with 95 % intervals by bootstrap over
-    surfaces, or exact over slides where these are wider; mean sliding time and share right when each slide ends as soon
-    as it is decided; computing time of a training (s) and of one window from samples to estimate (µs, median and 99th
-    percentile), by the clock of the processor, of the round of 5 over all methods whose median was lowest.
+    Recipes as released, those of papers with one set of variables each, their training windows at least 0.5 s apart;
+    peers with windows of 0.5 s that do not overlap. Share of slides recognised over the sliding time, with 95 %
+    intervals by bootstrap over surfaces, or exact over slides where these are wider; mean sliding time and share right
+    when each slide ends as soon as it is decided; computing time of a training (s) and of one window from samples to
+    estimate (µs, median and 99th percentile), by the clock of the processor, of the round of 5 over all methods whose
+    median was lowest.
     """
     some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
     with imported(options, 'biotac20', *some) as bags:

@@ -98,7 +98,7 @@ REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
 }
 # Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
 HOST = 'twelve_textures'
-ADDED = ('skids', 'dropouts')
+ADDED = ('skids',)
 
 
 def completed(scene: Scene, touch_protocol: TouchProtocol) -> Scene:

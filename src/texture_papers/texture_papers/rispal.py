@@ -24,8 +24,7 @@ people
     Here: The same: `ets_roughness.csv`.
 search
     Paper: 20 individuals, 30 generations on the 15 textures (IV.D).
-    Here: `texture experiment roughness --tune`: the same size, 40 of the 200 slides of each texture, 4 of the
-        halves in the search.
+    Here: `texture experiment roughness --tune`: the same size, 40 of the 200 slides of each texture, 20 halves.
 """
 
 from __future__ import annotations
