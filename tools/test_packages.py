@@ -53,8 +53,8 @@ EXTRAS = {
     'rtde_receive': 'ur-rtde',
     'dashboard_client': 'ur-rtde',
 }
-# What comes with Python, or with scikit-learn.
-OTHERS = {'compression', 'threadpoolctl'}
+# What comes with Python or with scikit-learn, or lies in examples/.
+OTHERS = {'compression', 'explore_client', 'threadpoolctl'}
 # What refuses to be imported without rosbags, in these packages: all that reads or writes bags. The rest of what is
 # deployed, above all what moves a robot and what recognises, needs no extra.
 NEED_BAGS = {'texture_bringup', 'texture_evaluation', 'texture_recordings', 'texture_simulation'}
@@ -78,8 +78,8 @@ for name in sys.argv[2:]:
 # and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
 OPTIONAL = {
     'texture_recordings': {
-        'python3-scipy': {'public_sets', 'tables'},
-        'texture_features': {'commands.convert', 'dataset', 'segment'},
+        'python3-scipy': {'public_sets', 'readers'},
+        'texture_features': {'commands.convert', 'dataset', 'segment', 'slides'},
     }
 }
 # What launch files need, which no module imports.

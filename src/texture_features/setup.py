@@ -31,7 +31,7 @@ def modules(folder: str) -> list[str]:
 def executables() -> list[str]:
     """Return one executable for each module of nodes/, named as the module, and the one of command.py."""
     command = [f'texture = {NAME}.command:program'] if (HERE / NAME / 'command.py').exists() else []
-    return [f'{module} = {NAME}.nodes.{module}:main' for module in modules('nodes')] + command
+    return [f'{module} = texture_core.start:node' for module in modules('nodes')] + command
 
 
 def commands() -> list[str]:

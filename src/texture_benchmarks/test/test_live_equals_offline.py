@@ -19,8 +19,9 @@ from texture_core.types import ExplorationState, Phase, TextureEstimate
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_recordings.dataset import SlideDataset, find_slides
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import import_biotac20
+from texture_recordings.slides import find_slides
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 

@@ -15,7 +15,7 @@ from texture_benchmarks.peers import CLASSIFIERS, recipe_of, right_over_time
 from texture_benchmarks.study import APART_S, BenchmarkOptions, trained_apart
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import FAST_TOPIC, load_recipe
-from texture_recordings.dataset import LabelledSlide
+from texture_recordings.slides import LabelledSlide
 
 pytestmark = pytest.mark.ros
 

@@ -30,7 +30,7 @@ from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal
 from texture_estimation.acceptance import slides_needed
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
-from texture_recordings.dataset import LabelledSlide
+from texture_recordings.slides import LabelledSlide
 from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.ros

@@ -41,7 +41,8 @@ from texture_evaluation.cross_validation import interval, predict_slides
 from texture_evaluation.metrics import TIMES_S
 from texture_evaluation.train import training_examples
 from texture_features.windows import WindowParams
-from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 from texture_simulation.offline import simulate_slides
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene

@@ -19,7 +19,8 @@ from texture_estimation.next_motion import NextTouchModel, log_likelihoods
 from texture_estimation.recipe import load_recipe
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowBatch
-from texture_recordings.dataset import SlideDataset, SlideSamples
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import SlideSamples
 from texture_simulation.offline import simulate_slides
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene

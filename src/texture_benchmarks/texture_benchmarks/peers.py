@@ -18,7 +18,7 @@ from texture_core.types import AnyArray, Array
 from texture_estimation.recipe import FAST_TOPIC, Recipe, load_recipe
 from texture_features.feature_set import read_recipe
 from texture_features.windows import CutWindow, WindowParams, cut_recording
-from texture_recordings.dataset import LabelledSlide
+from texture_recordings.slides import LabelledSlide
 
 SVC = 'SVC on log bands'  # the typical spectrum of each window; it has no rejection of its own
 PACKAGES = 'TEXTURE_PEERS'  # environment variable: the folder of the packages that `make peers` installs

@@ -29,7 +29,8 @@ from texture_evaluation.cross_validation import predict_slides
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import training_examples
 from texture_features.augmentation import Augmentation, smooth_response
-from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A program that knows the interfaces alone: it reads numbers, and never a sentence."""
+"""The client of the examples knows the messages alone: every end of an exploration gives it another next step."""
 
 import dataclasses
 import threading
@@ -8,14 +8,13 @@ import threading
 import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
-from rclpy.action import ActionClient
+from builtin_interfaces.msg import Duration
+from explore_client import Next, TextureClient, next_step, probabilities
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
 from texture_msgs import msg
-from texture_msgs.action import Explore
-from texture_msgs.msg import ExplorationRequest, ExplorationResult, ExplorationState, ModelInfo, TextureEstimate
+from texture_msgs.msg import ExplorationResult, ExplorationState
 
-from texture_core.ros import FEATURE_QOS, STATE_QOS, WaitingExecutor, quality_of_service, to_msg
+from texture_core.ros import FEATURE_QOS, STATE_QOS, WaitingExecutor, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FeatureVector
 from texture_estimation.acceptance import NEVER, Acceptance, Limits
@@ -32,71 +31,23 @@ QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
 SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}
 STILL = {'start_height_m': 0.002, 'state_timeout_s': 1.0, 'watch_signal': False}
 NAMES = ('signal/f0', 'signal/f1')
-R, E = ExplorationResult, TextureEstimate
+R, SLIDE = ExplorationResult, ExplorationState.PHASE_SLIDE
 
 
-class Program:
-    """Explores, and says in one word what it does with the answer."""
-
-    def __init__(self, node, spin_until):
-        self._until = spin_until
-        self._explore = ActionClient(node, Explore, 'explore')
-        self._stop = node.create_client(Trigger, 'explorer/stop')
-        self._labels = {}
-        self.phases = []
-        node.create_subscription(ModelInfo, 'model_info', self._on_model, quality_of_service('model_info'))
-        node.create_subscription(ExplorationState, 'exploration', lambda one: self.phases.append(one.phase), STATE_QOS)
-
-    def _on_model(self, info):
-        self._labels[info.model, info.revision] = list(info.labels)
-
-    def explore(self, meanwhile=lambda _goal: None, **request):
-        """Return the result of an exploration and the status of its goal; `meanwhile` is called in its slide."""
-        self._until(self._explore.server_is_ready)
-        self.phases.clear()
-        sent = self._explore.send_goal_async(Explore.Goal(request=ExplorationRequest(**request)))
-        self._until(sent.done)
-        ending = sent.result().get_result_async()
-        self._until(lambda: ending.done() or ExplorationState.PHASE_SLIDE in self.phases)
-        if not ending.done():
-            meanwhile(sent.result())
-        self._until(ending.done)
-        return ending.result().result.result, ending.result().status
-
-    def stop(self, _goal=None):
-        self._until(self._stop.service_is_ready)
-        self._stop.call_async(Trigger.Request())
-
-    def next_step(self, result):
-        """Return what to do after a result, by its numbers alone."""
-        if result.error_code == R.ERROR_NONE:
-            return self.decision(result.texture)
-        if result.error_code in (R.ERROR_UNKNOWN_MOTION, R.ERROR_INVALID_REQUEST):
-            return 'correct the request'
-        if result.error_code in (R.ERROR_BUSY, R.ERROR_NOT_ACTIVE, R.ERROR_ARM_NOT_READY):
-            return 'ask later'
-        return 'explore again' if result.lifted else 'call a person'
-
-    def decision(self, estimate):
-        """Return the label that may be used, or what to do without one."""
-        if estimate.rejection == E.REJECTION_NONE:
-            labels = self._labels[estimate.model, estimate.revision]
-            assert labels[int(np.argmax(estimate.probabilities))] == estimate.label
-            return estimate.label
-        return {
-            E.REJECTION_NOVEL: 'teach it',
-            E.REJECTION_AMBIGUOUS: 'slide elsewhere',
-            E.REJECTION_OUTSIDE_TRAINING: 'slide as trained',
-            E.REJECTION_TOO_LITTLE_EVIDENCE: 'slide longer',
-            E.REJECTION_NO_MODEL: 'load a model',
-            E.REJECTION_TOO_LITTLE_TRAINING: 'train more',
-        }[estimate.rejection]
+def explore(graph, client, meanwhile=lambda: None, **request):
+    """Return the result of an exploration and the status of its goal; `meanwhile` is called in its slide."""
+    client.start(**request)
+    graph.until(lambda: client.is_complete() or (client.feedback and client.feedback.state.phase == SLIDE))
+    if not client.is_complete():
+        meanwhile()
+    graph.until(client.is_complete)
+    return client.result(), client._ending.result().status
 
 
 class World:
-    """An explorer on a simulated arm, in a thread of its own, and the program."""
+    """An explorer on a simulated arm, in its own thread."""
 
-    def __init__(self, graph, **parameters):
+    def __init__(self, **parameters):
         self.explorer = ExplorerNode(
             parameter_overrides=[Parameter(name, value=value) for name, value in {**STILL, **parameters}.items()]
         )
@@ -106,9 +57,8 @@ class World:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._spin)
         self._thread.start()
-        self.program = Program(graph.peer, graph.until)
 
-    def shove(self, _goal):
+    def shove(self):
         """Press the finger for a moment."""
         self.arm.push(20.0)
         threading.Timer(0.3, self.arm.push, [0.0]).start()
@@ -134,46 +84,45 @@ def graph():
         yield graph
 
 
-def test_a_program_tells_every_end_of_an_exploration_by_its_code(graph):
-    with World(graph, force_limit_n=8.0) as world:
-        explore, act = world.program.explore, world.program.next_step
+@pytest.fixture
+def client(graph):
+    client = TextureClient()
+    yield client
+    client.destroy_node()
+
+
+def test_the_client_tells_every_end_of_an_exploration_by_its_code(graph, client):
+    with World(force_limit_n=8.0) as world:
         aborted = GoalStatus.STATUS_ABORTED
+        workspace = {'motion': 'linear_slide', 'use_start': True, 'start_x_m': 0.5}
         cases = {
-            R.ERROR_UNKNOWN_MOTION: (lambda: explore(motion='linear_slid'), aborted, 'correct the request'),
-            R.ERROR_INVALID_REQUEST: (lambda: explore(**{**QUICK, 'force_n': 50.0}), aborted, 'correct the request'),
-            R.ERROR_STOPPED: (lambda: explore(world.program.stop, **SLOW), aborted, 'explore again'),
-            R.ERROR_CANCELLED: (
-                lambda: explore(lambda goal: goal.cancel_goal_async(), **SLOW),
-                GoalStatus.STATUS_CANCELED,
-                'explore again',
-            ),
-            R.ERROR_ARM_FAULT: (lambda: explore(lambda _: world.arm.fail('stop'), **SLOW), aborted, 'call a person'),
-            R.ERROR_NONE: (lambda: explore(**QUICK), GoalStatus.STATUS_SUCCEEDED, 'slide longer'),
+            R.ERROR_UNKNOWN_MOTION: ({'motion': 'linear_slid'}, None, aborted, Next.CORRECT_REQUEST),
+            R.ERROR_INVALID_REQUEST: ({**QUICK, 'force_n': 50.0}, None, aborted, Next.CORRECT_REQUEST),
+            R.ERROR_UNUSED_FIELD: ({**QUICK, 'turns': 2.0}, None, aborted, Next.CORRECT_REQUEST),
+            R.ERROR_OUTSIDE_WORKSPACE: (workspace, None, aborted, Next.CORRECT_REQUEST),
+            R.ERROR_STOPPED: (SLOW, client.stop, aborted, Next.EXPLORE_AGAIN),
+            R.ERROR_CANCELLED: (SLOW, client.cancel, GoalStatus.STATUS_CANCELED, Next.EXPLORE_AGAIN),
+            R.ERROR_TIMEOUT: ({**SLOW, 'timeout': Duration(sec=2)}, None, aborted, Next.EXPLORE_AGAIN),
+            R.ERROR_ARM_FAULT: (SLOW, lambda: world.arm.fail('stop'), aborted, Next.CALL_A_PERSON),
+            R.ERROR_NONE: (QUICK, None, GoalStatus.STATUS_SUCCEEDED, Next.SLIDE_LONGER),
+            R.ERROR_FORCE_LIMIT: (SLOW, world.shove, aborted, Next.EXPLORE_AGAIN),
         }
-        for code, (happens, status, action) in cases.items():
-            result, ended = happens()
-            assert (result.error_code, ended, act(result)) == (code, status, action), result.message
-        timeout = ExplorationRequest(**SLOW).timeout
-        timeout.sec = 2
-        assert explore(**SLOW, timeout=timeout)[0].error_code == R.ERROR_TIMEOUT
+        for code, (request, meanwhile, status, step) in cases.items():
+            result, ended = explore(graph, client, meanwhile or (lambda: None), **request)
+            assert (result.error_code, ended, next_step(result)) == (code, status, step), result.message
         busy = []
-        explore(lambda _: busy.append(second(graph, world.program)), **SLOW)
-        assert busy == [R.ERROR_BUSY]
-        result, _ = explore(world.shove, **SLOW)
-        assert (result.error_code, act(result)) == (R.ERROR_FORCE_LIMIT, 'explore again'), result.message
+
+        def ask_too():
+            other = TextureClient()
+            busy.append(explore(graph, other, **QUICK)[0])
+            other.destroy_node()
+            client.stop()
+
+        explore(graph, client, ask_too, **SLOW)
+        assert (busy[0].error_code, next_step(busy[0])) == (R.ERROR_BUSY, Next.ASK_LATER)
         world.explorer.trigger_deactivate()
-        result, _ = explore(**QUICK)
-        assert (result.error_code, act(result)) == (R.ERROR_NOT_ACTIVE, 'ask later')
-
-
-def second(graph, program):
-    """Return the error of a request during an exploration, which it then stops."""
-    sent = program._explore.send_goal_async(Explore.Goal(request=ExplorationRequest(**QUICK)))
-    graph.until(sent.done)
-    ending = sent.result().get_result_async()
-    graph.until(ending.done)
-    program.stop()
-    return ending.result().result.result.error_code
+        result, _ = explore(graph, client, **QUICK)
+        assert (result.error_code, next_step(result)) == (R.ERROR_NOT_ACTIVE, Next.ASK_LATER)
 
 
 @pytest.mark.parametrize(
@@ -184,10 +133,10 @@ def second(graph, program):
     ],
     ids=['no surface', 'no signal'],
 )
-def test_a_program_tells_a_missing_surface_or_sensor_by_its_code(graph, parameters, code):
-    with World(graph, **parameters) as world:
-        result, _ = world.program.explore(**QUICK)
-        assert (result.error_code, world.program.next_step(result)) == (code, 'explore again'), result.message
+def test_the_client_tells_a_missing_surface_or_sensor_by_its_code(graph, client, parameters, code):
+    with World(**parameters):
+        result, _ = explore(graph, client, **QUICK)
+        assert (result.error_code, next_step(result)) == (code, Next.EXPLORE_AGAIN), result.message
 
 
 @pytest.fixture(scope='module')
@@ -199,15 +148,15 @@ def model():
     return train(load_recipe('default'), LabelledFeatures(values, labels, groups, NAMES, 'kind', 0.5, 0.25))
 
 
-# The centre of the windows, their number and what else they say, and what the program does.
+# The centre of the windows, their number, other values of theirs, and the next step of the client.
 SLIDES = {
-    'a trained surface': ((4.0, 0.0), 8, {}, 'felt'),
-    'a new surface': ((60.0, 60.0), 8, {}, 'teach it'),
-    'another motion': ((4.0, 0.0), 8, {'motion': 'circular', 'speed_m_s': 9.0}, 'slide as trained'),
-    'no window': ((4.0, 0.0), 0, {}, 'slide longer'),
-    'features of another recipe': ((4.0, 0.0), 8, {'feature_set': 'other'}, 'load a model'),
-    'a doubtful surface': ((4.0, 0.0), 8, {}, 'slide elsewhere'),
-    'a surface of few slides': ((4.0, 0.0), 8, {}, 'train more'),
+    'a trained surface': ((4.0, 0.0), 8, {}, Next.USE_LABEL),
+    'a new surface': ((60.0, 60.0), 8, {}, Next.TRAIN_IT),
+    'another motion': ((4.0, 0.0), 8, {'motion': 'circular', 'speed_m_s': 9.0}, Next.SLIDE_AS_TRAINED),
+    'no window': ((4.0, 0.0), 0, {}, Next.SLIDE_LONGER),
+    'features of another recipe': ((4.0, 0.0), 8, {'feature_set': 'other'}, Next.LOAD_A_MODEL),
+    'a doubtful surface': ((4.0, 0.0), 8, {}, Next.SLIDE_ELSEWHERE),
+    'a surface of few slides': ((4.0, 0.0), 8, {}, Next.TRAIN_MORE),
 }
 
 
@@ -215,7 +164,7 @@ def with_acceptance(model, **changes):
     return dataclasses.replace(model, acceptance=dataclasses.replace(model.acceptance, **changes))
 
 
-def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path):
+def test_the_client_tells_every_rejection_by_its_code(graph, client, model, tmp_path):
     domain = dataclasses.replace(model.acceptance.domain, speed_m_s=(0.05, 0.05))
     models = {
         'a doubtful surface': with_acceptance(
@@ -225,23 +174,27 @@ def test_a_program_tells_every_rejection_by_its_code(graph, model, tmp_path):
         'another motion': with_acceptance(model, domain=domain),
     }
     classifier = graph.add(Classifier)
-    with World(graph) as world:
+    with World():
         windows = graph.peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         graph.until(lambda: windows.get_subscription_count() and classifier.count_subscribers('texture'))
         ids = graph.listen(ExplorationState, 'exploration', STATE_QOS)
-        for name, (centre, count, said, action) in SLIDES.items():
+        for name, (centre, count, values, step) in SLIDES.items():
             path = models.get(name, model).save(tmp_path / name.replace(' ', '_'))
             [taken] = classifier.set_parameters([Parameter('model', value=str(path))])
             assert taken.successful, taken.reason
 
-            def slide(_goal, centre=centre, count=count, said=said):
+            def slide(centre=centre, count=count, values=values):
                 exploration_id = ids[-1].exploration_id
                 for k, row in enumerate(np.random.default_rng(1).normal(centre, size=(count, 2))):
-                    values = {'feature_set': 'kind', **said}
-                    windows.publish(to_msg(FeatureVector(k * 10**8, exploration_id, 0.5, 0.1, NAMES, row, **values)))
+                    given = {'feature_set': 'kind', **values}
+                    windows.publish(to_msg(FeatureVector(k * 10**8, exploration_id, 0.5, 0.1, NAMES, row, **given)))
                 windows.publish(to_msg(FeatureVector(10**9, exploration_id, 0.0, 0.1, last=True)))
 
-            result, _ = world.program.explore(slide, **QUICK)
+            result, _ = explore(graph, client, slide, **QUICK)
             assert result.error_code == R.ERROR_NONE, result.message
-            assert world.program.next_step(result) == action, (name, result.texture)
-            assert action == 'felt' or not result.texture.decided
+            assert next_step(result) == step, (name, result.texture)
+            assert result.texture.decided <= (step == Next.USE_LABEL)
+            if step == Next.USE_LABEL:
+                named = probabilities(result)
+                assert set(named) == {'cork', 'felt'}
+                assert result.texture.label == max(named, key=named.get) == 'felt'

@@ -63,7 +63,7 @@ def test_slides_in_several_directions_end_with_the_first_that_fails_and_tell_how
     asked = []
 
     class FailingOperator(contextlib.nullcontext):
-        wait_for_explorer = staticmethod(lambda deadline_s: None)
+        wait_for_explorer = staticmethod(lambda *_: None)
 
         def explore(self, request, _on_progress):
             asked.append(round(math.degrees(request.direction_rad)))

@@ -266,16 +266,16 @@ def demonstrate(
         'model': (out / f'{MODEL}.npz').resolve(),
         'roughness_model': (out / f'{ROUGHNESS}.json').resolve(),
         'seed': seed + 1,
-        'dashboard': str(dashboard).lower(),
-        'dashboard_port': (port := _free_port()),
     }
+    if dashboard:
+        arguments |= {'dashboard': 'true', 'dashboard_port': _free_port()}
     with tempfile.TemporaryDirectory(prefix='texture_demo_') as folder:
         parameters = Path(folder) / 'explorer.yaml'
         parameters.write_text(f'/**/explorer: {{ros__parameters: {{edge_m: {plan.edge_m}}}}}\n')
         arguments['explorer_params'] = parameters
         with DemoRig(Path(folder), out / LOG, arguments) as rig:
             if dashboard:
-                progress.line(f'dashboard: http://127.0.0.1:{port} while this runs')
+                progress.line(f'dashboard: http://127.0.0.1:{arguments["dashboard_port"]} while this runs')
             slides = _explore(rig, plan, progress)
     _report(slides, out, progress)
     return all(slide.as_expected for slide in slides)
@@ -373,8 +373,8 @@ def _draw_slide(axis: Any, slide: Slide) -> None:
         colour = 'lightgrey' if number != best else COLOURS[2] if accepted else COLOURS[5]
         width, above = (2.0, 3) if number == best else (1.0, 2)
         axis.plot(seconds, values, color=colour, marker='.', linewidth=width, zorder=above)
-    verdict = f'accepted: {final.label}' if accepted else f'rejected: {final.rejection.name.lower().replace("_", " ")}'
+    nearest = f' (nearest: {final.label})' if final.label else ''
+    reason = final.rejection.name.lower().replace('_', ' ')
+    verdict = f'accepted: {final.label}' if accepted else f'rejected: {reason}{nearest}'
     axis.set_title(f'{slide.title}\n{verdict}', color=COLOURS[2] if accepted else COLOURS[5])
     axis.set_ylim(0.0, 1.05)
-    if not accepted and final.label:
-        axis.annotate(f'nearest: {final.label}', (0.96, 0.22), xycoords='axes fraction', ha='right', color='grey')

@@ -62,7 +62,6 @@ def middleware() -> str:
 # Wait in a coroutine for what ROS answers in its own thread.
 
 FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
-SOON_S = 1.0  # within which an explorer that runs is usually discovered
 
 
 async def ready(is_ready: Callable[[], bool], node: str) -> None:
@@ -217,10 +216,10 @@ class Operator:
         self._node.destroy_node()
         self._context.try_shutdown()
 
-    def wait_for_explorer(self, deadline_s: float) -> None:
-        """Wait until explorations can be asked for."""
+    def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
+        """Wait until explorations can be asked for; the wait is shown after `quiet_s`."""
         missing = 'no explorer answers; start one, such as the emulator with `texture launch emulator`'
-        self._until(self._explore.server_is_ready, deadline_s, missing, quiet_s=SOON_S)
+        self._until(self._explore.server_is_ready, deadline_s, missing, quiet_s=quiet_s)
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""

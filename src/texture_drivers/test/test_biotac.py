@@ -83,18 +83,6 @@ def test_each_channel_and_finger_gets_its_own_word() -> None:
     assert (replies.pac == 1739).all()
 
 
-def test_a_parity_error_is_counted_and_leaves_the_other_fingers_alone() -> None:
-    frame = bytearray(slot(0x80, 2021, 1739, 4095) * 44)
-    frame[1 * 8 + 2] ^= 0x80  # slot 1 (PAC 0), first finger, first byte
-    frame[3 * 8 + 5] ^= 0x01  # slot 3 (PAC 1), second finger, the parity bit of the second byte
-    replies = decode(bytes(frame), BIOTAC, fingers=3)
-    assert np.argwhere(np.isnan(replies.pac)).tolist() == [[0, 0], [1, 1]]
-    assert replies.pac[0, 1:].tolist() == [1739, 4095]
-    assert replies.pac[1, [0, 2]].tolist() == [2021, 4095]
-    assert replies.damaged.tolist() == [1, 1, 0]
-    assert replies.refused.tolist() == [0, 0, 0]
-
-
 def test_a_place_without_a_biotac_gives_no_numbers() -> None:
     for line in (b'\x00', b'\xff'):
         replies = decode((b'\x80\x00' + WORDS[2021] + line * 2) * 44, BIOTAC, fingers=2)

@@ -79,8 +79,8 @@ def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> N
 @pytest.mark.parametrize(
     ('values', 'textures', 'motions', 'said'),
     [
-        (np.zeros((2, 1)), ['a'], [ACROSS], 'one row, one texture and one motion'),
-        (np.full((2, 1), np.nan), ['a', 'a'], [ACROSS] * 2, 'not finite'),
+        (np.zeros((2, 1)), ['a'], [ACROSS], 'one texture and one motion'),
+        (np.full((2, 1), np.nan), ['a', 'a'], [ACROSS] * 2, 'one row of finite values'),
         (np.eye(3), ['a', 'a', 'b'], [ACROSS, ACROSS, ALONG], 'no slide over b'),
         (np.eye(2), ['a', 'b'], [ACROSS] * 2, 'how much slides differ'),
         (np.eye(4), ['a', 'b'] * 2, [ACROSS] * 2 + [ALONG] * 2, 'how much slides differ'),

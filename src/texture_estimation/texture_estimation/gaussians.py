@@ -44,7 +44,7 @@ class GaussianClasses:
         means = group_means(samples, classes)
         deviations = samples - means[classes]
         freedom = len(samples) - len(means)
-        scale = _scale(samples, deviations, freedom)
+        scale = within_scale(samples, deviations, freedom, MIN_VARIANCE)
         centre = means.mean(axis=0)
         projection = _projection(deviations / scale, freedom, scale)
         return cls(centre, projection, _projected(means - centre, projection), slides)
@@ -63,12 +63,12 @@ class GaussianClasses:
         return log_softmax(-0.5 * self.inverse_temperature * distances / variances)
 
 
-def _scale(samples: Array, deviations: Array, freedom: int) -> Array:
-    """Return the standard deviation of each feature within classes; infinite for one that is constant."""
+def within_scale(samples: Array, deviations: Array, freedom: int, least: float) -> Array:
+    """Return the deviation of each feature within classes, of all at least this variance; infinite for a constant."""
     overall = samples.var(axis=0)
     constant = np.sqrt(overall) <= CONSTANT * np.abs(samples).max(axis=0)
     within = np.square(deviations).sum(axis=0) / max(freedom, 1)
-    return np.sqrt(np.where(constant, np.inf, np.maximum(within, MIN_VARIANCE * overall)))
+    return np.sqrt(np.where(constant, np.inf, np.maximum(within, least * overall)))
 
 
 def _projection(deviations: Array, freedom: int, scale: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.types import AnyArray, Array, FeatureVector, SlideMotion, group_similar
+from texture_estimation.gaussians import within_scale
 from texture_estimation.learners.learner import group_means, log_loss, log_softmax
 from texture_features.feature_set import fingerprint_difference
 
@@ -67,32 +68,28 @@ class NextTouchModel:
     means: Array
 
     def __post_init__(self) -> None:
-        if self.means.shape != (len(self.motions), len(self.textures), *self.projection.shape[1:]):
-            raise InvalidData(
-                f'means of shape {self.means.shape} do not fit {len(self.motions)} motions and {len(self.textures)} '
-                'textures'
-            )
+        shape = len(self.motions), len(self.textures), *self.projection.shape[1:]
+        if self.means.shape != shape:
+            raise InvalidData(f'means of motions and textures have the shape {self.means.shape}; {shape} is needed')
 
     @classmethod
     def fit(cls, values: Array, textures: Sequence[str], motions: Sequence[SlideMotion]) -> NextTouchModel:
         """Learn from slides."""
         values = np.asarray(values, dtype=np.float64)
-        if values.ndim != 2 or not len(values) == len(textures) == len(motions) or not len(values):
+        if not len(values) == len(textures) == len(motions) > 0 or values.ndim != 2 or not np.isfinite(values).all():
             raise InvalidData(
                 f'features of shape {values.shape} with {len(textures)} textures and {len(motions)} motions cannot be '
-                'trained on; give one row, one texture and one motion for each slide'
+                'trained on; give one row of finite values, one texture and one motion for each slide'
             )
-        if not np.isfinite(values).all():
-            raise InvalidData('features of slides hold values that are not finite; leave these slides out')
         names, codes = np.unique(np.asarray(textures), return_inverse=True)
         made = list(dict.fromkeys(motions))
         cells = np.array([made.index(motion) for motion in motions]) * len(names) + codes
         counts = np.bincount(cells, minlength=len(made) * len(names))
-        _check(made, names, counts.reshape(len(made), -1) > 0)
+        for motion, over in zip(made, counts.reshape(len(made), -1) > 0, strict=True):
+            if not over.all():
+                raise InvalidData(f'{motion} has no slide over {", ".join(names[~over])}; slide over every texture')
         if counts.max() < LEAST:
-            raise InvalidData(
-                'one slide over each texture with each motion does not tell how much slides differ; add some'
-            )
+            raise InvalidData('one slide of a kind over each texture does not tell how much slides differ; add some')
         (projection, means), sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
         return cls(tuple(names.tolist()), sure * projection, tuple(made), sure * means)
 
@@ -118,14 +115,11 @@ class NextTouchModel:
 
     def update(self, log_prior: Array, motion: SlideMotion, values: Array) -> Array:
         """Return the log-posterior (n_textures,) after a slide with mean features (n_features,)."""
-        means = self._means(motion)
         values = np.asarray(values, dtype=np.float64)
         if values.shape != self.projection.shape[:1] or not np.isfinite(values).all():
-            raise InvalidData(
-                f'features of shape {values.shape} do not tell about a slide; give {len(self.projection)} finite '
-                'values, as the slides that were trained on have'
-            )
-        return log_softmax(self._checked(log_prior) + log_likelihoods(values @ self.projection, means))
+            wanted = f'{len(self.projection)} finite values, as the trained slides have'
+            raise InvalidData(f'features of shape {values.shape} do not describe a slide; give {wanted}')
+        return log_softmax(self._checked(log_prior) + log_likelihoods(values @ self.projection, self._means(motion)))
 
     def information(self, log_posterior: Array, motion: SlideMotion) -> float:
         """Return the information in nats that a slide is expected to give, by its lower bound in closed form."""
@@ -147,19 +141,15 @@ class NextTouchModel:
 
     def _means(self, motion: SlideMotion) -> Array:
         if motion not in self.motions:
-            raise InvalidParameter(
-                f'{motion} is not in the training set; choose one of: {"; ".join(map(str, self.motions))}'
-            )
-        means: Array = self.means[self.motions.index(motion)]
-        return means
+            known = '; '.join(map(str, self.motions))
+            raise InvalidParameter(f'{motion} is not in the training set; choose one of: {known}')
+        return np.asarray(self.means[self.motions.index(motion)])
 
     def _checked(self, log_prior: Array) -> Array:
         log_prior = np.asarray(log_prior, dtype=np.float64)
         if log_prior.shape != (len(self.textures),) or not np.isfinite(log_prior.max()):
-            raise InvalidData(
-                f'log-probabilities of shape {log_prior.shape} do not fit; give one for each of the '
-                f'{len(self.textures)} textures, of which at least one is possible'
-            )
+            wanted = f'one for each of the {len(self.textures)} textures, of which at least one is possible'
+            raise InvalidData(f'log-probabilities of shape {log_prior.shape} do not fit; give {wanted}')
         return log_softmax(log_prior)
 
 
@@ -172,14 +162,6 @@ def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:
     if not usable:
         raise InvalidData(f'none of the {len(vectors)} windows of the slide could be used; slide longer')
     return np.mean(usable, axis=0)
-
-
-def _check(made: Sequence[SlideMotion], names: AnyArray, slid: AnyArray) -> None:
-    """Refuse motions that lack a texture; `slid` tells which have which, (n_motions, n_textures)."""
-    for motion, over in zip(made, slid, strict=True):
-        if not over.all():
-            missing = ', '.join(names[~over])
-            raise InvalidData(f'{motion} has no slide over {missing}; slide over every texture with every motion')
 
 
 def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]:
@@ -199,14 +181,13 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     counts = np.bincount(cells)
     means = group_means(values, cells)
     off, freedom = values - means[cells], len(values) - len(counts)
-    scale = _scale(values, off, freedom)
+    scale = within_scale(values, off, freedom, SMALLEST)
     # The shrinkage takes the number of slides for that of free deviations; means have used up some of them.
     covariance = ledoit_wolf(off / scale, assume_centered=True)[0] * len(values) / freedom
     by_motion = means.reshape(-1, n_textures, values.shape[1])
     apart = (by_motion - by_motion.mean(axis=1, keepdims=True)).reshape(means.shape) / scale
     between = apart.T @ apart / (len(by_motion) * max(n_textures - 1, 1))
-    untold = np.diag(covariance) <= 0.0
-    spread, axes = eigh(between, covariance + np.diag(untold * 1.0))
+    spread, axes = eigh(between, covariance + np.diag(1.0 * (np.diag(covariance) <= 0.0)))
     chance = float((1.0 / counts).mean())
     spread -= chance
     axes, spread = axes[:, spread > 0.0], spread[spread > 0.0]
@@ -217,43 +198,25 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     return projection, middle + drawn * (own - middle)
 
 
-def _scale(values: Array, off: Array, freedom: int) -> Array:
-    """Return how much each feature differs between slides, (n_features,); infinite where it is constant."""
-    variance = values.var(axis=0)
-    constant = np.sqrt(variance) <= 1e-12 * np.abs(values).max(axis=0)
-    return np.where(constant, np.inf, np.sqrt((off * off).sum(axis=0) / freedom + SMALLEST * variance))
-
-
-def _parts(cells: AnyArray) -> AnyArray:
-    """Return the part of each slide, those of one texture and motion in turn; -1 for one that is alone.
-
-    The first slide is in another part for the next texture, so that where there are two of each not all are missed at
-    once, and nothing showed how much they differ.
-    """
-    part = np.full(len(cells), -1)
-    for number, cell in enumerate(np.unique(cells)):
-        rows = np.flatnonzero(cells == cell)
-        if len(rows) >= LEAST:
-            part[rows] = (np.arange(len(rows)) + number) % PARTS
-    return part
-
-
 def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     """Return the exponent of the likelihoods that makes slides held out most probable: they are not quite Gaussian."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
 
-    parts, least = _parts(cells), len(np.unique(cells))
-    likelihoods: list[Array] = [np.zeros((0, n_textures))]
-    truths = [cells[:0]]
+    # Slides of one texture and motion are held out in turn, the first one in another part for the next texture: so that
+    # where there are two of each not all are missed at once. One that is alone is never held out.
+    _, numbers, counts = np.unique(cells, return_inverse=True, return_counts=True)
+    ranks = np.array([np.count_nonzero(cells[:row] == cell) for row, cell in enumerate(cells)])
+    parts = np.where(counts[numbers] >= LEAST, (ranks + numbers) % PARTS, -1)
+    found = []
     for part in range(PARTS):
-        own, others = parts == part, parts != part
-        if own.any() and np.count_nonzero(others) > least:
-            projection, means = _fit(values[others], cells[others], n_textures)
-            likelihoods.append(log_likelihoods(values[own] @ projection, means[cells[own] // n_textures]))
-            truths.append(cells[own] % n_textures)
-    untempered, truth = np.concatenate(likelihoods), np.concatenate(truths)
-    if not len(truth):
+        own = parts == part
+        if own.any() and np.count_nonzero(~own) > len(counts):
+            projection, means = _fit(values[~own], cells[~own], n_textures)
+            likelihoods = log_likelihoods(values[own] @ projection, means[cells[own] // n_textures])
+            found.append((likelihoods, cells[own] % n_textures))
+    if not found:
         return 1.0
+    untempered, truth = (np.concatenate(each) for each in zip(*found, strict=True))
 
     def loss(logarithm: float) -> float:
         return log_loss(log_softmax(math.exp(logarithm) * untempered), truth)

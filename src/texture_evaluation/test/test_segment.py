@@ -7,8 +7,8 @@ from texture_core.errors import InvalidData
 from texture_core.types import Phase
 from texture_features.segmentation import SegmentationParams
 from texture_recordings.bags import BagWriter, read_bag
-from texture_recordings.dataset import find_slides
 from texture_recordings.segment import segment_bags
+from texture_recordings.slides import find_slides
 from texture_simulation.offline import SlidePlan, write_simulated
 
 SURFACE = 'ridge_2mm_deep'

@@ -16,7 +16,8 @@ from texture_features.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.bags import BagWriter, read_bag
-from texture_recordings.dataset import SlideDataset, motion_made
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import motion_made
 from texture_simulation.offline import SlidePlan, write_simulated
 
 RATE_HZ = 1000.0

@@ -10,8 +10,9 @@ from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, lost_samples
 from texture_features.features.taxels import SpatialBands
 from texture_recordings.bags import read_bag
-from texture_recordings.dataset import SlideDataset, find_slides
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import IMPORTS, evenly
+from texture_recordings.slides import find_slides
 
 import_ntp21, import_fabricslide, import_fingersense, import_lmt29 = (
     IMPORTS[name] for name in ('ntp21', 'fabricslide', 'fingersense', 'lmt29')

@@ -26,7 +26,8 @@ from texture_features.correction import (
     file_beside,
     write_reference,
 )
-from texture_recordings.dataset import LabelledSlide, SlideDataset, SlideSamples
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
 UNMEASURED = 'noise and drift were not measured, for too little was recorded before the touch'

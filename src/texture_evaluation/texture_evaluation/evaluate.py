@@ -29,7 +29,8 @@ from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import slide_digest
 from texture_features.feature_set import fingerprint_difference
 from texture_features.windows import WindowEvent
-from texture_recordings.dataset import LabelledSlide, SlideDataset, no_window
+from texture_recordings.dataset import SlideDataset, no_window
+from texture_recordings.slides import LabelledSlide
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,8 @@ from texture_estimation.roughness import RoughnessModel, load_roughness_recipe, 
 from texture_estimation.training import train
 from texture_features.feature_set import LabelledFeatures
 from texture_recordings.bags import find_bags
-from texture_recordings.dataset import LabelledSlide, SlideDataset
+from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 
 HOPS = 4  # windows of the least distance overlap so often
 

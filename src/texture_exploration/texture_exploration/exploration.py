@@ -27,7 +27,7 @@ from texture_exploration.safety import SafetyLimits
 
 def may_stop(estimate: TextureEstimate) -> bool:
     """Return whether a texture estimate may end the slide; one whose confidence is not known may not."""
-    return estimate.accepted and estimate.decided
+    return estimate.accepted and estimate.decided and estimate.confidence >= 0.0
 
 
 class ExplorationEstimates:

@@ -9,8 +9,9 @@ import pytest
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.types import NANOSECONDS, Phase, TactileSignal, lost_samples
 from texture_recordings.bags import read_bag
-from texture_recordings.dataset import SlideDataset, find_slides
+from texture_recordings.dataset import SlideDataset
 from texture_recordings.public_sets import frame_indices, import_biotac20, restore_sign
+from texture_recordings.slides import find_slides
 
 N_FRAMES = 610
 

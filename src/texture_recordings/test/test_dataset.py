@@ -9,8 +9,8 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, ExplorationState, Phase, TactileSignal
 from texture_recordings.bags import BagWriter, Continuity
-from texture_recordings.dataset import STREAMS, LabelledSlide, find_slides, parse_selection, with_places
 from texture_recordings.nodes.replay import Schedule
+from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, parse_selection, with_places
 
 pytestmark = pytest.mark.ros
 

@@ -54,6 +54,34 @@ def test_rows_of_a_buffer_have_the_rate_of_rows_and_duration(tmp_path: Path, siz
     assert report.streams['cork', 'signal'] == {'samples': N, 'lost': 0}
 
 
+LOST = np.isin(np.arange(N), [100, 101, 260, 433])
+UNEVEN = np.floor(T * 41.7) / 41.7  # of a buffer that is read 41.7 times a second, with two or three rows
+
+
+@pytest.mark.parametrize(('times', 'rate_hz', 'sentence', 'lost'), [
+    (bursts(3, 50e-6)[~LOST], 100.0, 'in bursts of 1 to 3, so lost rows cannot be told; .* the rate is 99', 9),
+    ((T[~LOST] / 10).round(3), 1000.0, 'counts in steps of 0.001 s at 1000 Hz, so lost samples cannot be told', 4),
+    (UNEVEN[~LOST], 0.0, 'in bursts of 1 to 3, so lost rows cannot be told', None),
+    (bursts(3, 50e-6)[np.r_[0:100, 101, 100, 102:N]], 0.0, 'in bursts, and 2 of them are out of order', None),
+])  # fmt: skip
+def test_losses_that_cannot_be_told_are_refused_until_the_rate_is_stated(
+    tmp_path: Path, times: np.ndarray, rate_hz: float, sentence: str, lost: int | None
+) -> None:
+    csv(tmp_path, times, X[: len(times)])
+    with pytest.raises(InvalidData, match=sentence):
+        run(tmp_path)
+    if lost is not None:
+        stream = {'columns': ['x'], 'time': {'column': 't'}, 'rate_hz': rate_hz}
+        assert run(tmp_path, streams={'signal': stream}).streams['cork', 'signal']['lost'] == lost
+
+
+def test_rows_of_a_buffer_that_is_read_at_any_time_follow_each_other(tmp_path: Path) -> None:
+    csv(tmp_path, UNEVEN, X)
+    counts = run(tmp_path).streams['cork', 'signal']
+    assert counts['lost'] == 0
+    assert counts['samples'] > 0.97 * N
+
+
 @pytest.mark.parametrize(('times', 'unit'), [
     ((1000 * T * 60).astype(int) % 2**16, 'ms'), ((1e6 * T).astype(int) % 2**16, 'us'),
     (((1e6 * T).astype(int) + 2**32 - 10**6) % 2**32, 'us'), (((1e3 * T).astype(int) + 2**31 - 5000) % 2**31, 'ms'),

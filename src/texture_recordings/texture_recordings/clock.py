@@ -235,7 +235,8 @@ def _places(times: Array, samples: AnyArray, rate_hz: float, out: int, *, stated
         if abs(np.median(lag[row + 1 : row + 6]) - np.median(lag[max(0, row - 4) : row + 1])) > 0.5:
             raise ClockFault(
                 int(kept[row + 1]), f'a gap of {steps[row]:.3g} samples at {rate_hz:g} Hz contradicts the times '
-                f'around it, so lost samples cannot be told from late rows; {WITHOUT_TIME}',
+                f'around it, so lost samples cannot be told from late rows; by rows and duration the rate is '
+                f'{len(times) / max(times[-1] - times[0], 1e-9):.4g} Hz; {WITHOUT_TIME}',
             )  # fmt: skip
     # Losses are those that stand out: whole steps, and longer than any that is none.
     large = missing > 0

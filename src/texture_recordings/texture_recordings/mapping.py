@@ -13,7 +13,7 @@ from pathlib import Path
 from texture_core.config import find_file, load_yaml, param, tree_from_mapping, unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.types import MAX_HZ, MIN_HZ
-from texture_recordings.dataset import STREAMS
+from texture_recordings.slides import STREAMS
 
 FIELD = re.compile(r'\{(\w*)(:d)?\}|\*')
 
@@ -118,7 +118,7 @@ class StreamColumns:
     """The columns of one stream: `signal` for vibration, `signal_static` for slow channels."""
 
     columns: list[str] = param(  # noqa: RUF009 – it gives a field
-        [], "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8')."
+        [], "Names the columns in their order: names, patterns ('taxel*') or ranges ('0-8', 'acc.1-3')."
     )
     channels: list[str] = param(  # noqa: RUF009 – it gives a field
         [], 'Names the channels in the bag; [] takes the names of the columns.'

@@ -20,7 +20,7 @@ from texture_core.config import Arrays, open_regular, unknown_name
 from texture_core.errors import InvalidData
 from texture_core.types import NANOSECONDS, AnyArray, Array, ExplorationState, Phase, TactileSignal
 from texture_recordings.bags import DELAY_NS, PAUSE_NS, START_NS, BagWriter, slide_batches
-from texture_recordings.dataset import parse_selection
+from texture_recordings.slides import parse_selection
 
 # --------------------
 # A slide of the BioTac data set, and how the finger moved in it.

@@ -33,7 +33,7 @@ from texture_recordings.mapping import FileFormat, TableMapping, template_fields
 MAX_FILE_BYTES = 1000 * MB
 MAX_VALUES = 8_000_000  # of 8 bytes, of one file; a larger file may have as many as it has bytes
 EXAMPLES = 3
-RANGE = re.compile(r'(\D*)(\d{1,9})-\1(\d{1,9})')
+RANGE = re.compile(r'(\D*)(\d{1,9})-(?:\1)?(\d{1,9})')
 MAX_RANGE = 10_000
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
 MAX_ARRAYS = 50_000  # in the cells and structs of a MATLAB file, or data sets of an HDF5 file

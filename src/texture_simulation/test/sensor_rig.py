@@ -73,7 +73,7 @@ def feed_tsf85(shape: tuple[int, ...]) -> Feed:
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first, first + ticks) % 1000
         dynamic = np.repeat(numbers[:, None], 2, axis=1) if len(shape) == 2 else numbers
-        device.advance(dynamic.astype(np.int16), np.full((1, *shape), first % 1000, dtype=np.uint16))
+        device.measure((dynamic.astype(np.int16), np.full((1, *shape), first % 1000, dtype=np.uint16)))
 
     return feed
 
@@ -83,7 +83,7 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
 
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first * slots, (first + ticks) * slots) % 4096
-        device.advance(np.repeat(numbers[:, None], fingers, axis=1).astype(np.uint16).reshape(ticks, slots, fingers))
+        device.measure(np.repeat(numbers[:, None], fingers, axis=1).astype(np.uint16).reshape(ticks, slots, fingers))
 
     return feed
 
@@ -93,7 +93,7 @@ def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
 
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first, first + ticks) % 30_000
-        device.sample(np.outer(numbers, np.ones(channels)).astype(kind))
+        device.measure(np.outer(numbers, np.ones(channels)).astype(kind))
 
     return feed
 
@@ -101,7 +101,7 @@ def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
 def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     """Feed the film, and the force with every 64th tick."""
     numbers = np.arange(first, first + ticks)
-    device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
+    device.measure(((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16)))
 
 
 def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:

@@ -13,7 +13,7 @@ import pytest
 from texture_core.types import NANOSECONDS, FingerState, Phase, lost_samples
 from texture_drivers import tsf85 as tables
 from texture_recordings.bags import read_bag
-from texture_recordings.dataset import find_slides
+from texture_recordings.slides import find_slides
 from texture_simulation.offline import (
     SlidePlan,
     simulate_exploration,

@@ -9,6 +9,7 @@ import tty
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,6 @@ from texture_drivers.sensor import SensorParams
 from texture_simulation.devices.fingers import (
     ByteFaults,
     EmulatedBioTac,
-    EmulatedDaq,
     EmulatedTsf85,
 )
 
@@ -32,22 +32,35 @@ Make = Callable[..., Rig]
 
 
 @pytest.fixture
-def make(tmp_path: Path) -> Iterator[Make]:
+def open_rig(tmp_path: Path) -> Iterator[Make]:
     with ExitStack() as rigs:
 
-        def make(serials: tuple[str, ...] = ('BT-0',), prefix: str = '', finger: int = 0, **options: Any) -> Rig:
-            link = tmp_path / 'biotac'
-            device = EmulatedBioTac(link, np.random.default_rng(0), serials)
-            rig = rigs.enter_context(Rig('biotac', link, case=biotac(prefix, fingers=len(serials)), device=device))
-            rig.sensor = BioTac(SensorParams(device=str(link), finger=finger), **options)
+        def open_rig(name: str, device: Any = None, sensor: Any = None, **changes: Any) -> Rig:
+            """Return a rig with an opened sensor: another device or driver than of the catalogue, a changed case."""
+            link = tmp_path / name
+            made = device and device(link, np.random.default_rng(0))
+            rig = rigs.enter_context(Rig(name, link, case=replace(CASES[name], **changes), device=made))
+            rig.sensor = sensor(link) if sensor else rig.sensor
             rig.sensor.open()
             return rig
 
-        yield make
+        yield open_rig
 
 
-def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(make: Make) -> None:
-    rig = make(serials=('BT-0', 'BT-1', ''), finger=1)
+def board(
+    open_rig: Make, serials: tuple[str, ...] = ('BT-0',), prefix: str = '', finger: int = 0, **options: Any
+) -> Rig:
+    """Return a rig with a board of BioTacs."""
+    return open_rig(
+        'biotac',
+        partial(EmulatedBioTac, serials=serials),
+        lambda link: BioTac(SensorParams(device=str(link), finger=finger), **options),
+        **vars(biotac(prefix, fingers=len(serials))),
+    )
+
+
+def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(open_rig: Make) -> None:
+    rig = board(open_rig, serials=('BT-0', 'BT-1', ''), finger=1)
     rig.set(board_flip=0.01)
     batches = rig.signal_s(1.4)
     values = np.concatenate([batch.samples[:, 0] for batch in batches])
@@ -57,35 +70,23 @@ def test_words_damaged_on_the_board_are_nan_and_no_neighbour_moves(make: Make) -
     assert rig.sensor.counts['damaged_words'] > 0
 
 
-def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advice(make: Make) -> None:
-    rig = make()
+def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advice(open_rig: Make) -> None:
+    rig = board(open_rig)
     rig.signal_s(1.5)
     assert rig.sensor.details['serial of finger 0'] == 'BT-0'
     rig.set(silent=True)
     assert 'sends no whole frames' in rig.fault()
 
 
-def test_all_fingers_of_a_board_have_topics_of_their_own(make: Make) -> None:
-    rig = make(serials=('BT-0', 'BT-1', ''), prefix='finger1/', fingers=(0, 1, 2))
+def test_all_fingers_of_a_board_have_topics_of_their_own(open_rig: Make) -> None:
+    rig = board(open_rig, serials=('BT-0', 'BT-1', ''), prefix='finger1/', fingers=(0, 1, 2))
     topics = rig.read_s(0.1)
     assert not topics['finger2/signal']
     assert set(topics) == {f'finger{n}/{topic}' for n in range(3) for topic in ('signal', 'signal_static')}
 
 
-@pytest.fixture
-def make_anyskin(tmp_path: Path) -> Iterator[Make]:
-    with ExitStack() as rigs:
-
-        def make_anyskin(**changes: Any) -> Rig:
-            rig = rigs.enter_context(Rig('anyskin', tmp_path / 'anyskin', case=replace(CASES['anyskin'], **changes)))
-            rig.sensor.open()
-            return rig
-
-        yield make_anyskin
-
-
-def test_a_rate_that_nobody_set_is_measured_and_kept(make_anyskin: Make) -> None:
-    rig = make_anyskin(config='')
+def test_a_rate_that_nobody_set_is_measured_and_kept(open_rig: Make) -> None:
+    rig = open_rig('anyskin', config='')
     first = rig.signal_s(0.2)[0]
     assert first.sampling_rate_hz == pytest.approx(250.0, abs=2.0)
     assert first.sampling_rate_hz == round(first.sampling_rate_hz)
@@ -95,38 +96,24 @@ def test_a_rate_that_nobody_set_is_measured_and_kept(make_anyskin: Make) -> None
     assert again.sampling_rate_hz == first.sampling_rate_hz == rig.sensor.expected_rates_hz['signal']
 
 
-def test_the_temperature_is_published_if_wanted(make_anyskin: Make) -> None:
-    assert 'temperature' not in make_anyskin(config='{rate_hz: 250.0}').read_s(0.2)
-    temperature = make_anyskin().read_s(0.2)['temperature'][-1]
+def test_the_temperature_is_published_if_wanted(open_rig: Make) -> None:
+    assert 'temperature' not in open_rig('anyskin', config='{rate_hz: 250.0}').read_s(0.2)
+    temperature = open_rig('anyskin').read_s(0.2)['temperature'][-1]
     assert temperature.channels == ('m0', 'm1', 'm2', 'm3', 'm4')
     assert temperature.samples == pytest.approx(31.25)
 
 
-@pytest.fixture
-def make_sampler(tmp_path: Path) -> Iterator[Make]:
-    with ExitStack() as rigs:
-
-        def make_sampler(name: str = 'daq', *, start_us: int | None = None, **changes: Any) -> Rig:
-            link = tmp_path / name
-            device = None if start_us is None else EmulatedDaq(link, np.random.default_rng(0), start_us)
-            rig = rigs.enter_context(Rig(name, link, case=replace(CASES[name], **changes), device=device))
-            rig.sensor.open()
-            return rig
-
-        yield make_sampler
-
-
-def test_the_channels_keep_their_order(make_sampler: Make) -> None:
+def test_the_channels_keep_their_order(open_rig: Make) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
-        device.sample(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
+        device.measure(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
 
-    last = make_sampler(feed=feed).signal_s(0.5)[-1]
+    last = open_rig('daq', feed=feed).signal_s(0.5)[-1]
     assert last.samples[0, 0] > 0
     np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
 
 
-def test_a_silent_device_and_a_babbling_one_are_reported_apart(make_sampler: Make) -> None:
-    rig = make_sampler()
+def test_a_silent_device_and_a_babbling_one_are_reported_apart(open_rig: Make) -> None:
+    rig = open_rig('daq')
     rig.set(silent=True)
     assert 'sends nothing' in rig.fault()
     rig.set(silent=False, faults=ByteFaults(flip=0.2))
@@ -139,14 +126,14 @@ def swing(device: Any, first: int, ticks: int) -> None:
     """Feed a film that swings at 50 Hz, and a force that rises."""
     numbers = np.arange(first, first + ticks)
     film = 1000 * np.sin(2 * np.pi * 50 / 4096 * numbers)
-    device.sample(film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16))
+    device.measure((film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16)))
 
 
 SWING: dict[str, Feed] = {'feed': swing}
 
 
-def test_film_and_force_come_as_two_streams_in_their_units(make_sampler: Make) -> None:
-    topics = make_sampler('pvdf', config='', **SWING).read_s(1.0)
+def test_film_and_force_come_as_two_streams_in_their_units(open_rig: Make) -> None:
+    topics = open_rig('pvdf', config='', **SWING).read_s(1.0)
     film, force = topics['signal'], topics['signal_static']
     assert lost_samples(film) == lost_samples(force) == 0
     assert (film[0].sensor, film[0].units, film[0].sampling_rate_hz) == ('pvdf/film', ('pC',), 4096.0)
@@ -189,20 +176,20 @@ def host(tmp_path: Path, device: EmulatedTsf85) -> Iterator[Host]:
 
 
 def test_it_streams_from_start_to_stop_only(device: EmulatedTsf85, host: Host) -> None:
-    device.advance(TEN_MS, NO_IMAGE)
+    device.measure((TEN_MS, NO_IMAGE))
     assert host.read() == b''
     os.write(host.end, START)
-    device.advance(TEN_MS, NO_IMAGE)
+    device.measure((TEN_MS, NO_IMAGE))
     assert host.read().count(b'\x9a\x00\x58') == 10
     os.write(host.end, STOP)
-    device.advance(TEN_MS, NO_IMAGE)
+    device.measure((TEN_MS, NO_IMAGE))
     assert host.read() == b''
 
 
 def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, host: Host) -> None:
     os.write(host.end, START)
     for _ in range(200):
-        device.advance(TEN_MS, NO_IMAGE)
+        device.measure((TEN_MS, NO_IMAGE))
     assert device.dropped_bytes > 50_000
 
 

@@ -21,7 +21,6 @@ from texture_simulation.devices.ur import (
     RtdeSession,
     SafetyMode,
     ScriptCommand,
-    SpeedMove,
     UrControllerParams,
 )
 
@@ -29,11 +28,16 @@ SCRIPT = 'def rtde_control():\nend\n'
 
 
 @pytest.fixture
-def controller():
-    controller = EmulatedController(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
-    controller.upload(SCRIPT)
-    run(controller, 0.1)
-    return controller
+def served():
+    return EmulatedController(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
+
+
+@pytest.fixture
+def controller(served):
+    """Return a controller on which the control script runs."""
+    served.upload(SCRIPT)
+    run(served, 0.1)
+    return served
 
 
 def run(controller, seconds):
@@ -173,30 +177,12 @@ def pressing(newtons):
     )
 
 
-def vector(*values):
-    return np.array([*values, *[0.0] * (6 - len(values))])
-
-
 @pytest.mark.parametrize('stiffness', [500.0, 2000.0, 10000.0])
 def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
     robot = robot_over(stiffness_n_m=stiffness, start_height_m=0.002)
     robot.force_mode = pressing(2.0)
     go(robot, 2.0)
     assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
-
-
-def test_force_control_holds_while_the_finger_slides():
-    robot = robot_over(start_height_m=0.0)
-    robot.force_mode = pressing(2.0)
-    robot.motion = SpeedMove(vector(0.02), 1.0)
-    go(robot, 3.0)
-    assert robot.velocity[0] == pytest.approx(0.02)
-    assert robot.force[2] == pytest.approx(2.0, rel=0.01)
-
-
-@pytest.fixture
-def served():
-    return EmulatedController(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
 
 
 @pytest.fixture

@@ -59,11 +59,6 @@ class SkinContact:
         self._surface = surface
         self._drag = self._make_drag()
 
-    @property
-    def start_m(self) -> tuple[Array, Array]:
-        """Where on the sample a path begins that begins at (0, 0): x and y, (..., 1) each."""
-        return self._x_m, self._y_m
-
     def relocate(self) -> None:
         """Let the sample lie otherwise from now on: no two touches meet the same place, unless the sample varies."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._batch_shape, 1))

@@ -10,16 +10,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from texture_core.config import find, param
 from texture_core.types import DEVICES, NANOSECONDS, FingerReceiver, FingerState
-from texture_drivers import daq, pvdf
-from texture_drivers.biotac import LAYOUTS as BIOTACS
-from texture_drivers.tsf85 import LAYOUTS as TSF85S
-from texture_drivers.tsf85 import RATE_HZ
 from texture_simulation import sensor_models as models
 from texture_simulation.devices import fingers
 from texture_simulation.path import FingerTrack
@@ -40,17 +35,14 @@ class LiveSensor:
         self,
         model: models.SensorModel | models.JoinedFingers,
         device: fingers.EmulatedDevice,
-        send: Callable[[Any], None],
-        skip: Callable[[int], None],
-        pace: tuple[float, int],
+        kind: models.SensorKind,
     ) -> None:
         self.model = model
         self.device = device
         self.done = 0  # steps, those that were skipped among them
         self.skipped = 0
-        self._send = send
-        self._skip = skip
-        self._rate_hz, self._points = pace
+        self._points, self._points_hz = kind.step_points, kind.path_rate_hz
+        self._rate_hz = kind.path_rate_hz / kind.step_points
         self._track = FingerTrack()
         self._start_ns: int | None = None
 
@@ -65,17 +57,17 @@ class LiveSensor:
         skipped = max(0, due - round(LONGEST_BURST_S * self._rate_hz))
         if skipped:
             self.skipped += skipped
-            self._skip(skipped)
+            self.device.skip(skipped)
         self.done += due
         if due > skipped:
             self._slide(due - skipped, self._start_ns + round(self.done / self._rate_hz * NANOSECONDS))
 
     def _slide(self, steps: int, until_ns: int) -> None:
         was_touching = self._track.touching
-        path = self._track.advance(until_ns, self._points * steps, self._points * self._rate_hz)
+        path = self._track.advance(until_ns, self._points * steps, self._points_hz)
         if not was_touching and self._track.touching:
             self.model.touch.relocate()
-        self._send(self.model.advance(path))
+        self.device.measure(self.model.advance(path))
 
 
 # --------------------
@@ -84,74 +76,32 @@ class LiveSensor:
 
 # Makes a live sensor, not started: its first `advance` is the beginning of its time. From a scene, the surface that is
 # touched, the symbolic link that leads to the device, and all random numbers: positions, effects, noise.
-MakeLiveSensor = Callable[..., LiveSensor]
+MakeLiveSensor = Callable[[Scene, Surface, Path, np.random.Generator], LiveSensor]
+
+Model = models.SensorModel | models.JoinedFingers
 
 
-def live_tsf85(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator, layout: str) -> LiveSensor:
-    """Return a TSF-85 of which one finger touches."""
-    model = models.Tsf85Model(scene, surface, rng, layout=TSF85S[layout])
-    return _on_tsf85(model, link, rng)
-
-
-def live_tsf85_pair(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
-    """Return a TSF-85 of which both fingers touch."""
-    return _on_tsf85(models.tsf85_pair(scene, surface, rng), link, rng)
-
-
-def _on_tsf85(model: models.Tsf85Model | models.JoinedFingers, link: Path, rng: np.random.Generator) -> LiveSensor:
-    device = fingers.EmulatedTsf85(link, rng)
-    pace = RATE_HZ, models.TSF85_OVERSAMPLING
-    return LiveSensor(model, device, lambda measured: device.advance(*measured), device.skip, pace)
-
-
-def live_biotac(
-    scene: Scene, surface: Surface, link: Path, rng: np.random.Generator, *, hand: bool = False
-) -> LiveSensor:
-    """Return a BioTac alone on its board, or a board with BioTacs on three fingers: all are served with each frame."""
-    layout = BIOTACS['biotac']
-    pace = layout.frame_rate_hz, len(layout.slots)
-    if hand:
-        device = fingers.EmulatedBioTac(link, rng, models.SERIALS)
-        return LiveSensor(models.biotac_hand(scene, surface, rng, layout), device, device.advance, device.skip, pace)
-    device = fingers.EmulatedBioTac(link, rng)
-    model = models.BioTacModel(scene, surface, rng, layout=layout)
-    return LiveSensor(model, device, lambda counts: device.advance(counts[:, :, None]), device.skip, pace)
-
-
-def live_daq(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
-    """Return the finger of paper 3."""
-    model, device = models.DaqModel(scene, surface, rng), fingers.EmulatedDaq(link, rng)
-    pace = daq.RATE_HZ, 1
-    return LiveSensor(model, device, device.sample, lambda samples: device.skip(samples / daq.RATE_HZ), pace)
-
-
-def live_pvdf(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
-    """Return the finger of paper 5."""
-    model, device = models.PvdfModel(scene, surface, rng), fingers.EmulatedPvdf(link, rng)
-    pace = pvdf.FILM_RATE_HZ, 1
-
-    def skip(samples: int) -> None:
-        device.skip(samples / pvdf.FILM_RATE_HZ)
-
-    return LiveSensor(model, device, lambda both: device.sample(*both), skip, pace)
-
-
-def live_anyskin(scene: Scene, surface: Surface, link: Path, rng: np.random.Generator) -> LiveSensor:
-    """Return an AnySkin."""
-    model, device = models.AnySkinModel(scene, surface, rng), fingers.EmulatedAnySkin(link, rng)
-    pace = models.ANYSKIN_RATE_HZ, models.ANYSKIN_OVERSAMPLING
-    return LiveSensor(model, device, device.sample, device.skip, pace)
+def _live(
+    kind: str,
+    device: Callable[[Path, np.random.Generator], fingers.EmulatedDevice],
+    model: Callable[[Scene, Surface, np.random.Generator], Model] | None = None,
+) -> MakeLiveSensor:
+    """Return what makes a sensor of a kind on a device; without a model it is a finger alone."""
+    make = model or models.SENSORS[kind].make
+    return lambda scene, surface, link, rng: LiveSensor(
+        make(scene, surface, rng), device(link, rng), models.SENSORS[kind]
+    )
 
 
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
-    'tsf85': partial(live_tsf85, layout='tsf85'),
-    'tsf85_pair': live_tsf85_pair,
-    'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
-    'biotac': live_biotac,
-    'biotac_hand': partial(live_biotac, hand=True),
-    'daq': live_daq,
-    'pvdf': live_pvdf,
-    'anyskin': live_anyskin,
+    'tsf85': _live('tsf85', fingers.EmulatedTsf85),
+    'tsf85_pair': _live('tsf85', fingers.EmulatedTsf85, models.tsf85_pair),
+    'tsf85_3x4': _live('tsf85_3x4', fingers.EmulatedTsf85),
+    'biotac': _live('biotac', fingers.EmulatedBioTac, partial(models.biotac_hand, places=1)),
+    'biotac_hand': _live('biotac', partial(fingers.EmulatedBioTac, serials=models.SERIALS), models.biotac_hand),
+    'daq': _live('daq', fingers.EmulatedDaq),
+    'pvdf': _live('pvdf', fingers.EmulatedPvdf),
+    'anyskin': _live('anyskin', fingers.EmulatedAnySkin),
 }
 
 

@@ -675,9 +675,8 @@ def _join_pair(measured: Sequence[tuple[NDArray[np.int16], NDArray[np.uint16]]])
 SERIALS = ('BT-0', 'BT-1', 'BT-2')  # by place
 
 
-def biotac_hand(scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> JoinedFingers:
-    """Return three BioTacs on one board: they measure (n_frames, n_slots, n_places) counts."""
-    models = [
-        BioTacModel(scene.of_finger(place), surface, rng, layout=layout, finger=place) for place in range(len(SERIALS))
-    ]
+def biotac_hand(scene: Scene, surface: Surface, rng: np.random.Generator, places: int = len(SERIALS)) -> JoinedFingers:
+    """Return BioTacs on one board: they measure (n_frames, n_slots, n_places) counts."""
+    make = SENSORS['biotac'].make
+    models = [make(scene.of_finger(place), surface, rng, finger=place) for place in range(places)]
     return JoinedFingers(models, partial(np.stack, axis=-1))

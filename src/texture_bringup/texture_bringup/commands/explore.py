@@ -50,7 +50,7 @@ NUMBERS = (
 UNLIKE = 'it resembles none of the known textures'
 BAR = 24
 TIMEOUT_S = 300.0
-EXPLORER_S = 5.0  # within which an explorer that runs is discovered
+EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovered, at most and usually
 
 
 def _configure_explore(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +97,7 @@ def _explore(options: argparse.Namespace) -> int:
     requests, made, code = requests_of(options), 0, 0
     try:
         with Operator(options.namespace) as operator:
-            operator.wait_for_explorer(EXPLORER_S)
+            operator.wait_for_explorer(EXPLORER_S, SOON_S)
             while made < len(requests):
                 result = explored(operator, requests[made])
                 code = max(code, exit_code(result))
@@ -270,7 +270,7 @@ def _identify(options: argparse.Namespace) -> int:
         )
     belief, number = known.uniform_log_prior, 0
     with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(EXPLORER_S)
+        operator.wait_for_explorer(EXPLORER_S, SOON_S)
         while number < options.most and np.exp(belief.max()) < options.sure:
             number += 1
             motion, information = known.best_motion(belief, known.motions)
@@ -345,7 +345,7 @@ def _collect(options: argparse.Namespace) -> int:
         given |= dict(zip(names, getattr(options, option) or (), strict=False))
     params = parameters_from(options, CollectionParams, given)
     with Operator(options.namespace) as operator:
-        operator.wait_for_explorer(EXPLORER_S)
+        operator.wait_for_explorer(EXPLORER_S, SOON_S)
         end, bag = collect_surface(
             operator,
             options.surface,
@@ -415,7 +415,7 @@ def plate_request(options: argparse.Namespace, stored: Mapping[str, float]) -> E
 def slide_over_plate(bag: Path, request: ExplorationRequest, namespace: str, count: int) -> None:
     """Slide over the reference plate so many times, and record that into a bag; MotionAborted if a slide fails."""
     with Operator(namespace) as operator:
-        operator.wait_for_explorer(EXPLORER_S)
+        operator.wait_for_explorer(EXPLORER_S, SOON_S)
         with recorder(operator, bag, namespace):
             for _ in range(count):
                 explored = operator.explore(request)

@@ -23,8 +23,8 @@ from texture_core.errors import DeviceError, InvalidData, InvalidParameter, Text
 from texture_core.ros import declare, run, to_stamp
 from texture_core.types import NANOSECONDS
 from texture_recordings.bags import RawMessage, find_bags, read_named, short_name, topics_in
-from texture_recordings.dataset import find_slides
 from texture_recordings.ros import TOPICS
+from texture_recordings.slides import find_slides
 
 # --------------------
 # When each message of a recording is due in a replay.

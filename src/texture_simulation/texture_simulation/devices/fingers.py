@@ -254,6 +254,14 @@ class EmulatedDevice:
         """Begin clock and numbers again, as after a brown-out."""
         self._held_back = b''
 
+    def measure(self, measured: Any) -> None:
+        """Send what a model has measured."""
+        raise NotImplementedError
+
+    def skip(self, steps: int) -> None:
+        """Let time pass without sending."""
+        raise NotImplementedError
+
     def _disturbed(self, frames: Iterable[bytes]) -> bytes:
         """Return frames as they go out, some of them left out or sent twice."""
         if self.frame_faults == FrameFaults():
@@ -279,14 +287,14 @@ TEMPERATURE_C = 31.25
 
 
 class EmulatedAnySkin(EmulatedDevice):
-    """An emulated board: `sample` it at its pace; it sends from the moment it is plugged in. See `EmulatedDevice`."""
+    """An emulated board: it sends from the moment it is plugged in. See `EmulatedDevice`."""
 
-    def sample(self, field_ut: Array) -> None:
-        """Measure and send."""
+    def measure(self, measured: Array) -> None:
+        """Send the field, (n_samples, 15) µT."""
         # With the wrong firmware it is a board with fewer magnetometers.
-        self._send(self._disturbed(encode(field_ut[:, 3:] if self.wrong_firmware else field_ut)))
+        self._send(self._disturbed(encode(measured[:, 3:] if self.wrong_firmware else measured)))
 
-    def skip(self, frames: int) -> None:
+    def skip(self, steps: int) -> None:
         """Let time pass without sending: the board does not number its frames."""
 
 
@@ -307,7 +315,7 @@ WRONG_VERSION = 99
 
 
 class EmulatedBioTac(EmulatedDevice):
-    """An emulated bridge: `advance` it by the frames that have been sampled."""
+    """An emulated bridge: `measure` takes the frames that have been sampled."""
 
     def __init__(
         self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
@@ -323,14 +331,14 @@ class EmulatedBioTac(EmulatedDevice):
         super().reset()
         self._frames = 0
 
-    def skip(self, frames: int) -> None:
+    def skip(self, steps: int) -> None:
         """Let time pass without sending: frames are lost."""
-        self._frames += frames
+        self._frames += steps
 
-    def advance(self, values: Values) -> None:
-        """Sample some frames and send them."""
-        replies = self._disturb(encode_replies(values, self._absent))
-        self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True)))
+    def measure(self, measured: Values) -> None:
+        """Send frames, (n_frames, n_slots, n_places)."""
+        replies = self._disturb(encode_replies(measured, self._absent))
+        self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(measured, replies, strict=True)))
 
     def _sent(self, values: Values, reply: bytes) -> bytes:
         """Return the bytes that one frame becomes."""
@@ -387,10 +395,11 @@ class EmulatedSampler(EmulatedDevice):
             name: np.empty((0, stream.columns), dtype=np.int16) for name, stream in self._streams.items()
         }
 
-    def skip(self, duration_s: float) -> None:
-        """Let time pass without sending: whole frames are lost."""
+    def skip(self, steps: int) -> None:
+        """Let time pass, in samples of the first stream, without sending: whole frames are lost."""
+        first = next(iter(self._streams.values()))
         for name, stream in self._streams.items():
-            self._frames[name] += round(duration_s * stream.rate_hz / stream.rows)
+            self._frames[name] += round(steps / first.rate_hz * stream.rate_hz / stream.rows)
 
     def advance(self, samples: Mapping[str, Counts]) -> None:
         """Sample, and send what fills a frame."""
@@ -431,9 +440,9 @@ class EmulatedDaq(EmulatedSampler):
     ) -> None:
         super().__init__(link, rng, {'daq': STREAM._replace(rate_hz=rate_hz)}, start_us)
 
-    def sample(self, counts: Counts) -> None:
-        """Take samples, (n_samples, 8)."""
-        self.advance({'daq': counts})
+    def measure(self, measured: Counts) -> None:
+        """Send samples, (n_samples, 8)."""
+        self.advance({'daq': measured})
 
 
 # --------------------
@@ -449,8 +458,9 @@ class EmulatedPvdf(EmulatedSampler):
     def __init__(self, link: Path, rng: np.random.Generator, start_us: int = 0) -> None:
         super().__init__(link, rng, {'film': FILM, 'force': FORCE}, start_us)
 
-    def sample(self, film: Counts, force: Counts) -> None:
-        """Take samples, (n_film,) and (n_force,)."""
+    def measure(self, measured: tuple[Counts, Counts]) -> None:
+        """Send samples of the film, (n_film,), and of the force, (n_force,)."""
+        film, force = measured
         self.advance({'film': film[:, None], 'force': force[:, None]})
 
 
@@ -530,7 +540,7 @@ UNKNOWN_ITEM = b'\x80'  # no type that any firmware known sends
 
 
 class EmulatedTsf85(EmulatedDevice):
-    """An emulated sensor: `advance` it by the milliseconds that have passed."""
+    """An emulated sensor: `measure` takes the milliseconds that have passed."""
 
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
@@ -557,8 +567,9 @@ class EmulatedTsf85(EmulatedDevice):
         """Pull the plugs of fingers, or plug them in again, one flag a finger; the hub stays on its line."""
         self._encoder.plug(plugged)
 
-    def advance(self, dynamic: Counts, images: Image) -> None:
-        """Let as many milliseconds pass as there are dynamic values, and send them if started."""
+    def measure(self, measured: tuple[Counts, Image]) -> None:
+        """Let as many milliseconds pass as there are dynamic values, and send them and the newest image if started."""
+        dynamic, images = measured
         self._execute(self._port.read())
         if len(images):
             self._image, self._image_is_new = images[-1], True
@@ -568,9 +579,9 @@ class EmulatedTsf85(EmulatedDevice):
         self._send(data)
         self.skip(len(dynamic))
 
-    def skip(self, milliseconds: int) -> None:
-        """Let time pass of which nothing is sent."""
-        self._clock_ms += milliseconds
+    def skip(self, steps: int) -> None:
+        """Let milliseconds pass of which nothing is sent."""
+        self._clock_ms += steps
 
     def _sent(self, dynamic: Counts) -> bytes:
         packets = self._encoder.packets(self._clock_ms, dynamic, self._image, self._image_is_new)

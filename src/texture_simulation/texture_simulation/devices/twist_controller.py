@@ -40,6 +40,13 @@ class TouchedSurfaceParams(TouchParams):
 STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
 
 
+def approach(now: Array, wanted: Array, most: float) -> Array:
+    """Return a vector led towards a wanted one by at most so much."""
+    change = wanted - now
+    size = math.sqrt(float(change @ change))
+    return wanted if size <= most else now + change * (most / size)
+
+
 def touch_force_n(
     params: TouchedSurfaceParams, friction: float, axes: Array, from_origin_m: Array, velocity_m_s: Array
 ) -> Array:
@@ -204,9 +211,7 @@ class EmulatedTwistArm:
         speed = math.sqrt(float(wanted @ wanted))
         if speed > params.max_speed_m_s:
             wanted = wanted * (params.max_speed_m_s / speed)
-        change = wanted - self.velocity
-        size, most = math.sqrt(float(change @ change)), params.max_acceleration_m_s2 * dt_s
-        self.velocity = wanted if size <= most else self.velocity + change * (most / size)
+        self.velocity = approach(self.velocity, wanted, params.max_acceleration_m_s2 * dt_s)
         self.position = self.position + self.velocity * dt_s
 
     def _yielding(self) -> Array:

@@ -31,7 +31,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, TextureError
 from texture_core.types import Array, FingerSender, FingerState, loopback_address, rotation_matrix
 from texture_simulation.devices.rails import FingerPipeParams
-from texture_simulation.devices.twist_controller import TouchedSurfaceParams, touch_force_n
+from texture_simulation.devices.twist_controller import TouchedSurfaceParams, approach, touch_force_n
 
 # --------------------
 # Facts about UR controllers and about the control script of ur-rtde.
@@ -151,7 +151,7 @@ FRICTION = 0.5  # of the surface, until `emulate friction` sets another
 ADMITTANCE_M_S_N = 0.01
 LAG_S = 0.01
 HALT = 20.0  # deceleration of a protective stop, m/s²
-# The sensor drifts apart on all axes when it is not zeroed.
+# The sensor has an offset on all axes until it is zeroed.
 OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
 
 
@@ -165,9 +165,7 @@ class SpeedMove:
 
     def velocity(self, velocity: Array, step_s: float) -> Array:
         """Return the velocity of the next step, (6,)."""
-        change, most = self._wanted - velocity, self._acceleration * step_s
-        size = math.sqrt(change @ change)
-        led = self._wanted if size <= most else velocity + most / size * change
+        led = approach(velocity, self._wanted, self._acceleration * step_s)
         self.done = not led.any() and not self._wanted.any()
         return led
 
@@ -264,7 +262,7 @@ STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
 ENDED = object()
 MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
-# So the control script of ur-rtde says it; the client puts the number behind a comment.
+# As it stands in the control script of ur-rtde; the client puts the number behind a comment.
 FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
 Steps = Iterator[None]
 
@@ -384,7 +382,7 @@ class EmulatedController:
     # client has written 0 in between. A command that is overwritten within a cycle is lost, as on the real controller.
 
     def _control_script(self) -> Steps:
-        """Obey until told to end; one item per cycle."""
+        """Obey until the command to end; one item per cycle."""
         whole_in, real_in, whole_out, real_out = self.registers
         here = slice(self.first_register, None)
         registers = Registers(whole_in[here], real_in[here], whole_out[here], real_out[here])
@@ -735,7 +733,7 @@ class Server:
             self._listen(ip, DASHBOARD_PORT, partial(DashboardSession, controller, self._go_silent))
 
     def run(self, stopped: Callable[[], bool]) -> None:
-        """Serve until told to stop."""
+        """Serve until `stopped`."""
         step_ns = round(self._controller.step_s * 1e9)
         due_ns = time.monotonic_ns()
         while not stopped():
@@ -750,7 +748,7 @@ class Server:
             self._controller.tick()
             for connection, session in [] if silent else list(self._sessions.items()):
                 self._send(connection, session.package())
-            self._tell_emulator()
+            self._send_state()
 
     def _listen(self, ip: str, port: int, make_session: Callable[[], Session]) -> None:
         try:
@@ -803,7 +801,7 @@ class Server:
         self._sessions.pop(connection).close()
         connection.close()
 
-    def _tell_emulator(self) -> None:
+    def _send_state(self) -> None:
         robot = self._controller.robot
         x, y, z = (robot.pose[:3] - robot.origin).tolist()
         vx, vy, vz = robot.velocity[:3].tolist()
