@@ -79,7 +79,7 @@ SMALLEST = 1e-9  # features below it do not count in a digest
 
 
 @dataclass(frozen=True)
-class Source:
+class GoldenSlides:
     """Slides over a few surfaces: of a scene, or of a public data set where `data_set` names one."""
 
     recipes: tuple[str, ...]  # names; '*' stands for anything
@@ -94,7 +94,7 @@ def _plan(speed_m_s: float, force_n: float, slide_s: float, fingers: int = 1) ->
 
 
 SOURCES = {
-    'twelve_textures': Source(
+    'twelve_textures': GoldenSlides(
         (
             'any-place',
             'any-place-and-taxels',
@@ -107,54 +107,56 @@ SOURCES = {
         'twelve_textures',
         _plan(0.1, 2.0, 1.5),
     ),
-    'two fingers': Source(
+    'two fingers': GoldenSlides(
         ('two-fingers',),
         ('glass', 'brushed_metal', 'ridge_1mm', 'ridge_3mm'),
         'twelve_textures',
         _plan(0.1, 2.0, 1.5, 2),
     ),
-    'ets_linear': Source(
+    'ets_linear': GoldenSlides(
         ('ets-linear-*',), ('ridge_1', 'ridge_2a', 'ridge_2b', 'grid_1'), 'ets_linear', _plan(0.15, 2.0, 1.2)
     ),
-    'ets_circular': Source(
+    'ets_circular': GoldenSlides(
         ('ets-circular-*',), ('ridge_1', 'ridge_2', 'grid_2', 'circles'), 'ets_circular', _plan(0.15, 2.0, 1.2)
     ),
-    'ets_fine': Source(
+    'ets_fine': GoldenSlides(
         ('ets-fine-*',),
         ('sheet_metal', 'smooth_plastic', 'sheet_of_paper', 'cardboard_paper'),
         'ets_fine',
         _plan(0.15, 2.0, 1.5),
     ),
-    'jamali': Source(('jamali-*',), ('carpet_1', 'sponge_1', 'tile_1', 'vinyl_1'), 'jamali', _plan(0.05, 2.0, 2.2)),
-    'hu': Source(('hu-pca-*',), ('linen_1', 'linen_2', 'linen_3', 'linen_5'), 'hu', _plan(0.0255, 1.5, 3.2)),
-    'kaboli': Source(
+    'jamali': GoldenSlides(
+        ('jamali-*',), ('carpet_1', 'sponge_1', 'tile_1', 'vinyl_1'), 'jamali', _plan(0.05, 2.0, 2.2)
+    ),
+    'hu': GoldenSlides(('hu-pca-*',), ('linen_1', 'linen_2', 'linen_3', 'linen_5'), 'hu', _plan(0.0255, 1.5, 3.2)),
+    'kaboli': GoldenSlides(
         ('kaboli-em', 'kaboli-pa', 'kaboli-svm', 'vibration-and-taxels'),
         ('red_ball', 'rough_ball', 'orange', 'sponge_ball'),
         'kaboli',
         _plan(0.02, 0.7, 2.4),
     ),
-    'two kaboli fingers': Source(
+    'two kaboli fingers': GoldenSlides(
         ('kaboli-*-two-fingers',),
         ('red_ball', 'rough_ball', 'orange', 'sponge_ball'),
         'kaboli',
         _plan(0.02, 0.7, 2.4, 2),
     ),
-    'shapes': Source(
+    'shapes': GoldenSlides(
         ('kaboli-svm',), ('red_ball', 'rough_ball', 'orange', 'apple'), 'kaboli_shapes', _plan(0.02, 0.7, 2.4)
     ),
-    'oriented': Source(
+    'oriented': GoldenSlides(
         ('default',), ('ridges_x', 'ridges_y', 'ridges_left', 'cloth_even'), 'oriented', _plan(0.1, 2.0, 1.5)
     ),
-    'sticky': Source(
+    'sticky': GoldenSlides(
         ('friction-svm',), ('dry_glass', 'polished_plastic', 'lacquer', 'rubber'), 'sticky', _plan(0.1, 1.0, 1.5)
     ),
-    'roughness': Source(
+    'roughness': GoldenSlides(
         ('ets-roughness-*', 'roughness'),
         ('k_paper', 'a_composite_wood', 'b_grip_plastic', 'j_grip_plastic', 'e_sandpaper'),
         'roughness',
         _plan(0.15, 2.0, 1.5),
     ),
-    'biotac20': Source(
+    'biotac20': GoldenSlides(
         (
             'default',
             'peaks-naive-bayes',
@@ -166,7 +168,7 @@ SOURCES = {
         ('material02', 'material05', 'material09', 'material14'),
         data_set='biotac20',
     ),
-    'ntp21': Source(('any-speed',), ('texture01', 'texture05', 'texture13', 'texture24'), data_set='ntp21'),
+    'ntp21': GoldenSlides(('any-speed',), ('texture01', 'texture05', 'texture13', 'texture24'), data_set='ntp21'),
 }
 
 
@@ -227,7 +229,7 @@ def rows(only: str = '') -> dict[str, Any]:
     return found
 
 
-def available(source: Source) -> bool:
+def available(source: GoldenSlides) -> bool:
     """Return whether the slides of a source can be had here."""
     return not source.data_set or (DATA / source.data_set).is_dir()
 
@@ -246,11 +248,11 @@ def known_rows() -> set[str]:
     return {*stored, *filter(arm_available, ARMS), *of_recipes}
 
 
-def _recipes(source: Source) -> list[str]:
+def _recipes(source: GoldenSlides) -> list[str]:
     return [name for name in every_recipe() if any(fnmatch(name, wanted) for wanted in source.recipes)]
 
 
-def _bags(source: Source, folder: Path) -> list[Path]:
+def _bags(source: GoldenSlides, folder: Path) -> list[Path]:
     """Write the bags of a source; a second set along y lies in a folder of its own."""
     if source.data_set:
         command = ['texture', 'import', source.data_set, str(DATA), str(folder / 'x'), '--slides', '1-7']

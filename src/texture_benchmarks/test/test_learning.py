@@ -7,14 +7,20 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.learning import run_incremental
-from texture_benchmarks.next_motion import CHOICES, MOTIONS, explored, extracted, training
+from texture_benchmarks.learning import (
+    MOTIONS,
+    RECORDED,
+    SIMULATED,
+    known_from,
+    right_after_slides,
+    run_incremental,
+    simulated_slides,
+)
 from texture_benchmarks.scale import FeatureSpread
 from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
 from texture_features.feature_set import LabelledFeatures
-from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.ros
 
@@ -56,6 +62,9 @@ def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
     assert after_two['incremental']['slides'] > 0.7
     assert after_two['incremental']['windows'] > after_two['retrained']['windows'] - 0.1
     assert all(chart.is_file() for chart in result.charts)
+    chosen = result.numbers['chosen_motions']
+    assert chosen[SIMULATED]['informed'][-1] >= 0.6
+    assert all(0.25 < shares[-1] <= 1.0 for shares in chosen[RECORDED].values())  # chance is a quarter
 
 
 def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
@@ -63,40 +72,21 @@ def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
         run_benchmark('learning', BenchmarkOptions(tmp_path))
 
 
-@pytest.mark.benchmark
-def test_every_way_to_choose_is_evaluated_after_every_slide(tmp_path: Path) -> None:
-    result, written = run_benchmark('next_motion', BenchmarkOptions(tmp_path, quick=True))
-    accuracy = result.numbers['accuracy']
-    assert written.is_file()
-    assert all(drawn.is_file() for drawn in result.charts)
-    assert set(accuracy) == set(CHOICES)
-    assert all(len(shares) == 8 and 0.0 <= min(shares) <= max(shares) <= 1.0 for shares in accuracy.values())
-    assert accuracy['informed'][-1] >= 0.6
+def test_trials_are_recognised_once_a_motion_distinguishes_the_textures() -> None:
+    textures = ('cork', 'felt', 'wood')
+    motions = MOTIONS[:2]  # the second one tells nothing
+    values = np.random.default_rng(0).standard_normal((2, 3, 8, 2))
+    values[0, :, :, 0] += 100.0 * np.arange(3)[:, None]
+    known = known_from(motions, values, textures)
+    found = right_after_slides(known, motions, values, np.random.default_rng(0), 2)
+    assert found['informed'].tolist() == found['fixed order'].tolist() == [1.0, 1.0]
+    assert found['random'][0] < 1.0
 
 
-def test_trials_are_recognised_once_a_motion_reports_the_textures_apart() -> None:
-    scene, features, motions = load_scene('oriented'), load_recipe('default').feature_set, MOTIONS[:1]
-    values = np.zeros((1, len(scene.surfaces), 4, 2))
-    values[..., 0] = 100.0 * np.arange(len(scene.surfaces))[:, None]
-    values += np.random.default_rng(0).standard_normal(values.shape)
-    known = training(scene, motions, values)
-    for way in CHOICES.values():
-        choose = way(known, motions, np.random.default_rng(0))
-        trials = explored(list(scene.surfaces), known, motions, values, choose=choose, n_slides=2)
-        assert trials.right.shape == trials.probability.shape == (2 * len(scene.surfaces), 2)
-        assert trials.right.all()
-    one = extracted(scene, motions, 1, features, np.random.default_rng(0))
-    assert one.shape[:3] == (1, len(scene.surfaces), 1)
-    assert one == pytest.approx(extracted(scene, motions, 1, features, np.random.default_rng(0)))
-
-
-@pytest.mark.benchmark
-@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_touches_of_recorded_slides_are_chosen_in_every_way(tmp_path: Path) -> None:
-    result, _ = run_benchmark('next_motion_recorded', BenchmarkOptions(out=tmp_path, quick=True, data=DATA))
-    [found] = result.numbers.values()
-    assert set(found['accuracy']) == {'informed', 'fixed order, planned', 'random'}
-    assert all(0.25 < shares[-1] <= 1.0 for shares in found['accuracy'].values())  # chance is a quarter
+def test_simulated_slides_are_one_window_of_each_texture_with_each_motion() -> None:
+    one = simulated_slides(MOTIONS[:1], 1, np.random.default_rng(0))
+    assert one.shape[:3] == (1, 8, 1)
+    assert one == pytest.approx(simulated_slides(MOTIONS[:1], 1, np.random.default_rng(0)))
 
 
 recorded = pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')

@@ -13,12 +13,9 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
+
 from texture_benchmarks.ros.graph import Graph
-from texture_benchmarks.soak import Processes
-from texture_bringup.launcher import (
-    ChildLauncher,
-    find_launch_file,
-)
+from texture_bringup.launcher import ChildLauncher, find_launch_file
 from texture_core.ros import to_msg
 from texture_core.types import FeatureVector
 from texture_estimation.model import load_model
@@ -73,7 +70,8 @@ def times_to_be_ready_again(model, folder, kills):
         times_s = []
         for _ in range(kills):
             graph.spin(1.0)  # what is under way
-            os.kill(Processes(folder / 'log').update()['classifier'], signal.SIGKILL)
+            *_, pid = re.findall(r'\[launch\] classifier started \(process (\d+)\)', (folder / 'log').read_text())
+            os.kill(int(pid), signal.SIGKILL)
             began_s = time.monotonic()
             received.clear()
             graph.wait_until(answered, DEADLINE_S, 'estimates')

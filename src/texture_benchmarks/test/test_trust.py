@@ -8,65 +8,49 @@ import pytest
 
 from texture_benchmarks.study import BenchmarkOptions
 from texture_benchmarks.trust import (
-    RECIPES,
     ROWS,
-    SCENE,
-    TRAINED,
-    TRAINED_SLIDES,
     UNDISTURBED,
     VIBRATION,
-    DisturbanceSweep,
     Outcome,
-    at_other_speed,
     breakdown,
     breakdown_strengths,
     breakdowns,
     disturbed,
     ordered,
     run,
-    simulate,
 )
 from texture_core.types import ExplorationState, Phase, Rejection, TactileSignal, TextureEstimate
-from texture_estimation.acceptance import slides_needed
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
 from texture_recordings.slides import LabelledSlide
-from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.ros
 
 RATE_HZ = 1000.0
 
 
-def samples() -> np.ndarray:
-    return 5.0 + np.random.default_rng(0).normal(size=(3000, 2)) * [1.0, 20.0]
+def changed(row: str, strength: float, samples: np.ndarray) -> np.ndarray:
+    """Return the vibration of a slide under a disturbance."""
+    [run] = disturbed(batches(samples, RATE_HZ, 100), ROWS[row], strength, np.random.default_rng(1)).signals[VIBRATION]
+    return run.samples
 
 
-def changed(row: str, strength: float, of: np.ndarray | None = None) -> np.ndarray:
-    return ROWS[row].change(samples() if of is None else of, RATE_HZ, strength, np.random.default_rng(1))
+def test_strengths_are_in_the_units_that_the_rows_name() -> None:
+    samples = 5.0 + np.random.default_rng(0).normal(size=(3000, 1)) * 20.0
+    rms = samples.std()
+    assert (changed('white noise', 1.0, samples) - samples).std() == pytest.approx(rms, rel=0.1)
+    assert (changed('offset drift', 3.0, samples) - samples)[1000] == pytest.approx(3.0 * rms, rel=1e-3)
+    assert changed('gain', 0.5, samples) == pytest.approx(0.5 * samples)
+    assert (np.diff(changed('hidden losses', 0.5, samples), axis=0) == 0).mean() == pytest.approx(0.5, abs=0.1)
+    assert np.ptp(changed('clipped', 0.5, samples)) == pytest.approx(rms, rel=1e-3)
 
 
-def test_disturbances_do_what_they_say() -> None:
-    np.testing.assert_allclose((changed('white noise', 1.0) - samples()).std(axis=0), samples().std(axis=0), rtol=0.1)
-    np.testing.assert_allclose((changed('offset drift', 3.0) - samples())[1000], 3.0 * samples().std(axis=0))
-    np.testing.assert_allclose(changed('gain', 0.5), 0.5 * samples())
-    assert np.isnan(changed('lost samples', 0.1)).mean() == pytest.approx(0.1, abs=0.05)
-    assert (np.diff(changed('hidden losses', 0.5), axis=0) == 0).mean() == pytest.approx(0.5, abs=0.1)
-    assert len(changed('speed', 2.0)) == 1500
-    np.testing.assert_allclose(np.ptp(changed('clipped', 0.5), axis=0), samples().std(axis=0))
-
-
-def test_wear_halves_the_power_at_its_cut_off() -> None:
-    tone = np.sin(2 * np.pi * 20.0 * np.arange(5000) / RATE_HZ)[:, None]
-    worn = changed('wear', 20.0, tone)
-    assert worn[1000:].var() / tone.var() == pytest.approx(0.5, abs=0.05)
-
-
-def test_half_the_speed_halves_the_frequency() -> None:
-    tone = np.sin(2 * np.pi * 100.0 * np.arange(2000) / RATE_HZ)[:, None]
-    slower = at_other_speed(tone, 1.0, 0.5)
-    expected = np.sin(2 * np.pi * 50.0 * np.arange(4000) / RATE_HZ)
-    np.testing.assert_allclose(slower[100:-100, 0], expected[100:-100], atol=0.01)
+def test_wear_halves_the_power_at_its_cut_off_and_half_the_speed_the_frequency() -> None:
+    time_s = np.arange(4000)[:, None] / RATE_HZ
+    tone = np.sin(2 * np.pi * 100.0 * time_s)
+    assert changed('wear', 20.0, np.sin(2 * np.pi * 20.0 * time_s)).var() / tone.var() == pytest.approx(0.5, abs=0.05)
+    slower = changed('speed', 0.5, tone)
+    np.testing.assert_allclose(slower[100:-100], np.sin(2 * np.pi * 50.0 * time_s)[100:-100], atol=0.01)
 
 
 @pytest.mark.parametrize(
@@ -124,36 +108,22 @@ def test_a_loss_stays_a_loss() -> None:
     assert [(run.first_sample, len(run.samples)) for run in found] == [(0, 500), (600, 500)]
 
 
-@pytest.fixture(scope='module')
-def slide() -> LabelledSlide:
-    return simulate(TRAINED, 1, np.random.default_rng(0), conditions=True)[0]
-
-
-@pytest.fixture(params=ROWS)
-def row(request: pytest.FixtureRequest) -> DisturbanceSweep:
-    return ROWS[request.param]
-
-
-def vibration_of(item: LabelledSlide) -> np.ndarray:
-    return np.concatenate([batch.samples for batch in item.signals['signal']])
-
-
-def test_every_row_changes_the_samples_and_keeps_the_slide(row: DisturbanceSweep, slide: LabelledSlide) -> None:
+@pytest.mark.parametrize('name', ROWS)
+def test_every_row_changes_the_samples_and_keeps_the_slide(name: str) -> None:
+    before = np.random.default_rng(0).standard_normal((3000, 1)).astype(np.float32)
+    slide, row = batches(before, RATE_HZ, 100), ROWS[name]
     for strength in row.strengths:
-        # A short slide may lose nothing of one in a thousand, so some seeds are tried.
-        changed = [disturbed(slide, row, strength, np.random.default_rng(seed)) for seed in range(40)]
-        assert changed[0].name == slide.name
-        before = vibration_of(slide)
-        assert any(_differ(vibration_of(one), before) for one in changed)
+        found = disturbed(slide, row, strength, np.random.default_rng(0))
+        assert found.name == slide.name
+        assert not np.array_equal(found.signals[VIBRATION][0].samples, before)
 
 
-def _differ(own: np.ndarray, before: np.ndarray) -> bool:
-    return own.shape != before.shape or not np.array_equal(own, before, equal_nan=True)
-
-
-def test_the_same_other_finger_touches_all_slides(slide: LabelledSlide) -> None:
-    finger = ROWS['another finger']
-    one, other = (vibration_of(disturbed(slide, finger, 2.0, np.random.default_rng(seed))) for seed in (0, 1))
+def test_the_same_other_finger_touches_all_slides() -> None:
+    slide = batches(np.random.default_rng(0).standard_normal((1000, 1)), RATE_HZ, 100)
+    one, other = (
+        disturbed(slide, ROWS['another finger'], 2.0, np.random.default_rng(seed)).signals[VIBRATION][0].samples
+        for seed in (0, 1)
+    )
     np.testing.assert_array_equal(one, other)
 
 
@@ -180,8 +150,7 @@ def test_the_quick_form_on_simulated_slides_gives_figures_of_all_compared(tmp_pa
     result = run(BenchmarkOptions(out=tmp_path, quick=True))
     outcomes = result.numbers['default']['outcomes']
     assert 'simulated' in result.data
-    assert len(outcomes) == 1 + 8 + 3 + 2
-    assert len(result.numbers['SVC on log bands']['outcomes']) == 1 + 8 + 3
+    assert len(outcomes) == len(result.numbers['SVC on log bands']['outcomes']) == 1 + 8 + 4
     clean = outcomes[UNDISTURBED]
     assert clean['slides'] == 36
     assert clean['label_right'] > 18  # chance is 3
@@ -189,11 +158,3 @@ def test_the_quick_form_on_simulated_slides_gives_figures_of_all_compared(tmp_pa
         assert outcome['early_right'] + outcome['early_wrong'] <= outcome['slides']
         low, high = outcome['interval']
         assert low <= outcome['label_right'] / outcome['slides'] <= high
-    outside = result.numbers['rejected_as_outside_training']['default']
-    assert outside == {'undisturbed, simulated': 0.0, 'circle, simulated': 1.0}
-
-
-@pytest.mark.parametrize('name', RECIPES)
-def test_so_many_slides_are_simulated_that_each_recipe_may_be_certain(name: str) -> None:
-    slides = TRAINED_SLIDES * len(load_scene(SCENE).surfaces)
-    assert slides >= slides_needed(load_recipe(name).training.max_error_rate)

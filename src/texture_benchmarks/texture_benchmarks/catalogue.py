@@ -15,7 +15,6 @@ from texture_benchmarks import (
     latency,
     learning,
     motion,
-    next_motion,
     overview,
     papers,
     scale,
@@ -35,9 +34,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'papers': papers.run,  # the papers' recipes on recordings, at the same and at another place of a track
     'trust': trust.run,  # where recognition fails: how slides end under disturbances and over unknown materials
     'roughness': latency.run_roughness,  # from window to grade
-    'learning': learning.run,  # trained slide by slide against trained again on the same slides
-    'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
-    'next_motion_recorded': next_motion.run_recorded,  # the same among recorded speeds and forces
+    'learning': learning.run,  # textures added slide by slide, and slides needed with chosen motions
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
 }

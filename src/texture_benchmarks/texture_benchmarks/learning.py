@@ -1,12 +1,15 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A model trained more textures slide by slide against one trained again on the same recorded slides."""
+"""Textures added slide by slide against a training on the same slides, and slides needed with chosen motions."""
 
 from __future__ import annotations
 
+import itertools
+import math
 import tempfile
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,17 +17,25 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
-from texture_core.types import Array, TextureEstimate
+from texture_core.config import find
+from texture_core.types import Array, SlideMotion, TextureEstimate, Window
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental import IncrementalClassifier
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.model import TextureModel
+from texture_estimation.next_motion import NextTouchModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import training_examples
-from texture_features.feature_set import LabelledFeatures
+from texture_features.feature_set import FeatureSet, LabelledFeatures
+from texture_features.windows import CutWindow, WindowBatch
 from texture_recordings.dataset import SlideDataset
+from texture_recordings.slides import SlideSamples
+from texture_simulation.offline import simulate_slides
+from texture_simulation.path import SimulatedSlide
+from texture_simulation.scene import load_scene
+from texture_simulation.sensor_models import SENSORS
 
 
 @dataclass(frozen=True)
@@ -118,6 +129,133 @@ def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> Textu
     return final
 
 
+# --------------------
+# Slides needed to recognise a texture: with motions chosen for what they tell, in a fixed order, and at random.
+
+SIMULATED, RECORDED = 'simulated', 'recorded'
+SCENE, SLIDE_S = 'oriented', 0.5
+TOUCH_FEATURES = FeatureSet.from_mapping(
+    {'inputs': {'signal': {'features': [{'mean_log_bands': {'bands': 32}}, 'moments']}}}
+)
+MOTIONS = tuple(
+    SlideMotion('linear_slide', quarter * math.pi / 4, speed, force, SLIDE_S)
+    for force, speed, quarter in itertools.product((2.0, 1.0), (0.1, 0.05), range(4))
+)
+TRAINED_SLIDES, SLIDES, TRIALS, SEEDS = 20, 8, 20, 5  # TRAINED_SLIDES of each texture with each motion
+TOUCH_M, TOUCHES = 0.006, 4  # each texture of ntp21 has one slide of 52 to 60 mm with each speed and force
+
+
+def right_after_slides(
+    known: NextTouchModel, motions: Sequence[SlideMotion], values: Array, rng: np.random.Generator, n_slides: int
+) -> dict[str, Array]:
+    """Return the share of trials that are right after each slide, by the way in which motions are chosen.
+
+    `values` are features of slides (n_motions, n_textures, n_trials · n_slides, n_features), in the order of the known
+    textures. The fixed order is the one that is chosen most often.
+    """
+    chosen: list[SlideMotion] = []
+    ways: Mapping[str, Callable[[Array, int], SlideMotion]] = {
+        'informed': lambda posterior, _: known.best_motion(posterior, motions).motion,
+        'fixed order': lambda _, slide: Counter(chosen[slide::n_slides]).most_common(1)[0][0],
+        'random': lambda *_: motions[int(rng.integers(len(motions)))],
+    }
+    shares = {}
+    for name, choose in ways.items():
+        right = []
+        for truth, first in itertools.product(range(values.shape[1]), range(0, values.shape[2], n_slides)):
+            posterior = known.uniform_log_prior
+            for slide in range(n_slides):
+                motion = choose(posterior, slide)
+                chosen += [motion] * (name == 'informed')
+                posterior = known.update(posterior, motion, values[motions.index(motion), truth, first + slide])
+                right.append(int(posterior.argmax()) == truth)
+        shares[name] = np.reshape(right, (-1, n_slides)).mean(axis=0)
+    return shares
+
+
+def known_from(motions: Sequence[SlideMotion], values: Array, textures: Sequence[str]) -> NextTouchModel:
+    """Learn from features of slides, (n_motions, n_textures, n_slides, n_features)."""
+    n_motions, _, count, n_features = values.shape
+    return NextTouchModel.fit(
+        values.reshape(-1, n_features),
+        np.tile(np.repeat(textures, count), n_motions).tolist(),
+        np.repeat(np.array(motions, dtype=object), len(textures) * count).tolist(),
+    )
+
+
+def simulated_slides(motions: Sequence[SlideMotion], count: int, rng: np.random.Generator) -> Array:
+    """Return the features of slides of one window each, (n_motions, n_textures, count, n_features)."""
+    scene = load_scene(SCENE)
+    stream = find(SENSORS, scene.sensor, 'sensor model').fast
+    cells = []
+    for motion, surface in itertools.product(motions, sorted(scene.surfaces)):
+        speed, force = motion.speed_m_s, motion.force_n
+        samples = simulate_slides(
+            scene, surface, count, SimulatedSlide(speed, force, SLIDE_S, motion.direction_rad), rng
+        )
+        windows = [Window(own.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force) for own in samples]
+        events = [CutWindow(0, '', SLIDE_S, SLIDE_S, {'signal': window}, speed, force, '') for window in windows]
+        cells.append(np.stack([vector.values for vector in TOUCH_FEATURES.extract_many(events)]))
+    return np.stack(cells).reshape(len(motions), len(scene.surfaces), count, -1)
+
+
+def recorded_touches(slide: SlideSamples) -> Array:
+    """Return the features of the touches of a slide, means over the taxels, in the order of time."""
+    length = round(TOUCH_M / slide.speed_m_s * slide.rate_hz)
+    count = len(slide.samples) // length
+    batch = WindowBatch(slide.samples[: count * length].reshape(count, length, -1), slide.rate_hz)
+    [signal] = TOUCH_FEATURES.inputs
+    values: Array = np.concatenate([feature(batch) for _, feature in signal.features], axis=-1).mean(axis=1)
+    return values
+
+
+def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str, dict[str, list[float]]]:
+    """Return the share right after each slide, simulated and recorded, by the way in which motions are chosen."""
+    found: dict[str, list[dict[str, Array]]] = {SIMULATED: [], RECORDED: []}
+
+    # Simulated: other slides of the same textures and motions.
+    textures = sorted(load_scene(SCENE).surfaces)
+    motions, seeds, trials = (MOTIONS[:4], 1, 3) if options.quick else (MOTIONS, SEEDS, TRIALS)
+    for seed in range(seeds):
+        rng = np.random.default_rng([options.seed, seed])
+        known = known_from(motions, simulated_slides(motions, TRAINED_SLIDES, rng), textures)
+        tested = simulated_slides(motions, trials * SLIDES, rng)
+        found[SIMULATED].append(right_after_slides(known, motions, tested, rng, SLIDES))
+
+    # Recorded: every other touch of each slide is trained, and the others are drawn for the test.
+    slides = SlideDataset.from_bags(bags[:4] if options.quick else bags).samples('signal')
+    touches = {
+        (SlideMotion('linear_slide', 0.0, round(one.speed_m_s, 3), round(one.force_n, 2), 0.0), one.surface): (
+            recorded_touches(one)
+        )
+        for one in slides
+    }
+    recorded, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
+    for trained in (0, 1):
+        rng = np.random.default_rng([options.seed, trained])
+        own = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
+        known = NextTouchModel.fit(
+            np.concatenate([values for *_, values in own]),
+            [name for _, name, values in own for _ in values],
+            [motion for motion, _, values in own for _ in values],
+        )
+
+        def drawn(values: Array, rng: np.random.Generator = rng) -> Array:
+            few = len(values) < TOUCHES  # only then a touch comes again within a trial
+            return np.concatenate([values[rng.choice(len(values), TOUCHES, replace=few)] for _ in range(TRIALS)])
+
+        cells = [drawn(touches[cell][1 - trained :: 2]) for cell in itertools.product(recorded, surfaces)]
+        tested = np.stack(cells).reshape(len(recorded), len(surfaces), TRIALS * TOUCHES, -1)
+        found[RECORDED].append(right_after_slides(known, recorded, tested, rng, TOUCHES))
+    return {
+        source: {way: np.mean([one[way] for one in parts], axis=0).round(4).tolist() for way in parts[0]}
+        for source, parts in found.items()
+    }
+
+
+# --------------------
+# The study.
+
 RECIPE = 'default'
 TRAINED, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3
 QUICK_SLIDES, QUICK_TRAINED, QUICK_STAGES = '1-3,31-32', 3, (1, 2)
@@ -129,7 +267,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on 15 materials, add 5 more, test on later slides of all; several draws of the five.
 
     Share of test windows and of whole test slides (final estimate) that are right, mean over the draws; processor
-    time of adding a slide, stored on disk.
+    time of adding a slide, stored on disk. Chosen motions: share of trials in which the most probable texture is right
+    after each slide, of simulated slides of 0.5 s (scene oriented, 16 motions) and of recorded touches of 6 mm (ntp21,
+    16 speeds and forces, every other touch of each slide trained on), both described by mean_log_bands and moments.
     """
     recipe = load_recipe(RECIPE)
     if isinstance(recipe.learner, Mlp):
@@ -151,6 +291,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             )
             for number, draw in enumerate(draws)
         ]
+    with imported(options, 'ntp21') as bags:
+        chosen = chosen_motions(options, bags)
     return BenchmarkResult(
         name='learning',
         measured=run.__doc__,
@@ -159,7 +301,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         split=f'{len(runs)} draws of {len(draws[0])} new materials: trained on slides '
         f'1-{last_training} of the others, '
         f'trained slide by slide from slide 1 on, tested on the slides after {last_training} of all',
-        numbers=_numbers(runs, draws, stages),
+        numbers={**_numbers(runs, draws, stages), 'chosen_motions': chosen},
         charts=(_chart(runs, stages, len(draws[0]), options.out / 'learning.png'),),
     )
 

@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from texture_msgs import msg
 from texture_msgs.msg import ExplorationResult, ExplorationState
 
-from texture_core.ros import FEATURE_QOS, STATE_QOS, WaitingExecutor, to_msg
+from texture_core.ros import FEATURE_QOS, WaitingExecutor, to_msg
 from texture_core.ros_testing import LocalGraph
 from texture_core.types import FeatureVector
 from texture_estimation.acceptance import NEVER, Acceptance, Limits
@@ -177,14 +177,13 @@ def test_the_client_tells_every_rejection_by_its_code(graph, client, model, tmp_
     with World():
         windows = graph.peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         graph.until(lambda: windows.get_subscription_count() and classifier.count_subscribers('texture'))
-        ids = graph.listen(ExplorationState, 'exploration', STATE_QOS)
         for name, (centre, count, values, step) in SLIDES.items():
             path = models.get(name, model).save(tmp_path / name.replace(' ', '_'))
             [taken] = classifier.set_parameters([Parameter('model', value=str(path))])
             assert taken.successful, taken.reason
 
             def slide(centre=centre, count=count, values=values):
-                exploration_id = ids[-1].exploration_id
+                exploration_id = client.feedback.state.exploration_id
                 for k, row in enumerate(np.random.default_rng(1).normal(centre, size=(count, 2))):
                     given = {'feature_set': 'kind', **values}
                     windows.publish(to_msg(FeatureVector(k * 10**8, exploration_id, 0.5, 0.1, NAMES, row, **given)))

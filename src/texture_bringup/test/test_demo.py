@@ -103,7 +103,8 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
         _, said = demo.communicate(timeout=DEADLINE_S)
     assert demo.returncode == 130
     # A slow start has said what it waits for.
-    assert re.fullmatch(r'((waiting; so far|fit) [^\n]*\n)*texture: interrupted\n', said), said
+    shown = r'((waiting; so far|fit|read bags|compute features) [^\n]*\n)*'
+    assert re.fullmatch(rf'{shown}texture: interrupted\n', said), said
     assert 'Traceback' not in said
     assert len(pids) == 7
     assert not any(Path(f'/proc/{pid}').exists() for pid in pids)

@@ -81,7 +81,6 @@ def test_a_training_that_would_take_too_long_makes_fewer_steps(make_examples, mo
     )  # four slides of each: four folds, and all
 
 
-NAMES = ('signal/a', 'signal/b', 'signal/slide_onset')
 SLIDES, WINDOWS = 20, 6
 
 

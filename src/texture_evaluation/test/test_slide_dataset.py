@@ -172,13 +172,14 @@ def test_windows_over_distances_show_as_much_of_a_surface_at_every_speed() -> No
     way_m = [np.linspace(0.0, 0.06, count)[:, None] for count in (301, 61)]  # at 20 and at 100 mm/s
     dataset = SlideDataset.from_arrays({'signal': way_m}, ['cork', 'felt'], {'signal': 100.0}, speed_m_s=[0.02, 0.1])
     features = FeatureSet.from_mapping({'inputs': {'signal': {'features': ['mean']}}})
-    found = dataset.features_over_distances(features, [0.02, 0.5], hop_m=0.01)
+    found = dataset.features(features, distances_m=[0.02, 0.5]).resized
     assert found is not None
     slow, fast = (found.X[found.labels == label][:, 0] for label in ('cork', 'felt'))
-    np.testing.assert_allclose(slow, [0.01, 0.02, 0.03, 0.04, 0.05, 0.03], atol=1e-3)  # the last shows the whole slide
+    starts = np.arange(0.0, 0.041, 0.02 / 4)
+    np.testing.assert_allclose(slow, [*(starts + 0.01), 0.03], atol=1e-3)  # the last shows the whole slide
     np.testing.assert_allclose(fast, slow, atol=2e-3)
     unknown = SlideDataset.from_arrays({'signal': way_m}, ['cork', 'felt'], {'signal': 100.0})
-    assert unknown.features_over_distances(features, [0.02], hop_m=0.01) is None
+    assert unknown.features(features, distances_m=[0.02]).resized is None
 
 
 BAG_FEATURES = FeatureSet.load('vibration-and-taxels')

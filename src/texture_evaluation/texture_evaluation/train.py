@@ -20,8 +20,6 @@ from texture_recordings.bags import find_bags
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 
-HOPS = 4  # windows of the least distance overlap so often
-
 
 def train_from_bags(
     recipe: str,
@@ -88,11 +86,8 @@ def train_grades_from_bags(
 def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
     windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-    examples = dataset.features(windows, recipe.augmentation)
     distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
-    if not distances_m:
-        return examples
-    return replace(examples, resized=dataset.features_over_distances(windows, distances_m, distances_m[0] / HOPS))
+    return dataset.features(windows, recipe.augmentation, distances_m)
 
 
 def slide_digest(slide: LabelledSlide) -> str:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.types import Window
+from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_features.augmentation import (
     KINDS,
     NOISE,
@@ -24,7 +24,7 @@ from texture_features.augmentation import (
     smooth_response,
 )
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow, SlideEnd
+from texture_features.windows import cut_recording
 
 RATE_HZ, TONE_HZ = 2000.0, 100.0
 FEATURES = FeatureSet.from_mapping(
@@ -35,30 +35,24 @@ FEATURES = FeatureSet.from_mapping(
 )
 
 
-def cut(params, slide_s=3.0, tone_hz=TONE_HZ):
-    """Return the windows of a slide with a tone and some noise."""
+def slide(slide_s=3.0, tone_hz=TONE_HZ):
+    """Return the signals and states of a slide with a tone and some noise."""
     rng = np.random.default_rng(5)
     time_s = np.arange(round(slide_s * RATE_HZ)) / RATE_HZ
     samples = (np.sin(2 * np.pi * tone_hz * time_s) + 0.1 * rng.standard_normal(len(time_s)))[:, None]
-    length, hop = round(params.length_s * RATE_HZ), round(params.hop_s * RATE_HZ)
-    starts = range(0, len(samples) - length + 1, hop)
-    windows = [
-        CutWindow(
-            start_ns=round(1e9 * start / RATE_HZ),
-            exploration_id='e',
-            length_s=params.length_s,
-            hop_s=params.hop_s,
-            windows={'signal': Window(samples[start : start + length], RATE_HZ, ('x',))},
-        )
-        for start in starts
-    ]
-    return [*windows, SlideEnd(round(1e9 * slide_s), 'e', params.hop_s)]
+    state = ExplorationState(0, 'e', 'linear_slide', Phase.SLIDE, steady_s=slide_s, surface='cork')
+    return {'signal': [TactileSignal(0, 'x', ('x',), (), RATE_HZ, 0, samples.astype(np.float32))]}, [state]
+
+
+def cut():
+    """Return the windows of the slide and its end."""
+    return list(cut_recording(*slide(), FEATURES.windows))
 
 
 def augmented(**params):
     augmenter = Augmenter(FEATURES, Augmentation(**{'copies': 2, **params}))
     for name in ('cork/1', 'cork/2'):
-        augmenter.add(name, cut(FEATURES.windows), cut)
+        augmenter.add(name, cut(), *slide())
     return augmenter.result()
 
 
@@ -67,7 +61,7 @@ def one_input(samples, vibration=True):
 
 
 def test_the_gain_response_of_a_log_power_is_two_and_that_of_a_shape_is_none() -> None:
-    [vector] = FEATURES.extract_many(cut(FEATURES.windows)[:1])
+    [vector] = FEATURES.extract_many(cut()[:1])
     response = dict(zip(vector.names, augmented().gain_response, strict=True))
     bands = [value for name, value in response.items() if 'mean_log_bands' in name]
     assert bands == pytest.approx([2.0] * 8, abs=1e-6)
@@ -95,7 +89,7 @@ def test_copies_are_of_the_slides_they_are_named_after_and_repeatable() -> None:
 
 def test_copies_without_any_range_are_the_slide_itself() -> None:
     same = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0)
-    values = np.stack([vector.values for vector in FEATURES.extract_many(cut(FEATURES.windows)[:-1])])
+    values = np.stack([vector.values for vector in FEATURES.extract_many(cut()[:-1])])
     own = same.copies.values[same.copies.groups == 'cork/1']
     np.testing.assert_allclose(own, values[: len(own)], rtol=1e-5, atol=1e-5)
     assert len(own) >= len(values) - 1

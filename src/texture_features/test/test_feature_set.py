@@ -104,7 +104,7 @@ def test_recipes_are_found_by_name_and_by_path(tmp_path):
         ({'inputs': {'signal': ['hjorth']}}, "list under 'features'"),
         ({'inputs': {'signal': {'features': [], 'rate': 3}}}, "list under 'features'"),
         ({'inputs': {'signal': {'features': ['hjort']}}}, "did you mean 'hjorth'"),
-        ({'inputs': {'signal': {'features': [{'hjorth': {'flor': 1}}]}}}, "did you mean 'floor'"),
+        ({'inputs': {'signal': {'features': [{'log_variance': {'flor': 1}}]}}}, "did you mean 'floor'"),
         ({'inputs': {'signal': {'features': [{'log_bands': {'bands': 1}}]}}}, '2 to 512'),
         ({'inputs': {'signal': {'features': ['hjorth', 'hjorth']}}}, 'twice'),
         ({'inputs': {'signal': {'features': ['hjorth']}}, 'windows': {'length_s': 0}}, 'at least|0.005 to'),

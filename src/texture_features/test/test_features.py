@@ -79,7 +79,6 @@ SCALING = {
     'speed': SAME,
     'force': SAME,
     'friction': SAME,
-    'slide_onset': SAME,
 }
 
 
@@ -253,13 +252,6 @@ def test_without_a_speed_there_is_no_value(feature) -> None:
     assert np.isnan(feature(row_windows(wave(0.15), np.nan))).all()
 
 
-@pytest.mark.parametrize('feature', [SpatialBandPower, SpatialVariation, PacinianPower])
-def test_hertz_takes_the_force_out(feature) -> None:
-    light = value(feature(force_exponent=2 / 3), row_windows(wave(0.15), force_n=1.0))
-    firm = value(feature(force_exponent=2 / 3), row_windows(8 ** (1 / 3) * wave(0.15), force_n=8.0))
-    assert light == pytest.approx(firm, abs=1e-9)
-
-
 def test_waves_the_wrong_way_round_are_refused() -> None:
     with pytest.raises(InvalidParameter, match='must be longer'):
         SpatialBandPower(longest_m=1e-4)
@@ -329,16 +321,16 @@ def test_a_harder_touch_leaves_the_normalised_bands_and_no_offset_counts(name):
 
 def test_shape_has_its_closed_forms():
     ramp = np.arange(8.0)[:, None]
-    level, log_variance, rise, absolute, above, skewness = FEATURES['mean_statistics'](floor=1e-12)(
+    level, log_variance, rise, absolute, above, skewness = FEATURES['mean_statistics']()(
         WindowBatch(-ramp, SPATIAL_RATE_HZ)
     )[0]
-    assert (level, log_variance) == (pytest.approx(-3.5), pytest.approx(np.log(5.25)))
+    assert (level, log_variance) == (pytest.approx(-3.5), pytest.approx(np.log(5.25), abs=1e-4))
     assert (rise, absolute, above) == (pytest.approx(-6.0), pytest.approx(6.0), pytest.approx(0.5))
     assert skewness == pytest.approx(0.0, abs=1e-9)
 
 
 def test_shares_keep_the_sign_and_leave_the_noise_of_free_taxels_out():
-    shares = FEATURES['log_shares'](floor=0.01)
+    shares = FEATURES['log_shares']()
     calm, noisy = (
         shares(WindowBatch(np.tile([60.0, -40.0, free], (20, 1)), SPATIAL_RATE_HZ))[:, 0] for free in (0.1, -0.1)
     )

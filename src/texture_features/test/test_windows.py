@@ -173,16 +173,6 @@ def test_speed_and_force_are_means_over_the_window():
     assert window.force_n == pytest.approx(2.0)
 
 
-def test_a_window_says_how_long_after_the_start_of_its_slide_it_begins():
-    params = dataclasses.replace(PARAMS, skip_s=0.25)
-    windows = [
-        event
-        for event in run({'signal': stream(2.0)}, [state(0.0, steady_s=2.0)], params)
-        if isinstance(event, CutWindow)
-    ]
-    assert [window.elapsed_s for window in windows[:2]] == [0.25, 0.25 + params.hop_s]
-
-
 def test_the_next_exploration_ends_one_that_was_never_ended():
     states = [state(0.0, steady_s=0.5), state(1.0, steady_s=0.5, name='e2'), state(1.5, Phase.DONE, name='e2')]
     events = run({'signal': stream(2.0)}, states)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, resample_poly
 
 from texture_core.config import param
-from texture_core.types import NANOSECONDS, Array
+from texture_core.types import NANOSECONDS, Array, ExplorationState, TactileSignal
 from texture_features.feature_set import CHUNK, MOTION, AugmentedFeatures, FeatureCopies, FeatureSet
-from texture_features.windows import CutWindow, WindowBatch, WindowEvent, WindowParams
+from texture_features.windows import CutWindow, WindowBatch, WindowEvent, WindowParams, cut_recording
 
 # --------------------
 # How training examples are augmented.
@@ -226,7 +226,7 @@ KINDS = tuple(DISTURBANCES)
 GAIN_STEP = 1.25  # ratio of the two gains at which the response of the features is measured
 NOISE = 'noise'
 PROBABILITY = 0.5  # of a change of speed, and of noise, in a copy
-Cut = Callable[[WindowParams], Sequence[WindowEvent]]
+Cut = Callable[[WindowParams], Iterable[WindowEvent]]
 Batches = Mapping[str, SlideWindows]
 Copy = tuple[NDArray[np.float32], str, int, str]  # values (n_windows, n_features), slide, number, kind
 
@@ -243,8 +243,19 @@ class Augmenter:
         self._disturbed: list[Copy] = []
         self._responses: list[Array] = []
 
-    def add(self, name: str, events: Sequence[WindowEvent], cut: Cut) -> None:
-        """Add the copies of a slide."""
+    def add(
+        self,
+        name: str,
+        events: Sequence[WindowEvent],
+        signals: Mapping[str, Sequence[TactileSignal]],
+        states: Sequence[ExplorationState],
+    ) -> None:
+        """Add the copies of a slide, of which the windows are cut already."""
+
+        def cut(params: WindowParams) -> Iterable[WindowEvent]:
+            used = {topic: signals[topic] for topic in self._features.topics}
+            return cut_recording(used, states, params, self._features.window_names)
+
         rng = np.random.default_rng([self._seed, self._slides])
         self._slides += 1
         windows = [event for event in events if isinstance(event, CutWindow)]

@@ -69,7 +69,6 @@ FEATURES: Mapping[str, type[Feature]] = {
     'speed': temporal.Speed,
     'force': temporal.Force,
     'friction': temporal.Friction,  # Roberge et al., future work
-    'slide_onset': temporal.SlideOnset,
 }
 
 
@@ -127,8 +126,8 @@ CHUNK = 64
 InputLayout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of each input
 
 
-MOTION = ('speed_m_s', 'force_n', 'tangential_force_n', 'elapsed_s')  # of a window, whatever its input
-MOTION_FEATURES = (temporal.Speed, temporal.Force, temporal.Friction, temporal.SlideOnset)
+MOTION = ('speed_m_s', 'force_n', 'tangential_force_n')  # of a window, whatever its input
+MOTION_FEATURES = (temporal.Speed, temporal.Force, temporal.Friction)
 JOINT = '+'  # between the topics of a joint input
 AGAIN = '#'  # between a topic and the name of a further description of it
 RAW, SUBTRACTED = 'raw', 'tared'

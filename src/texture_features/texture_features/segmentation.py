@@ -18,7 +18,8 @@ from texture_features.windows import SampleBuffer
 
 CELL_S = 0.005  # in which the power is computed
 SMOOTHED_CELLS, SMOOTHED_PERCENTILE = 11, 70  # rest and sliding are distinguished over 55 ms; a knock lasts less
-SMOOTH_ORDER = 3  # what follows a cubic over `smooth_s` is the load, not vibration
+SMOOTH_S, SMOOTH_ORDER = 0.05, 3  # what follows a cubic over 50 ms is the load, not vibration
+LEAST_S = 0.15  # a shorter slide is none
 MAX_GAP_S = 0.06  # below the threshold, and still part of one slide; from the touch to the slide it takes longer
 # The quietest tenth of the means of 55 ms, of which half are at rest, ends at 0.8 of the mean of rest.
 REST_QUANTILE, REST_OVER_QUANTILE = 0.1, 1.25
@@ -37,18 +38,8 @@ class SegmentationParams:
     off: float = param(
         3.0, 'Stop threshold: power over baseline power below which sliding ends (hysteresis).', low=1.0, high=1e6
     )
-    min_duration_s: float = param(
-        0.15, 'Shortest slide that is reported; shorter ones are discarded.', unit='s', low=0.0, high=60.0
-    )
     ramp_s: float = param(
         0.2, 'Acceleration and deceleration time of the robot: left out at both ends.', unit='s', low=0.0, high=10.0
-    )
-    smooth_s: float = param(
-        0.05,
-        'Time constant of the high-pass filter that removes the load; slow slides need a longer one.',
-        unit='s',
-        low=0.01,
-        high=1.0,
     )
     noise_rms: float = param(
         0.0,
@@ -57,14 +48,14 @@ class SegmentationParams:
     )
 
 
-def cell_power(samples: Samples, rate_hz: float, smooth_s: float) -> Array:
+def cell_power(samples: Samples, rate_hz: float) -> Array:
     """Return the power of the vibration in cells of 5 ms, (n_cells, n_channels); what is not finite has none."""
     if samples.ndim != 2 or not rate_hz > 0:
         raise InvalidData(
             f'sliding is looked for in samples of shape {samples.shape} at {rate_hz} Hz; (n_samples, n_channels) at a '
             'rate above 0 is needed'
         )
-    width, smoothed = max(1, round(CELL_S * rate_hz)), max(2 * round(0.5 * smooth_s * rate_hz) + 1, SMOOTH_ORDER + 2)
+    width, smoothed = max(1, round(CELL_S * rate_hz)), max(2 * round(0.5 * SMOOTH_S * rate_hz) + 1, SMOOTH_ORDER + 2)
     known = np.isfinite(samples)
     vibration = np.where(known, samples, 0.0)
     vibration -= np.where(known, vibration, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
@@ -92,7 +83,7 @@ def find_sliding(
     A finger at rest gives the sensor's noise, a sliding one vibration that grows with its speed: it slides where the
     mean power over that of rest passes `on` and stays above `off`, and at steady speed one ramp from both ends.
     """
-    power = cell_power(samples, rate_hz, params.smooth_s)
+    power = cell_power(samples, rate_hz)
     if len(power) < SMOOTHED_CELLS:
         return []
     rest = rest_power(power) if rest is None else rest
@@ -116,7 +107,7 @@ def find_sliding(
         )
         for first, last in runs
     ]
-    return [(start_s, end_s) for start_s, end_s in found if end_s - start_s >= params.min_duration_s]
+    return [(start_s, end_s) for start_s, end_s in found if end_s - start_s >= LEAST_S]
 
 
 def segment_recording(
@@ -136,7 +127,7 @@ def segment_recording(
     # A channel is as quiet as in its quietest run: one may hold little rest.
     rests: dict[int, Array] = {}
     for run, samples in zip(runs, whole, strict=True):
-        if len(power := cell_power(samples, run.rate_hz, params.smooth_s)):
+        if len(power := cell_power(samples, run.rate_hz)):
             known = rests.get(power.shape[1], rest_power(power))
             rests[power.shape[1]] = np.minimum(known, rest_power(power))
     states: list[ExplorationState] = []
@@ -144,7 +135,7 @@ def segment_recording(
         for interval in find_sliding(samples, run.rate_hz, params, rests.get(samples.shape[1])):
             start_ns, end_ns = (run.time_of(run.first_sample + at_s * run.rate_hz) for at_s in interval)
             start_ns = max(start_ns, states[-1].stamp_ns if states else 0)  # a sensor that starts again may be early
-            if end_ns - start_ns < params.min_duration_s * NANOSECONDS:
+            if end_ns - start_ns < LEAST_S * NANOSECONDS:
                 continue
             name = f'{exploration_id}/{len(states) // 2 + 1:03d}'
             steady_s = (end_ns - start_ns) / NANOSECONDS

@@ -44,8 +44,6 @@ class WindowBatch:
         Mean speed and normal force in each window; NaN if unknown.
     tangential_force_n : (...)
         Mean force of the surface against the direction of travel; NaN if unknown.
-    elapsed_s : (...)
-        From the start of the slide to that of each window; infinite if unknown.
     joined
         The same stretches of time of other inputs, for features that join several; of the same leading axes.
     channels
@@ -64,7 +62,6 @@ class WindowBatch:
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
     joined: tuple[WindowBatch, ...] = ()
     channels: tuple[str, ...] = ()
-    elapsed_s: Array = field(default_factory=lambda: np.array(np.inf))
     tangential_force_n: Array = field(default_factory=lambda: np.array(np.nan))
     _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
@@ -148,8 +145,11 @@ class Feature(Protocol):
         """Return the values; finite for finite samples."""
 
 
-def floor_param(added: str = 'Power', unit: str = 'unit²', default: float = 1e-20) -> Any:
-    """Return the parameter `floor` of a feature that is a logarithm."""
+FLOOR = 1e-20  # power or power density added before a logarithm: silence gives a finite value
+
+
+def floor_param(added: str = 'Power', unit: str = 'unit²', default: float = FLOOR) -> Any:
+    """Return the parameter `floor` of a feature whose noise depends on the sensor."""
     sentence = f'{added} added before the logarithm, so that silence gives a finite value, {unit}.'
     return param(default, sentence, low=1e-300, high=1e300)
 
@@ -603,7 +603,6 @@ class CutWindow:
     motion: str = ''
     direction_rad: float = math.nan
     tangential_force_n: float = math.nan
-    elapsed_s: float = math.inf  # from the start of the slide to that of the window; infinite where nobody says
 
 
 @dataclass(frozen=True)
@@ -796,7 +795,6 @@ class WindowCutter:
             motion=slide.motion,
             direction_rad=span.direction_rad,
             tangential_force_n=span.tangential_force_n,
-            elapsed_s=(span.start_ns - slide.start_ns) / NANOSECONDS,
         )
 
     def _skip(self, slide: SlideCoverage, count: int) -> None:

@@ -70,10 +70,6 @@ class MeanHjorth:
     per_channel: ClassVar[bool] = False
 
     log_activity: bool = param(True, 'Averages the logarithm of the activity instead of the activity itself.')
-    floor: float = param(
-        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
-    )
-
     omit: str = param(
         '', "Which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
     )
@@ -85,7 +81,7 @@ class MeanHjorth:
 
     @property
     def _per_channel(self) -> Hjorth:
-        return Hjorth(self.log_activity, self.floor)
+        return Hjorth(self.log_activity)
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the means."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +26,7 @@ from texture_core.types import (
     Window,
 )
 from texture_features.feature_set import LabelledFeatures
-from texture_features.windows import CutWindow, WindowEvent, WindowParams, cut_recording
+from texture_features.windows import CutWindow, WindowEvent, cut_recording
 from texture_recordings.bags import is_bag, short_name, topics_in
 from texture_recordings.slides import (
     STREAMS,
@@ -50,6 +49,7 @@ if TYPE_CHECKING:
 # --------------------
 # Labelled slides with their signals: read once from bags, or given as arrays.
 
+HOPS = 4  # windows of the least distance overlap so often
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
 # Speeds and forces that differ by less are one condition: an arm does not keep to what it was asked for.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
@@ -371,7 +371,9 @@ class SlideDataset:
         for slide, events in self.windows(feature_set):
             yield slide, _described(slide, feature_set, events)
 
-    def features(self, feature_set: FeatureSet, augmentation: Augmentation | None = None) -> LabelledFeatures:
+    def features(
+        self, feature_set: FeatureSet, augmentation: Augmentation | None = None, distances_m: Sequence[float] = ()
+    ) -> LabelledFeatures:
         """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
 
         Parameters
@@ -380,6 +382,9 @@ class SlideDataset:
             Windows, inputs and features.
         augmentation
             Changes of copies of the slides, for training; with None or without copies there are none.
+        distances_m
+            How far the finger slides in further windows, m, which show so much of a surface, or the whole of a shorter
+            slide, of slides whose speed is known and that lost no samples; () for none.
 
         Returns
         -------
@@ -398,22 +403,31 @@ class SlideDataset:
             from texture_features.augmentation import Augmenter  # noqa: PLC0415  # needs scipy
 
             augmenter = Augmenter(feature_set, augmentation)
+        # One pass over the slides: windows, copies, and windows of other lengths.
         vectors: list[FeatureVector] = []
+        resized: list[FeatureVector] = []
         for slide, events in self.windows(feature_set):
             vectors += _described(slide, feature_set, events)
+            resized += feature_set.extract_many(_windows_over(slide, feature_set, distances_m))
             if augmenter is not None:
-                augmenter.add(slide.name, events, partial(_cut_by, slide, feature_set))
+                augmenter.add(slide.name, events, slide.signals, slide.states)
         if not vectors:
             raise no_window(self, feature_set)
-        features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
+        surfaces = {slide.name: slide.surface for slide in self.slides}
+        features = LabelledFeatures.from_vectors(vectors, surfaces)
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
         slides = {slide.name: slide for slide in self.slides}
         conditions = {
             name: replace(made, session=slides[name].session, place=slides[name].place)
             for name, made in features.conditions.items()
         }
-        augmented = augmenter.result() if augmenter is not None else None
-        return replace(features, motions=motions, conditions=conditions, augmented=augmented)
+        return replace(
+            features,
+            motions=motions,
+            conditions=conditions,
+            augmented=augmenter.result() if augmenter is not None else None,
+            resized=LabelledFeatures.from_vectors(resized, surfaces) if resized else None,
+        )
 
     def tare_faults(self, feature_set: FeatureSet) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round, as the node warns.
@@ -426,32 +440,6 @@ class SlideDataset:
             tared = {topic: batch.tared for topic, batch in batches.items() if batch.sensor not in ('', topic)}
             faults.update(dict.fromkeys(feature_set.tare_faults(tared)))
         return list(faults)
-
-    def features_over_distances(
-        self, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float
-    ) -> LabelledFeatures | None:
-        """Return features of windows that show so much of a surface, or the whole of a shorter slide.
-
-        Parameters
-        ----------
-        feature_set
-            Inputs and features; its windows have no effect.
-        distances_m
-            How far the finger slides in a window, m.
-        hop_m
-            Way between the starts of two windows, m.
-
-        Returns
-        -------
-        LabelledFeatures or None
-            Of the slides whose speed is known and that lost no samples; None if there are none.
-        """
-        events = [event for slide in self.slides for event in _windows_over(slide, feature_set, distances_m, hop_m)]
-        if not events:
-            return None
-        return LabelledFeatures.from_vectors(
-            feature_set.extract_many(events), {slide.name: slide.surface for slide in self.slides}
-        )
 
     def samples(self, topic: str) -> list[SlideSamples]:
         """Return the samples of one topic of each slide without gaps, with speed, force and direction.
@@ -501,20 +489,18 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
     return list(cut_recording(used, slide.states, feature_set.windows, feature_set.window_names))
 
 
-def _windows_over(
-    slide: LabelledSlide, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float
-) -> Iterator[CutWindow]:
-    """Yield windows of a slide at a known speed without gaps, of each distance."""
-    if not slide.speed_m_s > 0.0:
+def _windows_over(slide: LabelledSlide, feature_set: FeatureSet, distances_m: Sequence[float]) -> Iterator[CutWindow]:
+    """Yield windows of a slide at a known speed without gaps, of each distance; the least one overlaps four times."""
+    if not distances_m or not slide.speed_m_s > 0.0:
         return
     try:
         inputs = {topic: SlideSamples.of(slide, topic) for topic in feature_set.topics}
     except InvalidData:
         return
     slid_s = min(len(samples.samples) / samples.rate_hz for samples in inputs.values())
-    windows = feature_set.windows
+    windows, hop_s = feature_set.windows, distances_m[0] / HOPS / slide.speed_m_s
     for length_s in sorted({min(distance_m / slide.speed_m_s, slid_s) for distance_m in distances_m}):
-        for start_s in np.arange(0.0, slid_s - length_s + 1e-9, hop_m / slide.speed_m_s).tolist():
+        for start_s in np.arange(0.0, slid_s - length_s + 1e-9, hop_s).tolist():
             cut = {topic: _stretch(samples, start_s, length_s) for topic, samples in inputs.items()}
             if all(np.isfinite(window.samples).all() for window in cut.values()):
                 start_ns = slide.start_ns + round(start_s * NANOSECONDS)
@@ -533,10 +519,6 @@ def _described(slide: LabelledSlide, feature_set: FeatureSet, events: Sequence[W
     """Return the feature vectors of the windows of a slide under its name; not its end."""
     vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
     return [replace(vector, exploration_id=slide.name) for vector in vectors]
-
-
-def _cut_by(slide: LabelledSlide, feature_set: FeatureSet, windows: WindowParams) -> list[WindowEvent]:
-    return cut_slide(slide, replace(feature_set, windows=windows, _layouts={}))
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:

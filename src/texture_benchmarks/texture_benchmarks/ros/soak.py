@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Run the nodes for hours: explore, inject faults, listen to everything."""
+"""Explore again and again while faults befall nodes and robot: what must hold, and what was seen.
+
+All nodes of a tactile finger on an emulated arm behind ROS controllers run as processes. Each fault comes in turn, and
+after it, unless it succeeded all the same, explorations without one until one does.
+"""
 
 from __future__ import annotations
 
@@ -8,32 +12,28 @@ import math
 import os
 import re
 import signal
-import socket
 import tempfile
 import threading
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TwistStamped, WrenchStamped
-from rcl_interfaces.msg import Log
 from rclpy.executors import ExternalShutdownException
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
-from texture_benchmarks import soak
-from texture_benchmarks.ros.graph import Graph, GraphT
+from texture_benchmarks.ros.graph import Graph
+from texture_benchmarks.study import BenchmarkResult
 from texture_bringup.demo import free_domain, isolated
-from texture_bringup.launcher import ChildLauncher
 from texture_bringup.operator import Operator
-from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted, TextureError
+from texture_core.errors import LaunchFailed, TextureError
 from texture_core.ros import ESTIMATE_QOS, FEATURE_QOS, to_ns
 from texture_core.ros_testing import NodeProcess
 from texture_core.types import NANOSECONDS, ExplorationRequest, ExplorationState, Phase
@@ -41,511 +41,379 @@ from texture_evaluation.train import train_from_bags
 from texture_simulation.offline import SlidePlan, write_simulated
 from texture_simulation.scene import load_scene
 
+# --------------------
+# What befalls an exploration, and the nodes that it befalls.
 
-class Listener(Graph):
-    """Take part in a graph in a thread of its own, from `with` to the end of the block."""
 
-    def __init__(self, domain_id: int) -> None:
+class Fault(NamedTuple):
+    """What befalls an exploration once the finger slides; 'start' befalls the arm before it is connected."""
+
+    action: str = ''  # 'start' or 'set' with parameters, 'ask' for something, 'freeze', 'kill', 'stop', 'command'
+    node: str = ''
+    given: Mapping[str, Any] = {}
+    hold_s: float = 0.0
+    obeys: bool = True  # whether the arm does what the explorer commands, and the explorer can command
+
+
+NONE = 'none'
+FAULTS: Mapping[str, Fault] = {
+    'sensor unplugged': Fault('set', 'emulator', {'plugged': False}, 2.0),
+    'bytes corrupted': Fault('set', 'emulator', {'bit_flips': 2e-3}, 3.0),
+    'emulator frozen': Fault('freeze', 'emulator', hold_s=2.0),
+    'sensor killed': Fault('kill', 'sensor'),
+    'feature extractor killed': Fault('kill', 'feature_extractor'),
+    'classifier killed': Fault('kill', 'classifier'),
+    'stopped by the operator': Fault('stop'),
+    'impossible speed': Fault('ask', given={'speed_m_s': 9.0}),
+    'wall of 20 kN/m in the slide': Fault('start', given={'wall_m': 0.02}),
+    'velocities inverted': Fault('start', given={'invert_twist': True}, obeys=False),
+    'force inverted': Fault('start', given={'invert_force': True}),
+    'force 0.5 s late': Fault('start', given={'force_delay_s': 0.5}),
+    'force 0.5 s late with new stamps': Fault('start', given={'force_delay_s': 0.5, 'stamp_when_sent': True}),
+    'explorer paused for 0.5 s': Fault('freeze', 'explorer', hold_s=0.5),
+    'explorer stopped for 3 s': Fault('freeze', 'explorer', hold_s=3.0),
+    'explorer killed': Fault('kill', 'explorer', obeys=False),
+    'guard stopped for 3 s': Fault('freeze', 'guard', hold_s=3.0),
+    'guard killed': Fault('kill', 'guard'),
+    'second commander': Fault('command', hold_s=1.0),
+}
+HEALTHY = {'plugged': True, 'bit_flips': 0.0}
+HARMLESS = {'wall_m': 2.0, 'invert_twist': False, 'invert_force': False, 'force_delay_s': 0.0, 'stamp_when_sent': False}
+SCENE = 'twelve_textures'
+SLIDE = {'speed_m_s': 0.05, 'force_n': 3.0, 'distance_m': 0.06, 'use_start': True}
+GUARD = 'texture_exploration.ros.guard'
+PACKAGES = {
+    'emulator': 'texture_simulation',
+    'sensor': 'texture_drivers',
+    'twist_controller': 'texture_simulation',
+    'feature_extractor': 'texture_features',
+    'classifier': 'texture_estimation',
+    'explorer': 'texture_exploration',
+}
+# Patient with a busy machine; what comes 0.5 s late is too late all the same.
+PATIENT = {
+    'connect_timeout_s': 10.0,
+    'deadman_s': 0.4,
+    'state_timeout_s': 1.0,
+    'approach_timeout_s': 60.0,
+    'signal_timeout_s': 1.0,
+}
+PATCH = {'patch_x_low_m': -0.02, 'patch_x_high_m': 0.1, 'patch_y_low_m': -0.05, 'patch_y_high_m': 0.05}
+EMULATED = {'accept_no_timeout': True, 'accept_shared_group': True, 'approach_stiffness_n_m': 2e4}
+COUNTERS = {'sensor': 'lost', 'feature_extractor': 'lost_samples', 'classifier': 'lost_vectors'}
+ANSWERS_S, RESPAWN_S, SETTLED_S, POLL_S = 120.0, 0.2, 1.0, 0.05
+ATTEMPTS = 3  # a busy machine may abort before the slide, or slide too slowly for a success
+HUNG_S, BACK_S, LIMIT_N, ABOVE_S, FREE_N, GROWTH, LOOKS = 60.0, 60.0, 10.0, 0.1, 0.2, 0.01, 50
+
+# --------------------
+# What is recorded, and what must hold.
+
+SUCCESS, ABORTED, REFUSED, LOST = ENDINGS = 'success', 'aborted', 'refused', 'lost'
+NUMBERS = re.compile(r'-?\d[\w.:-]*')  # they differ where sentences are alike
+
+
+class FaultTrial(NamedTuple):
+    """One exploration, what befell it, and the true force on the finger meanwhile."""
+
+    fault: str
+    happened: bool  # what comes in the slide does not come without one
+    ending: str
+    message: str
+    took_s: float = 0.0
+    back_s: float = 0.0  # until all nodes report and samples arrive again; NaN if not in time
+    peak_n: float = 0.0
+    above_s: float = 0.0  # longest time without a break above the limit
+    left_n: float = 0.0  # once it is over and the arm obeys
+    silent: int = 0  # feature vectors without an estimate
+
+
+def longest_above_s(forces: Sequence[tuple[float, float]]) -> float:
+    """Return how long a force was above the limit without a break, of times and forces."""
+    longest_s, since_s = 0.0, math.nan
+    for time_s, force_n in forces:
+        since_s = math.nan if force_n <= LIMIT_N else time_s if math.isnan(since_s) else since_s
+        longest_s = max(longest_s, time_s - since_s)  # NaN is no more than anything
+    return longest_s
+
+
+def check(trials: Sequence[FaultTrial], counts: Mapping[str, int], memory: Sequence[Sequence[int]]) -> dict[str, Any]:
+    """Return what is required of a run: what was seen, and whether it holds."""
+    calm = [one.ending == SUCCESS for one in trials if one.fault == NONE]
+    blocked = sum(not any(calm[i : i + ATTEMPTS]) for i in range(len(calm) - ATTEMPTS + 1))
+    missing = {one.fault for one in trials} - {one.fault for one in trials if one.happened}
+    nameless = sum(one.ending != SUCCESS and not one.message for one in trials)
+    slowest_s, late = max(one.took_s for one in trials), sum(math.isnan(one.back_s) for one in trials)
+    longest, pressed = max(trials, key=lambda one: one.above_s), max(trials, key=lambda one: one.left_n)
+    lost, counted = counts['lost'], max(counts['sensor lost'], counts['feature_extractor lost_samples'])
+    # A classifier that is killed may have been at a vector.
+    silent = sum(one.silent for one in trials if one.fault != 'classifier killed')
+    lost_vectors = counts['classifier lost_vectors']
+    old = [(sizes, len(sizes) // 3) for sizes in memory if len(sizes) >= LOOKS]
+    grown = max((float(np.median(sizes[-n:]) / np.median(sizes[n : 2 * n]) - 1) for sizes, n in old), default=0.0)
+    found = {
+        'every fault comes': (f'not: {", ".join(sorted(missing)) or "none"}', not missing),
+        f'every exploration ends in {HUNG_S:g} s': (f'the longest took {slowest_s:.1f} s', slowest_s < HUNG_S),
+        'every exploration succeeds or ends by name': (f'{nameless} without', not nameless),
+        f'without a fault one of {ATTEMPTS} succeeds': (f'{sum(calm)} of {len(calm)} did', not blocked),
+        f'all nodes report and samples flow in {BACK_S:g} s': (f'{late} times not', not late),
+        f'no force is above {LIMIT_N:g} N for more than {ABOVE_S:g} s': (
+            f'longest {1e3 * longest.above_s:.0f} ms, {longest.peak_n:.0f} N, {longest.fault}',
+            longest.above_s <= ABOVE_S,
+        ),
+        'no finger stays pressed where the arm obeys': (
+            f'most {pressed.left_n:.2f} N, {pressed.fault}',
+            pressed.left_n <= FREE_N,
+        ),
+        'no node ends by itself': (f'{counts["ended"]} did', not counts['ended']),
+        'every lost sample is counted': (f'{lost} of {counts["samples"]}, {counted} counted', lost <= counted),
+        'every vector is answered or counted': (f'{silent} not, {lost_vectors} counted', silent <= lost_vectors),
+        'memory grows less than 1 %': (f'{grown:+.2%}, {len(old)} processes lived long enough', grown < GROWTH),
+    }
+    return {asked: {'seen': seen, 'holds': holds} for asked, (seen, holds) in found.items()}
+
+
+def figures(trials: Sequence[FaultTrial]) -> dict[str, Any]:
+    """Return how explorations ended under one fault."""
+    return {
+        'explorations': len(trials),
+        **{ending: sum(one.ending == ending for one in trials) for ending in ENDINGS},
+        'back_s': max(one.back_s for one in trials),
+        'peak_n': max(one.peak_n for one in trials),
+        'above_ms': 1e3 * max(one.above_s for one in trials),
+        'left_n': max(one.left_n for one in trials),
+        'messages': sorted({NUMBERS.sub('…', one.message) for one in trials}),
+    }
+
+
+# --------------------
+# The run.
+
+
+class Rig(Graph):
+    """All nodes as processes, an operator who explores with them, and what befalls them; use it in a `with` block."""
+
+    def __init__(self, domain_id: int, given: Mapping[str, Mapping[str, Any]]) -> None:
         super().__init__(domain_id, 'watcher')
-        self._thread = threading.Thread(target=self._spin, name='watcher', daemon=True)
-
-    def __enter__(self: GraphT) -> GraphT:
+        self._domain_id, self._given, self._nodes = domain_id, given, dict[str, NodeProcess]()
+        self._operator, self._other = Operator(domain_id=domain_id), Operator(domain_id=domain_id)
+        self.counts, self._newest, self._received_s = Counter[str](), dict[str, int](), dict[str, float]()
+        self.memory: defaultdict[int, list[int]] = defaultdict(list)  # pages of each process, after each exploration
+        self._forces: list[tuple[float, float]] = []
+        self._vectors, self._estimates = Counter[str](), Counter[str]()  # by exploration
+        listen = self.node.create_subscription
+        # Deep: what this listener loses must not look as if the driver had lost it.
+        deep = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
+        listen(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
+        listen(msg.TactileSignal, 'signal', self._on_signal, deep)
+        listen(msg.FeatureVector, 'features', lambda one: self._vectors.update([one.exploration_id]), FEATURE_QOS)
+        listen(msg.TextureEstimate, 'texture', lambda one: self._estimates.update([one.exploration_id]), ESTIMATE_QOS)
+        listen(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
+        self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
-        return self
 
     def __exit__(self, *_: object) -> None:
+        for name in reversed(self._nodes):  # the explorer first, which lifts the finger
+            self._nodes[name].stop()
+        for operator in (self._operator, self._other):
+            operator.__exit__(None, None, None)
         self._context.try_shutdown()
         self._thread.join()
         super().__exit__()
 
-    def _spin(self) -> None:
+    def _listen(self) -> None:
         with suppress(ExternalShutdownException):
             self._executor.spin()
-
-
-COUNTED = re.compile(r'\d+')
-LEVELS = {Log.WARN: 'WARN', Log.ERROR: 'ERROR', Log.FATAL: 'FATAL'}
-# Deep: what this listener loses must not look as if the driver had lost it.
-SIGNAL_QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
-LOG_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-class Watcher(Listener):
-    """Keep books about the nodes of one domain, in a thread of its own; use it in a `with` block."""
-
-    def __init__(self, domain_id: int) -> None:
-        self.signal = soak.SampleAccount()
-        self.vectors: Counter[str] = Counter()  # by exploration, as their estimates
-        self.estimates: Counter[str] = Counter()
-        self.totals: defaultdict[str, soak.Totals] = defaultdict(soak.Totals)
-        self.said: Counter[tuple[str, str, str]] = Counter()
-        self.received_s: dict[str, float] = {}
-        super().__init__(domain_id)
-        node = self.node
-        node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
-        node.create_subscription(Log, '/rosout', self._on_log, LOG_QOS)
-        node.create_subscription(msg.TactileSignal, 'signal', self._on_signal, SIGNAL_QOS)
-        node.create_subscription(msg.FeatureVector, 'features', self._on_vector, FEATURE_QOS)
-        node.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         for status in array.status:
             node = status.name.rpartition('/')[2]
-            counters = soak.COUNTERS.get(node, ())
-            self.totals[node].update({item.key: int(item.value) for item in status.values if item.key in counters})
-            self.received_s[node] = time.monotonic()
-
-    def _on_log(self, log: Log) -> None:
-        if log.level in LEVELS:
-            self.said[log.name, LEVELS[log.level], COUNTED.sub('…', log.msg)] += 1
+            self._received_s[node] = time.monotonic()
+            for item in status.values:
+                if item.key == COUNTERS.get(node):  # one that falls has begun again
+                    name, value = f'{node} {item.key}', int(item.value)
+                    before = self._newest.get(name, 0)
+                    self.counts[name] += value - before if value >= before else value
+                    self._newest[name] = value
 
     def _on_signal(self, batch: msg.TactileSignal) -> None:
         count = len(batch.samples) // max(1, len(batch.channels))
-        self.signal.update(batch.first_sample, count, to_ns(batch.header.stamp), batch.sampling_rate_hz)
-        self.received_s['signal'] = time.monotonic()
+        self.counts['samples'] += count
+        # An index that falls is of another life of the driver.
+        self.counts['lost'] += max(0, batch.first_sample - self._newest.get('sample', batch.first_sample))
+        self._newest['sample'] = batch.first_sample + count
+        self._received_s['signal'] = time.monotonic()
 
-    def _on_vector(self, vector: msg.FeatureVector) -> None:
-        self.vectors[vector.exploration_id] += 1
+    def _on_wrench(self, wrench: WrenchStamped) -> None:
+        force = wrench.wrench.force
+        self._forces.append((to_ns(wrench.header.stamp) / NANOSECONDS, math.hypot(force.x, force.y, force.z)))
 
-    def _on_estimate(self, estimate: msg.TextureEstimate) -> None:
-        self.estimates[estimate.exploration_id] += 1
+    def start(self, name: str, more: Mapping[str, Any] = {}) -> None:
+        """Start a node, again if it runs; wait until an explorer answers, whom nobody hears while it connects."""
+        if name in self._nodes:
+            self._nodes[name].stop()
+        given = {**self._given[name], **more}
+        node = self._nodes[name] = NodeProcess(PACKAGES[name], name, given, domain_id=self._domain_id)
+        node.__enter__()
+        deadline_s = time.monotonic() + ANSWERS_S
+        while name == 'explorer' and time.monotonic() < deadline_s:
+            with suppress(LaunchFailed):  # an answer to one whom it has not discovered yet is lost
+                self._operator.stop()
+                return
+        if name == 'explorer':
+            raise LaunchFailed(f'the explorer does not answer within {ANSWERS_S:g} s: {node.output}')
 
+    def run(self, name: str, surface: str) -> FaultTrial:
+        """Explore a surface with a fault, put right what it left, and wait until all works again."""
+        fault = FAULTS.get(name, Fault())
+        self._other.set_parameters('emulator', {'surface': surface})
+        if fault.action == 'start':
+            self._nodes['explorer'].stop()
+            self.start('twist_controller', fault.given)  # with its finger where all began
+            self.start('explorer')
+        self._forces, silent, began_s = [], self._silent(), time.monotonic()
+        explored = self._explore(fault, surface)
+        took_s = time.monotonic() - began_s
+        time.sleep(SETTLED_S)
+        forces = self._forces
+        left_n = forces[-1][1]
+        # As an operator does after a fault: put the arm right, and lift the finger by another explorer.
+        if fault.action == 'start' or not fault.obeys:
+            self._other.set_parameters('twist_controller', HARMLESS)
+            self.start('explorer')
+            self._other.call('explorer/lift', 'start the explorer')
+            time.sleep(SETTLED_S)
+            left_n = left_n if fault.obeys else self._forces[-1][1]
+        for node in self._nodes.values():
+            self.counts['ended'] += node.process.poll() is not None
+            with suppress(OSError):
+                pages = int(Path(f'/proc/{node.process.pid}/statm').read_text(encoding='ascii').split()[1])
+                self.memory[node.process.pid].append(pages)
+        back_s, peak_n = self._back(time.monotonic()), max(force for _, force in forces)
+        more = self._silent() - silent
+        return FaultTrial(name, *explored, took_s, back_s, peak_n, longest_above_s(forces), left_n, more)
 
-NODES = ('emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier')
-BACK_DEADLINE_S = 60.0
-POLL_S = 0.05
+    def _silent(self) -> int:
+        return sum((self._vectors - self._estimates).values())
 
+    def _explore(self, fault: Fault, surface: str) -> tuple[bool, str, str]:
+        """Explore; return whether the fault came, how the exploration ended, and why."""
+        in_slide, acting = fault.action not in ('', 'start', 'ask'), list[threading.Thread]()
 
-class FaultInjector:
-    """Inject faults in a thread of its own; use it in a `with` block."""
+        def on_progress(state: ExplorationState, _texture: Any) -> None:
+            if state.phase is Phase.SLIDE and in_slide and not acting:
+                acting.append(threading.Thread(target=self._act, args=(fault,)))
+                acting[0].start()
 
-    def __init__(
-        self, planned: Iterable[soak.PlannedFault], operator: Operator, processes: soak.Processes, watcher: Watcher
-    ) -> None:
-        self.fault_events: list[soak.FaultEvent] = []
-        self.error: Exception | None = None
-        self._planned_faults = planned
-        self._operator = operator
-        self._processes = processes
-        self._watcher = watcher
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='fault_injector', daemon=True)
-
-    def __enter__(self) -> FaultInjector:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    @property
-    def over(self) -> bool:
-        """Whether there are no more faults to come."""
-        return not self._thread.is_alive()
-
-    def _run(self) -> None:
+        given = {**SLIDE, **(fault.given if fault.action == 'ask' else {})}
         try:
-            for planned_fault in self._planned_faults:
-                if self._stop.wait(planned_fault.quiet_s):
-                    return
-                self._inject(planned_fault)
-        except Exception as error:  # stands in the report, which is written in any case
-            self.error = error
+            answer = self._operator.explore(ExplorationRequest('linear_slide', surface=surface, **given), on_progress)
+            ending = SUCCESS if answer.success else ABORTED if answer.exploration_id else REFUSED
+            message = answer.message
+        except TextureError as error:
+            ending, message = LOST, str(error)
+        for thread in acting:
+            thread.join()
+        return bool(acting) or not in_slide, ending, message
 
-    def _inject(self, planned: soak.PlannedFault) -> None:
-        begin_s = time.monotonic()
-        self.fault_events.append(soak.FaultEvent(planned.name, begin_s, math.inf, math.inf, ''))
-        detail = self._act(planned, *soak.FAULTS[planned.name][:2])
-        end_s = time.monotonic()
-        self.fault_events[-1] = soak.FaultEvent(planned.name, begin_s, end_s, math.inf, detail)
-        self.fault_events[-1] = soak.FaultEvent(planned.name, begin_s, end_s, self._back(end_s), detail)
-
-    def _act(self, planned: soak.PlannedFault, action: str, node: str) -> str:
-        """Inject a fault, and take back what does not heal by itself; return its strength in words."""
-        if action in ('unplug', 'corrupt'):
-            name, bad, good = ('plugged', False, True) if action == 'unplug' else ('bit_flips', planned.strength, 0.0)
-            self._operator.set_parameters('emulator', {name: bad})
-            self._stop.wait(planned.hold_s)
-            self._operator.set_parameters('emulator', {name: good})
-            return f'{name} {bad:g} for {planned.hold_s:.1f} s'
-        pid = self._processes.update().get(node)
-        if pid is None:
-            raise LaunchFailed(f"node '{node}' does not run any more")
-        if action == 'kill':
-            os.kill(pid, signal.SIGKILL)
-            return f'process {pid}'
-        os.kill(pid, signal.SIGSTOP)
-        try:
-            self._stop.wait(planned.hold_s)
-        finally:
+    def _act(self, fault: Fault) -> None:
+        if fault.action == 'stop':
+            self._other.stop()
+        elif fault.action == 'set':
+            self._other.set_parameters(fault.node, fault.given)
+            time.sleep(fault.hold_s)
+            self._other.set_parameters(fault.node, HEALTHY)
+        elif fault.action == 'command':
+            self._command(time.monotonic() + fault.hold_s)
+        elif fault.action == 'freeze':
+            pid = self._pid(fault.node)
+            os.kill(pid, signal.SIGSTOP)
+            time.sleep(fault.hold_s)
             os.kill(pid, signal.SIGCONT)
-        return f'for {planned.hold_s:.1f} s'
+        else:
+            os.kill(self._pid(fault.node), signal.SIGKILL)
+            if fault.node in COUNTERS:  # what moves a robot, no launch file starts again
+                time.sleep(RESPAWN_S)
+                self.start(fault.node)
+
+    def _pid(self, node: str) -> int:
+        """Return the process of a node, or of the guard that the explorer has started."""
+        if node != 'guard':
+            return self._nodes[node].process.pid
+        threads = Path(f'/proc/{self._nodes["explorer"].process.pid}/task').glob('*/children')
+        pids = [int(pid) for thread in threads for pid in thread.read_text(encoding='ascii').split()]
+        return next(pid for pid in pids if GUARD in Path(f'/proc/{pid}/cmdline').read_text(errors='replace'))
+
+    def _command(self, end_s: float) -> None:
+        """Command the arm, too, along the surface."""
+        publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
+        twist = TwistStamped()
+        twist.header.frame_id, twist.twist.linear.y = 'base', 0.01
+        while time.monotonic() < end_s:
+            twist.header.stamp = self.node.get_clock().now().to_msg()
+            publisher.publish(twist)
+            time.sleep(POLL_S)
+        self.node.destroy_publisher(publisher)
 
     def _back(self, since_s: float) -> float:
-        """Return when all nodes report again and samples arrive: NaN if not in time, inf if the run ends before."""
-        awaited = (*NODES, 'signal')
-        while time.monotonic() < since_s + BACK_DEADLINE_S:
-            if self._stop.is_set():
-                return math.inf
-            running = self._processes.update()
-            if all(name in running for name in NODES):
-                received_s = [self._watcher.received_s.get(name, 0.0) for name in awaited]
-                if min(received_s) > since_s:
-                    return max(received_s)
+        """Return the time until all nodes have reported and samples have arrived again; NaN if not in time."""
+        while time.monotonic() < since_s + BACK_S:
+            received_s = [self._received_s.get(name, 0.0) for name in (*PACKAGES, 'signal')]
+            if min(received_s) > since_s:
+                return max(received_s) - since_s
             time.sleep(POLL_S)
         return math.nan
 
 
-SAMPLE_PERIOD_S = 10.0  # between two looks at the processes
-# A surface that cannot be swapped within this time, for the bench does not answer, is told.
-SWAP_DEADLINE_S = 60.0
-
-
-class ExplorationLoop:
-    """Run explorations one after the other and record how they ended."""
-
-    def __init__(self, operator: Operator, stopper: Operator, check: Callable[[], None]) -> None:
-        self.explored: list[soak.ExplorationRecord] = []
-        self._check = check
-        self._operator = operator
-        self._stopper = stopper
-        self._surface = ''
-
-    def explore(self, planned: soak.PlannedExploration) -> None:
-        """Explore as ordered, and note how it ended."""
-        self._check()
-        begin_s = time.monotonic()
-        wanted, ending = soak.REFUSED if planned.invalid_on_purpose else soak.SUCCESS, soak.LOST
-        stopped: list[str] = []
-        exploration_id = ''
-        try:
-            if planned.request.surface != self._surface:
-                self._operator.set_parameters('emulator', {'surface': planned.request.surface}, SWAP_DEADLINE_S)
-                self._surface = planned.request.surface
-            answer = self._operator.explore(planned.request, lambda *_: self._stop(planned, begin_s, stopped))
-            ending = soak.SUCCESS if answer.success else soak.ABORTED if answer.exploration_id else soak.REFUSED
-            message, exploration_id = answer.message, answer.exploration_id
-        except (MotionAborted, LaunchFailed, InvalidParameter) as error:
-            message = str(error)
-        end_s = time.monotonic()
-        self.explored.append(
-            soak.ExplorationRecord(begin_s, end_s, ending, message, soak.ABORTED if stopped else wanted, exploration_id)
-        )
-
-    def _stop(self, planned: soak.PlannedExploration, begin_s: float, stopped: list[str]) -> None:
-        if not stopped and time.monotonic() - begin_s > planned.stop_after_s:
-            stopped.append('asked')
-            with suppress(TextureError):  # the explorer is frozen or dead just now, which is told otherwise
-                self._stopper.stop()
-
-
-SCENE, SURFACE = 'twelve_textures', 'glass'
-SLIDES = SlidePlan(slides=5, speed_m_s=0.08, force_n=1.5, slide_s=1.0)
-
-
-@dataclass(frozen=True)
-class SoakPlan:
-    """What is run."""
-
-    duration_s: float = 3600.0  # How long
-    quiet_s: float = 20.0  # Mean time between two faults
-    seed: int = 0  # Of orders, faults and the bench
-    model: Path | None = None  # That the classifier classifies by; None: one is trained on simulated slides first
-    settle_s: float = 10.0  # Time for the nodes to find each other, before anything is asked of them
-
-
-def launched_nodes(domain_id: int, folder: Path, plan: SoakPlan, log: Path) -> ChildLauncher:
-    """Return the launch of the emulator with a model, trained if there is none; use it in a `with` block."""
-    model = plan.model
-    if model is None:
-        bags = write_simulated(folder / 'slides', SLIDES, np.random.default_rng(plan.seed), SCENE)
-        train_from_bags('default', bags, out=folder / 'model')
-        model = folder / 'model'
-    card = model.with_suffix('.json').resolve()
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.bind(('127.0.0.1', 0))
-        port = int(probe.getsockname()[1])
-    arguments = {
-        'devices': folder,
-        'scene': SCENE,
-        'seed': plan.seed,
-        'model': card,
-        'recipe': card,
-        'watch_signal': 'true',
-        'dashboard': 'true',
-        'dashboard_port': port,
-    }
-    environment = isolated(domain_id, {**os.environ, 'ROS_LOG_DIR': str(folder / 'ros_log')})
-    return ChildLauncher('emulator', arguments, environment, log, together=False)
-
-
-REPORT_PERIOD_S = 60.0  # between two lines about how it goes
-PAUSE_S, LOOK_AFTER_S = 0.2, 1.0  # between two explorations, the latter after one that did not succeed
-START_DEADLINE_S = 120.0
-CALM_S = soak.RECOVERY_S  # after the last fault, before the last exploration
-
-
-def endure(
-    plan: SoakPlan, log: Path, say: Callable[[str], None], faults: Iterable[soak.PlannedFault] = ()
-) -> soak.SoakRecord:
-    """Explore again and again for a while, with faults at random, and once more in peace; return what happened.
-
-    With faults of one's own, the run ends when they are over. `say` is told now and then how it goes.
-    """
-    with tempfile.TemporaryDirectory(prefix='texture_endurance_') as name, ExitStack() as stack:
-        domain = free_domain()
-        launcher = stack.enter_context(launched_nodes(domain, Path(name), plan, log))
-        clients = [stack.enter_context(Operator(domain_id=domain, guard=launcher.check)) for _ in range(3)]
-        watcher = stack.enter_context(Watcher(domain))
-        clients[0].wait_for_explorer(START_DEADLINE_S)
-        clients[0].wait_for_signal(START_DEADLINE_S)
-        time.sleep(plan.settle_s)
-        rngs = [np.random.default_rng((plan.seed, i)) for i in range(2)]
-        planned = faults or soak.planned_faults(rngs[0], plan.quiet_s)
-        injector = FaultInjector(planned, clients[1], soak.Processes(log), watcher)
-        loop = ExplorationLoop(clients[0], clients[2], launcher.check)
-        begin_s, processes, usages = time.monotonic(), soak.Processes(log), list[soak.ProcessUsage]()
-
-        def look() -> None:
-            found = [soak.read_usage(node, pid, time.monotonic()) for node, pid in processes.update().items()]
-            usages.extend(usage for usage in found if usage)
-
-        ended_early_by = _work(loop, injector, rngs[1], begin_s + plan.duration_s, (look, say))
-        end_s = time.monotonic()
-        processes.update()
-    events = list(injector.fault_events)
-    return soak.SoakRecord(
-        begin_s=begin_s,
-        end_s=end_s,
-        seed=plan.seed,
-        explored=[replace(item, faults=soak.in_force(events, item.begin_s, item.end_s)) for item in loop.explored],
-        fault_events=events,
-        usages=usages,
-        totals={node: totals.sums for node, totals in watcher.totals.items()},
-        signal=watcher.signal,
-        vectors=sum(watcher.vectors.values()),
-        unanswered={
-            name: n - watcher.estimates[name] for name, n in watcher.vectors.items() if n > watcher.estimates[name]
-        },
-        said=[(*what, n) for what, n in watcher.said.most_common()],
-        ends=processes.ends,
-        ended_early_by=ended_early_by,
-    )
-
-
-def _work(
-    loop: ExplorationLoop,
-    injector: FaultInjector,
-    rng: np.random.Generator,
-    until_s: float,
-    told: tuple[Callable[[], None], Callable[[str], None]],
-) -> str:
-    """Explore until the time is over; return what ended it early, '' if nothing did."""
-    look, say = told
-    reported_s = looked_s = time.monotonic()
-    try:
-        with injector:
-            for planned in soak.planned_explorations(rng, list(load_scene(SCENE).surfaces)):
-                if time.monotonic() > until_s or injector.over:
-                    break
-                loop.explore(planned)
-                last = loop.explored[-1]
-                time.sleep(PAUSE_S if last.ending == soak.SUCCESS else LOOK_AFTER_S)
-                if time.monotonic() > looked_s + SAMPLE_PERIOD_S:
-                    looked_s = time.monotonic()
-                    look()
-                if time.monotonic() > reported_s + REPORT_PERIOD_S:
-                    reported_s = time.monotonic()
-                    say(
-                        f'{(until_s - reported_s) / 60:.0f} min left; {len(loop.explored)} explorations, '
-                        f'{len(injector.fault_events)} faults; the last one: {last.ending}, {last.message}'
-                    )
-        time.sleep(CALM_S)
-        loop.explore(soak.PlannedExploration(ExplorationRequest('linear_slide', surface=SURFACE)))
-    except KeyboardInterrupt:
-        return f'it was interrupted {until_s - time.monotonic():.0f} s before its end'
-    except TextureError as error:
-        return str(error)
-    return f'the faults ended early: {injector.error!r}' if injector.error else ''
-
-
-# Hazards of an arm behind ROS controllers
-
-ARM = {
-    'arm': 'ros_controllers',
-    'accept_no_timeout': True,
-    'accept_shared_group': True,
-    'watch_signal': False,
-    'connect_timeout_s': 10.0,
-    # Patient with a busy machine; what comes 0.5 s late is too late all the same.
-    'deadman_s': 0.4,
-    'state_timeout_s': 1.0,
-    'approach_timeout_s': 60.0,
-    'approach_stiffness_n_m': 20000.0,
-}
-CONTROLLER = {'start_height_m': 0.004, 'command_timeout_s': 0.0}  # it holds the last velocity for ever
-SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=3.0, distance_m=0.06)
-GUARD = 'texture_exploration.ros.guard'
-SETTLED_S = 1.0
-OTHER_M_S, OTHER_PERIOD_S = 0.01, 0.02  # what the other commander wants, along the surface, and how often
-
-
-class HazardRig(Listener):
-    """An emulated controller, an explorer and what befalls them; use it in a `with` block."""
-
-    def __init__(self, domain_id: int, clients: Sequence[Operator]) -> None:
-        super().__init__(domain_id)
-        self.force = soak.ForceAccount()
-        self._explorations, self._settings = clients
-        self._domain_id = domain_id
-        self._controller = self._new_controller({})
-        self._explorer = self._new_explorer()
-        self.node.create_subscription(WrenchStamped, 'true_wrench', self._on_wrench, 1000)
-
-    def __enter__(self) -> HazardRig:
-        self._controller.__enter__()
-        self._explorer.__enter__()
-        return super().__enter__()
-
-    def __exit__(self, *error: object) -> None:
-        self._explorer.stop()
-        self._controller.stop()
-        super().__exit__(*error)
-
-    def explore(self, name: str) -> soak.HazardRecord:
-        """Explore while something befalls the arm, put it right, and return how it went."""
-        hazard = soak.HAZARDS.get(name, soak.ArmHazard())
-        if hazard.from_start:
-            self._begin_anew(hazard.given)
-        self._wait_for_explorer()
-        self.force = soak.ForceAccount()
-        happened = [] if hazard.process or hazard.commander else ['before']
-
-        def on_progress(state: ExplorationState, _texture: Any) -> None:
-            if state.phase is Phase.SLIDE and not happened:
-                happened.append('in the slide')
-                self._act(hazard)
-
-        exploration_id = ''
-        try:
-            answer = self._explorations.explore(SLIDE, on_progress)
-            message, exploration_id = answer.message, answer.exploration_id
-            ending = soak.SUCCESS if answer.success else soak.ABORTED if exploration_id else soak.REFUSED
-        except (MotionAborted, LaunchFailed) as error:
-            ending, message = soak.LOST, str(error)
-        time.sleep(SETTLED_S)
-        left_n, force = self.force.newest_n, self.force
-        if not hazard.obeys:
-            self._lift_anew()
-            left_n = self.force.newest_n
-        if hazard.from_start or not hazard.obeys:
-            self._begin_anew({})
-        return soak.HazardRecord(name, bool(happened), ending, message, force.peak_n, force.above_s, left_n)
-
-    def _act(self, hazard: soak.ArmHazard) -> None:
-        if hazard.commander:
-            self._command_too(hazard.hold_s)
-            return
-        pid = self._explorer.process.pid
-        if hazard.process == 'guard':
-            pid = next(child for child in children(pid) if GUARD in command_line(child))
-        os.kill(pid, hazard.number)
-        if hazard.hold_s:
-            time.sleep(hazard.hold_s)
-            os.kill(pid, signal.SIGCONT)
-
-    def _command_too(self, hold_s: float) -> None:
-        publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
-        end_s = time.monotonic() + hold_s
-        while time.monotonic() < end_s:
-            twist = TwistStamped()
-            twist.header.stamp, twist.header.frame_id = self.node.get_clock().now().to_msg(), 'base'
-            twist.twist.linear.y = OTHER_M_S
-            publisher.publish(twist)
-            time.sleep(OTHER_PERIOD_S)
-        self.node.destroy_publisher(publisher)
-
-    def _begin_anew(self, given: Mapping[str, Any]) -> None:
-        """Start a controller with other parameters, with its finger where all began, and an explorer on it."""
-        self._explorer.stop()
-        self._controller.stop()
-        self._controller = self._new_controller(given).__enter__()
-        self._explorer = self._new_explorer().__enter__()
-
-    def _lift_anew(self) -> None:
-        """Put the controller right, and lift the finger by another explorer, as an operator does after a fault."""
-        self._explorer.stop()
-        self._settings.set_parameters('twist_controller', soak.HARMLESS)
-        self._explorer = self._new_explorer().__enter__()
-        self._wait_for_explorer()
-        with suppress(TextureError):  # what is left of the force tells
-            self._settings.call('explorer/lift', 'start the explorer')
-        time.sleep(SETTLED_S)
-
-    def _wait_for_explorer(self) -> None:
-        """Wait until the explorer answers: it is there for nobody as long as it connects to its arm.
-
-        An answer to one whom it has not discovered yet is lost, so that it is asked again.
-        """
-        self._explorations.wait_for_explorer(START_DEADLINE_S)
-        deadline_s = time.monotonic() + START_DEADLINE_S
-        while time.monotonic() < deadline_s:
-            with suppress(LaunchFailed):
-                self._explorations.stop()
-                return
-        raise LaunchFailed(f'the explorer does not answer (waited {START_DEADLINE_S:.0f} s)')
-
-    def _new_controller(self, given: Mapping[str, Any]) -> NodeProcess:
-        return NodeProcess('texture_simulation', 'twist_controller', {**CONTROLLER, **given}, domain_id=self._domain_id)
-
-    def _new_explorer(self) -> NodeProcess:
-        return NodeProcess('texture_exploration', 'explorer', ARM, domain_id=self._domain_id)
-
-    def _on_wrench(self, wrench: WrenchStamped) -> None:
-        force = wrench.wrench.force
-        self.force.update(to_ns(wrench.header.stamp) / NANOSECONDS, math.hypot(force.x, force.y, force.z))
-
-
-def children(pid: int) -> list[int]:
-    """Return the processes that a process has started."""
-    found: list[int] = []
-    for thread in Path('/proc', str(pid), 'task').glob('*/children'):
-        with suppress(OSError):  # it has ended meanwhile
-            found += map(int, thread.read_text(encoding='ascii').split())
-    return found
-
-
-def command_line(pid: int) -> list[str]:
-    """Return the words by which a process was started, none if it has ended."""
-    try:
-        return (Path('/proc') / str(pid) / 'cmdline').read_text(errors='replace').split('\0')
-    except OSError:
-        return []
-
-
-def endure_hazards(
-    plan: SoakPlan, say: Callable[[str], None], names: Sequence[str] = tuple(soak.HAZARDS)
-) -> list[soak.HazardRecord]:
-    """Explore with each hazard in turn, in calm after each, again and again until the time is over; each comes once."""
-    records: list[soak.HazardRecord] = []
+def soak(
+    duration_s: float, seed: int, say: Callable[[str], None], faults: Sequence[str] = tuple(FAULTS)
+) -> BenchmarkResult:
+    """Explore with each fault in turn, and without one after each, until the time is over; each comes once."""
     with ExitStack() as stack:
-        domain = free_domain()
-        stack.enter_context(mock.patch.dict(os.environ, isolated(domain, os.environ)))
-        clients = [stack.enter_context(Operator(domain_id=domain)) for _ in range(2)]
-        rig = stack.enter_context(HazardRig(domain, clients))
-        end_s = time.monotonic() + plan.duration_s
-        rng = np.random.default_rng(plan.seed)
-        while not records or time.monotonic() < end_s:
-            for name in rng.permutation(np.array(names)).tolist():
-                # A busy machine may abort before the slide, or slide too slowly for a success: so many attempts.
-                for hazard in (name, soak.NO_HAZARD):
-                    for _ in range(soak.ATTEMPTS):
-                        records.append(found := rig.explore(hazard))
-                        say(
-                            f'{hazard}: {found.ending}, {found.peak_n:.1f} N, {found.above_s * 1e3:.0f} ms above '
-                            f'{soak.FORCE_LIMIT_N:g} N, {found.left_n:.2f} N left: {found.message}'
-                        )
-                        if found.happened if hazard == name else found.ending == soak.SUCCESS:
+        # Train on simulated slides, and start all nodes.
+        folder, domain_id = Path(stack.enter_context(tempfile.TemporaryDirectory())), free_domain()
+        rng, surfaces = np.random.default_rng(seed), list(load_scene(SCENE).surfaces)
+        plan = SlidePlan(slides=5, speed_m_s=0.05, force_n=3.0, slide_s=1.0)
+        train_from_bags('default', write_simulated(folder / 'slides', plan, rng, SCENE), out=folder / 'model')
+        card, pipe, device = (str(folder / name) for name in ('model.json', 'finger', 'tsf85'))
+        given: Mapping[str, Mapping[str, Any]] = {
+            'emulator': {'scene': SCENE, 'seed': seed, 'sensor_link': device, 'finger_pipe': pipe},
+            'sensor': {'device': device},
+            # It holds the last velocity for ever.
+            'twist_controller': {'finger_pipe': pipe, 'start_height_m': 0.002, 'command_timeout_s': 0.0},
+            'feature_extractor': {'recipe': card},
+            'classifier': {'model': card},
+            'explorer': {'arm': 'ros_controllers', **PATIENT, **PATCH, **EMULATED},
+        }
+        stack.enter_context(mock.patch.dict(os.environ, isolated(domain_id, os.environ)))
+        running = stack.enter_context(Rig(domain_id, given))
+        for name in PACKAGES:
+            running.start(name)
+        # Each fault, and after it explorations without one.
+        trials, end_s = list[FaultTrial](), time.monotonic() + duration_s
+        while not trials or time.monotonic() < end_s:
+            for fault in rng.permutation(np.array(faults)).tolist():
+                for name in (fault, NONE):
+                    for _ in range(ATTEMPTS):
+                        trials.append(found := running.run(name, str(rng.choice(surfaces))))
+                        say(f'{name}: {found.ending} in {found.took_s:.1f} s, {found.peak_n:.1f} N: {found.message}')
+                        if found.happened if name == fault else found.ending == SUCCESS:
                             break
-    return records
+                    if found.ending == SUCCESS:  # in spite of the fault: nothing more has to be shown
+                        break
+    return BenchmarkResult(
+        name='endurance',
+        measured='how explorations end under each fault, time until all works again (s), true force on the finger (N)',
+        data='emulated sensor, and an emulated arm of 2 kN/m behind ROS controllers without a timeout',
+        split='none: one run; the model is trained on simulated slides',
+        numbers={
+            'seed': seed,
+            'duration_s': duration_s,
+            'explorations': len(trials),
+            'requirements': check(trials, running.counts, [*running.memory.values()]),
+            'counts': dict(running.counts),
+            'faults': {
+                name: figures([one for one in trials if one.fault == name])
+                for name in dict.fromkeys(one.fault for one in trials)
+            },
+        },
+    )

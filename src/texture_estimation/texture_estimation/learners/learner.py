@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.types import Array
-from texture_features.features.temporal import SLIDE_ONSET
 
 # --------------------
 # What a learner is: parameters that fit examples, and the predictor that it exports.
@@ -237,7 +236,7 @@ def standardisation(values: Array) -> tuple[Array, Array]:
 # Features that say how a window was made, and not what of.
 
 FORCE = 'force'  # ends the name of the feature
-NOT_COMPARED = (SLIDE_ONSET, FORCE)
+NOT_COMPARED = (FORCE,)
 
 # --------------------
 # Means of the rows that belong together, such as the windows of a slide or the slides of a texture.

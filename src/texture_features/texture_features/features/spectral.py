@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from texture_core.config import param
 from texture_core.types import Array
 from texture_features.features.temporal import signal_differences
-from texture_features.windows import Feature, WindowBatch, floor_param, mean_weights, power
+from texture_features.windows import FLOOR, Feature, WindowBatch, mean_weights, power
 
 # --------------------
 # Short spectra along a window: what the spectral features are made of.
@@ -201,13 +201,6 @@ class WelchPower(Feature):
     rate_of_change: bool = param(
         True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
     )
-    force_exponent: float = param(
-        0.0,
-        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
-        low=0.0,
-        high=4.0,
-    )
-    floor: float = floor_param()
 
 
 def welch_spectrum(windows: WindowBatch, points: int, rate_of_change: bool) -> tuple[Array, Array]:
@@ -237,16 +230,6 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
     )
 
 
-def force_normalised(log_power: Array, windows: WindowBatch, exponent: float) -> Array:
-    """Return a log power, (..., n_channels, n_values), less what it owes to the force, exponent · log(force).
-
-    On a soft round finger (Hertz) the stiffness grows with the cube root of the force, so the power with force^(2/3).
-    """
-    if not exponent:
-        return log_power
-    return log_power - exponent * np.log(np.asarray(windows.force_n))[..., None, None]
-
-
 @lru_cache(maxsize=64)
 def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
     """Return the frequency of each line, (segment / 2,) Hz, and the share of its density that its integral has."""
@@ -274,13 +257,6 @@ class LogBands(Feature):
     """
 
     bands: int = param(32, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
-    overlap: float = param(
-        0.75,
-        'Fraction of a segment that overlaps the next one; more gives smoother values and costs time.',
-        low=0.0,
-        high=0.9,
-    )
-    floor: float = floor_param('Power density', 'unit²/Hz')
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -289,12 +265,12 @@ class LogBands(Feature):
 
     @cached_property
     def _step(self) -> int:
-        return max(1, round(2 * self.bands * (1.0 - self.overlap)))
+        return max(1, self.bands // 2)  # a quarter of a segment
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
         densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        return np.log(mean_over_segments(densities) + self.floor)
+        return np.log(mean_over_segments(densities) + FLOOR)
 
 
 # --------------------
@@ -324,7 +300,6 @@ class LowFftBins(Feature):
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
     )
-    floor: float = floor_param('Power density', 'unit²/Hz')
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -338,7 +313,7 @@ class LowFftBins(Feature):
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
         densities, _ = welch_spectrum(windows, self.points, rate_of_change=False)
-        return np.log(densities[..., : self._count] + self.floor)
+        return np.log(densities[..., : self._count] + FLOOR)
 
 
 # --------------------
@@ -364,22 +339,22 @@ class MeanLogBands(LogBands):
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean of log(density + floor)."""
         densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
-        logs = densities + self.floor
+        logs = densities + FLOOR
         return mean_over_segments(np.log(logs, out=logs))
 
 
 # --------------------
 # Vibration power, weighted as the Pacinian receptors of the skin weight it.
 
-OCTAVES_PER_DB = 0.1 / np.log10(2.0)  # of power
+BEST_HZ, DB_PER_OCTAVE = 250.0, 12.0  # where the threshold of the Pacinian channel is lowest, and its slopes
 
 
 @dataclass(frozen=True)
 class PacinianPower(WelchPower):
     """Logarithm of Σ (amplitude / threshold amplitude)² over the lines of the spectrum.
 
-    The threshold is that of the Pacinian channel in two straight lines: it falls by 12 dB an octave up to `best_hz`
-    and rises by `slope_above_db` beyond; 1 at its best. A tone of amplitude a at `best_hz` gives log(a²/2).
+    The threshold is that of the Pacinian channel in two straight lines: it falls by 12 dB an octave up to 250 Hz and
+    rises as fast beyond; 1 at its best. A tone of amplitude a at 250 Hz gives log(a²/2).
 
     Source: Bensmaia & Hollins 2005, "Pacinian representations of fine surface texture"; slope and best frequency
     after Bolanowski et al. 1988. The straight lines are an approximation.
@@ -393,15 +368,6 @@ class PacinianPower(WelchPower):
     (0.5, 24)
     """
 
-    best_hz: float = param(
-        250.0, 'Frequency at which the detection threshold is lowest.', unit='Hz', low=1.0, high=10_000.0
-    )
-    slope_below_db: float = param(
-        12.0, 'Slope of the threshold below that frequency, in dB per octave.', low=0.0, high=100.0
-    )
-    slope_above_db: float = param(
-        12.0, 'Slope of the threshold above that frequency, in dB per octave.', low=0.0, high=100.0
-    )
     at_speed_m_s: float = param(
         0.0,
         'Reference speed to which frequencies are scaled before weighting; 0: no scaling.',
@@ -413,11 +379,10 @@ class PacinianPower(WelchPower):
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the log power."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
-        octaves = np.log2(at_reference_speed(hertz, windows, self.at_speed_m_s) / self.best_hz)
-        below, above = OCTAVES_PER_DB * self.slope_below_db, OCTAVES_PER_DB * self.slope_above_db
-        weights = np.exp2(np.minimum(below * octaves, -above * octaves))  # 1 / threshold²
+        octaves = np.abs(np.log2(at_reference_speed(hertz, windows, self.at_speed_m_s) / BEST_HZ))
+        weights = 10.0 ** (-0.1 * DB_PER_OCTAVE * octaves)  # 1 / threshold²
         power = np.add.reduce(densities * weights, axis=-1, keepdims=True) * hertz[0]
-        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)
+        return np.log(power + FLOOR)
 
 
 # --------------------
@@ -449,7 +414,6 @@ class PeakToMedianPower(Feature):
         'Segment with whose power the largest is compared: the median or the minimum one.',
         choices=(MEDIAN, MINIMUM),
     )
-    floor: float = floor_param()
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(strongest / other)."""
@@ -460,7 +424,7 @@ class PeakToMedianPower(Feature):
         powers = power(cut)
         powers.sort(axis=-1)
         other = segments // 2 if self.reference == MEDIAN else 0
-        ratio = (powers[..., -1:] + self.floor) / (powers[..., other : other + 1] + self.floor)
+        ratio = (powers[..., -1:] + FLOOR) / (powers[..., other : other + 1] + FLOOR)
         return np.log(ratio)
 
 
@@ -469,6 +433,7 @@ class PeakToMedianPower(Feature):
 
 # Of a power squared: far below any, far above the smallest number, so that nothing over nothing is 1.
 POWER_AUTOCORRELATION_TINY = 1e-200
+LEAST_RATIO = 1e-3  # added before the logarithm: a lag without any power gives a finite value
 
 
 @dataclass(frozen=True)
@@ -489,12 +454,6 @@ class PowerAutocorrelation(Feature):
     """
 
     lags: int = param(12, 'Number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24)
-    floor: float = param(
-        1e-3,
-        'Ratio added before the logarithm, so that a lag without any power gives a finite value.',
-        low=1e-12,
-        high=1.0,
-    )
 
     @cached_property
     def _lags(self) -> NDArray[np.intp]:
@@ -518,7 +477,7 @@ class PowerAutocorrelation(Feature):
         products = (later @ powers[..., :count, None])[..., 0] / count
         mean = (powers[..., :-1] @ mean_weights(n_steps))[..., None]
         autocorrelations = np.log(
-            (products + POWER_AUTOCORRELATION_TINY) / (mean * mean + POWER_AUTOCORRELATION_TINY) + self.floor
+            (products + POWER_AUTOCORRELATION_TINY) / (mean * mean + POWER_AUTOCORRELATION_TINY) + LEAST_RATIO
         )
         return autocorrelations.reshape(*powers.shape[:-2], -1)
 
@@ -548,13 +507,6 @@ class ShortTimeFourier(Feature):
         4, 'Number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
     )
     bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
-    overlap: float = param(
-        0.5,
-        'Fraction of a segment that overlaps the next one; more gives smoother values and costs time.',
-        low=0.0,
-        high=0.9,
-    )
-    floor: float = floor_param('Power density', 'unit²/Hz')
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -563,10 +515,9 @@ class ShortTimeFourier(Feature):
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density of each part + floor), part by part."""
-        step = max(1, round(2 * self.bands * (1.0 - self.overlap)))
-        densities = densities_of(windows, 2 * self.bands, step, self.bands)
+        densities = densities_of(windows, 2 * self.bands, self.bands, self.bands)  # segments overlap by half
         means = _averaging(self.parts, densities.shape[-2]) @ densities
-        return np.log(means + self.floor).reshape(*means.shape[:-2], -1)
+        return np.log(means + FLOOR).reshape(*means.shape[:-2], -1)
 
 
 @lru_cache(maxsize=64)
@@ -622,18 +573,15 @@ class SpectralExponent(Feature):
         low=0.0,
         high=10.0,
     )
-    floor: float = floor_param('Power density', 'unit²/Hz')
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return s."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         measured = at_reference_speed(hertz, windows, self.at_speed_m_s)
-        within = (measured >= self.low_hz) * (
-            measured <= self.high_hz
-        ) + 0.0 * measured  # NaN where the speed is unknown
+        within = np.where(np.isnan(measured), np.nan, (measured >= self.low_hz) & (measured <= self.high_hz))
         logs = np.log(hertz)
         middle = (within @ logs) / (np.add.reduce(within, axis=-1) + SPECTRAL_EXPONENT_TINY)
         weights = within * (logs - middle[..., None])
-        fall = np.add.reduce(weights * np.log(densities + self.floor), axis=-1)
+        fall = np.add.reduce(weights * np.log(densities + FLOOR), axis=-1)
         exponent: Array = -fall / (weights @ logs + SPECTRAL_EXPONENT_TINY)
         return exponent[..., None]

@@ -15,42 +15,36 @@ from texture_core.errors import InvalidParameter
 from texture_core.types import Array
 from texture_features.features.spectral import (
     WelchPower,
-    force_normalised,
     mean_subtracted,
     spatial_log_bands,
     welch_spectrum,
 )
-from texture_features.windows import Feature, WindowBatch, centred, first_difference, floor_param, power
+from texture_features.windows import FLOOR, Feature, WindowBatch, centred, first_difference, floor_param, power
 
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
+
+FREE_SHARE = 0.01  # of the load, below which a channel counts as free: its noise says nothing
 
 
 @dataclass(frozen=True)
 class LogShares(Feature):
     """Signed logarithm of each channel's share of the total load, less the mean of these logarithms.
 
-    The share s of a channel is its mean over the sum of the absolute means. Each gives sign(s) · log(max(|s|, floor) /
-    floor): a taxel that carries nearly nothing gives 0, not its noise. Where no level is negative these are the
+    The share s of a channel is its mean over the sum of the absolute means. Each gives sign(s) · log(max(|s|, 0.01) /
+    0.01): a taxel that carries nearly nothing gives 0, not its noise. Where no level is negative these are the
     centred log-ratios of Aitchison 1986 with a floor that follows the load. A force that presses all taxels harder by
     the same factor changes nothing.
 
     Examples
     --------
     >>> levels = np.array([[3.0, -1.0, 0.0]])  # pressed, pulled, and free
-    >>> shares = LogShares(floor=0.01)(WindowBatch(levels, rate_hz=100.0))[:, 0]
+    >>> shares = LogShares()(WindowBatch(levels, rate_hz=100.0))[:, 0]
     >>> (shares - shares[2]).round(2).tolist()  # log 75, -log 25, 0
     [4.32, -3.22, 0.0]
     >>> np.allclose(LogShares()(WindowBatch(10 * levels, 100.0)), LogShares()(WindowBatch(levels, 100.0)))
     True
     """
-
-    floor: float = param(
-        0.01,
-        'Fraction of the load below which a channel counts as free; a larger one keeps out more noise.',
-        low=1e-6,
-        high=0.5,
-    )
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the signed log shares."""
@@ -59,13 +53,15 @@ class LogShares(Feature):
         sizes = np.abs(levels)
         total = np.add.reduce(sizes, axis=-1, keepdims=True)
         shares = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
-        logs = np.sign(levels) * np.log(np.maximum(shares, self.floor) / self.floor)
+        logs = np.sign(levels) * np.log(np.maximum(shares, FREE_SHARE) / FREE_SHARE)
         centred: Array = logs - np.add.reduce(logs, axis=-1, keepdims=True) / logs.shape[-1]
         return centred[..., None]
 
 
 # --------------------
 # Mean, power and shape statistics of the signal, averaged over the channels.
+
+LEAST_VARIANCE = 1e-4  # added to the variance, in unit²: far below the noise of any array
 
 
 @dataclass(frozen=True)
@@ -91,10 +87,6 @@ class ChannelMeanStatistics(Feature):
         """What is averaged."""
         return ('mean', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
 
-    floor: float = param(
-        1e-4, 'Power added to the variance before logarithm and split, in unit².', low=1e-300, high=1e300
-    )
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the six means."""
         rows, centred = windows.rows, windows.centred_rows
@@ -105,13 +97,15 @@ class ChannelMeanStatistics(Feature):
         rise = (np.add.reduce(rows[..., -quarter:], axis=-1) - np.add.reduce(rows[..., :quarter], axis=-1)) / quarter
         above = np.count_nonzero(centred > 0.0, axis=-1) / n_samples
         cubes = np.add.reduce(centred**3, axis=-1) / n_samples
-        skewness = cubes / (variance + self.floor) ** 1.5
-        values = np.stack([level, np.log(variance + self.floor), rise, np.abs(rise), above, skewness], axis=-1)
+        skewness = cubes / (variance + LEAST_VARIANCE) ** 1.5
+        values = np.stack([level, np.log(variance + LEAST_VARIANCE), rise, np.abs(rise), above, skewness], axis=-1)
         return np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
 
 
 # --------------------
 # Relative changes: how much each taxel changes within a window, over the load of all.
+
+LEAST_LOAD = 1e-9  # in the unit of the signal, by which is divided
 
 
 @dataclass(frozen=True)
@@ -132,8 +126,6 @@ class RelativeChanges(Feature):
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('deviation', 'step')
 
-    floor: float = param(1e-9, 'Smallest load, in the unit of the signal; a smaller one is replaced by it.', low=1e-300)
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return both roots."""
         rows = windows.rows
@@ -141,7 +133,7 @@ class RelativeChanges(Feature):
         steps = first_difference(rows)
         steps = steps - np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
         deviations = np.sqrt(np.stack([power(windows.centred_rows), power(steps)], axis=-1))
-        return np.sqrt(deviations / np.maximum(load, self.floor)[..., None])
+        return np.sqrt(deviations / np.maximum(load, LEAST_LOAD)[..., None])
 
 
 # --------------------
@@ -271,7 +263,6 @@ class SpatialBandPower(WelchPower):
     shortest_m: float = param(
         4.5e-4, 'Shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
     )
-    floor: float = floor_param('Spatial power density', 'unit² m')
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:
@@ -297,7 +288,7 @@ class SpatialBandPower(WelchPower):
         share = inside[..., 1:] - inside[..., :-1]
         mean = np.add.reduce(share * densities[..., None, :], axis=-1) / (high - low)[..., 0]
         # Density per wave per metre: the same power on a stretch that is speed times narrower.
-        return force_normalised(np.log(mean * speed[..., 0] + self.floor), windows, self.force_exponent)
+        return np.log(mean * speed[..., 0] + FLOOR)
 
 
 @lru_cache(maxsize=64)
@@ -434,4 +425,4 @@ class SpatialVariation(WelchPower):
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         phase = 2.0 * np.pi * hertz * (self.lag_m / windows.moving_m_s[..., None, None])
         power = 2.0 * np.add.reduce(densities * (1.0 - np.cos(phase)), axis=-1, keepdims=True) * hertz[0]
-        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)
+        return np.log(power + FLOOR)

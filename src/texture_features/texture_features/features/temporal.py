@@ -12,7 +12,16 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import AnyArray, Array, Samples
-from texture_features.windows import Feature, WindowBatch, centred, first_difference, floor_param, mean_weights, power
+from texture_features.windows import (
+    FLOOR,
+    Feature,
+    WindowBatch,
+    centred,
+    first_difference,
+    floor_param,
+    mean_weights,
+    power,
+)
 
 # --------------------
 # The signal with its first and second difference, in one array.
@@ -104,7 +113,6 @@ class Hjorth(Feature):
     """
 
     log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
-    floor: float = floor_param()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -115,7 +123,7 @@ class Hjorth(Feature):
         """Return activity, mobility and complexity."""
         values = hjorth(windows.centred_rows)
         if self.log_activity:
-            values[..., 0] = np.log(values[..., 0] + self.floor)
+            values[..., 0] = np.log(values[..., 0] + FLOOR)
         return values
 
 
@@ -214,6 +222,7 @@ class ChannelMean(Feature):
 VALUES = ('log_power', 'log_amplitude', 'skewness', 'log_kurtosis')
 # Far below any power, far above the smallest number: nothing over nothing becomes 0 or 1.
 MOMENTS_TINY = 1e-150
+LEAST_AMPLITUDE = 1e-10  # added before a logarithm; it is squared where a power is meant
 
 
 @dataclass(frozen=True)
@@ -232,10 +241,6 @@ class Moments(Feature):
     2.67
     """
 
-    floor: float = param(
-        1e-10, 'Amplitude added before a logarithm; it is squared where a power is meant.', low=1e-140, high=1e100
-    )
-
     @property
     def names(self) -> tuple[str, ...]:
         """Value of the signal, of its slope and of its bend."""
@@ -251,44 +256,9 @@ class Moments(Feature):
         products = (orders[..., :2, :, :].swapaxes(-3, -2) @ orders[..., 1, :, :, None])[..., 0] / n_samples
         skewness = products[..., 0] / (square * np.sqrt(square) + MOMENTS_TINY)
         kurtosis = (products[..., 1] + MOMENTS_TINY) / (square * square + MOMENTS_TINY)
-        means += ((self.floor * self.floor,), (self.floor,))
+        means += ((LEAST_AMPLITUDE * LEAST_AMPLITUDE,), (LEAST_AMPLITUDE,))
         logs = np.log(means, out=means).reshape(*square.shape[:-1], 6)
         return np.concatenate((logs, skewness, np.log(kurtosis)), axis=-1)
-
-
-# --------------------
-# Whether a window is the first of a slide.
-
-SLIDE_ONSET = 'slide_onset'
-
-
-@dataclass(frozen=True)
-class SlideOnset(Feature):
-    """1 for a window that begins with the slide, 0 for later ones and where the time since the start is unknown.
-
-    While friction, contact and sensor settle, all textures look different from what they look like later.
-
-    Examples
-    --------
-    >>> windows = WindowBatch(np.zeros((2, 5, 1)), rate_hz=100.0, elapsed_s=np.array([0.0, 0.1]))
-    >>> SlideOnset()(windows).ravel().tolist()
-    [1.0, 0.0]
-    """
-
-    per_channel: ClassVar[bool] = False
-
-    within_s: float = param(
-        0.03,
-        'How long after the start of a slide a window may begin and be one of the onset.',
-        unit='s',
-        low=0.0,
-        high=60.0,
-    )
-
-    def __call__(self, windows: WindowBatch) -> Array:
-        """Return 1 or 0, (..., 1, 1)."""
-        elapsed_s = np.broadcast_to(windows.elapsed_s, windows.samples.shape[:-2])
-        return (elapsed_s <= self.within_s).astype(np.float64)[..., None, None]
 
 
 # --------------------
@@ -315,10 +285,12 @@ class Speed(Feature):
 # --------------------
 # How much the signal changes within a short time.
 
+LAG_S = 0.002  # at least one sample; a longer one compares lower frequencies
+
 
 @dataclass(frozen=True)
 class TemporalVariation(Feature):
-    """Logarithm of the mean absolute difference of the signal with itself `lag_s` later.
+    """Logarithm of the mean absolute difference of the signal with itself 2 ms later.
 
     In nerves the rougher surface makes the response of each fibre vary more in time; here the channel takes the place
     of a fibre.
@@ -332,22 +304,13 @@ class TemporalVariation(Feature):
     0.0
     """
 
-    lag_s: float = param(
-        0.002,
-        'Time lag between the compared samples, at least one sample; a longer one compares lower frequencies.',
-        unit='s',
-        low=0.0,
-        high=10.0,
-    )
-    floor: float = floor_param('Difference', 'unit')
-
     def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean |s(t + lag) - s(t)|)."""
         rows = windows.rows
-        lag = min(max(1, round(self.lag_s * windows.rate_hz)), rows.shape[-1] - 1)
+        lag = min(max(1, round(LAG_S * windows.rate_hz)), rows.shape[-1] - 1)
         steps = np.abs(rows[..., lag:] - rows[..., : rows.shape[-1] - lag])
         mean: Array = np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
-        return np.log(mean + self.floor)
+        return np.log(mean + FLOOR)
 
 
 # --------------------

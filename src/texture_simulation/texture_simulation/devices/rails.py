@@ -44,7 +44,7 @@ RISE_M = 0.05  # of the pressing motor above the start
 
 
 @dataclass(frozen=True)
-class TouchParams:
+class ContactParams:
     """Where a finger begins, and how hard it is to press."""
 
     start_height_m: float = param(0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0)
@@ -58,7 +58,7 @@ class TouchParams:
 
 
 @dataclass(frozen=True)
-class RailsMachine(TouchParams):
+class RailsMachine(ContactParams):
     """Parameters of the emulated rails and of the surface under the finger."""
 
     travel_m: float = param(0.3, 'Distance of the end switches from the start.', unit='m', low=0.01)

@@ -12,14 +12,14 @@ import numpy as np
 
 from texture_core.config import param
 from texture_core.types import Array, FingerState, rotation_matrix
-from texture_simulation.devices.rails import TouchParams
+from texture_simulation.devices.rails import ContactParams
 
 # --------------------
 # The surface under the finger of an emulated arm, and a wall.
 
 
 @dataclass(frozen=True)
-class TouchedSurfaceParams(TouchParams):
+class TouchedSurfaceParams(ContactParams):
     """Where the surface lies, and what else is there."""
 
     surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')

@@ -258,6 +258,7 @@ class EmulatedRobot:
 # --------------------
 # The emulated controller without its network: registers, program, robot, safety, in steps of its own time.
 
+STARTING_S = 0.05  # between the upload of a program and its start, in which the client clears its registers
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
 ENDED = object()
@@ -293,6 +294,7 @@ class EmulatedController:
         self.paused = False
         self._params = params
         self._loaded = ''  # name of the program that `play` starts
+        self._starts_s = math.inf  # when an uploaded program starts
         self._program: Iterator[None] | None = None
         self._watchdog_s = math.inf  # longest silence
         self._heard_s = self._excused_s = 0.0  # when the command register last came; silence that is not the client's
@@ -311,6 +313,8 @@ class EmulatedController:
     def tick(self) -> None:
         """Do one cycle."""
         self.time_s += self.step_s
+        if self.time_s >= self._starts_s:
+            self._starts_s, self.program_name, self._program = math.inf, CONTROL_SCRIPT, self._control_script()
         if self.time_s - self._heard_s > self._watchdog_s:
             self.stop_program()
         if self.playing and next(self._program or iter(()), ENDED) is ENDED:
@@ -336,12 +340,12 @@ class EmulatedController:
             self._heard_s, self._excused_s = self.time_s, 0.0
 
     def upload(self, script: str) -> None:
-        """Start a program; in a protective stop none starts."""
+        """Take over a program, which starts a little later; in a protective stop none starts."""
         if CONTROL_SCRIPT in script and self.safety is SafetyMode.NORMAL:
             self.stop_program()
             first = FIRST_REGISTER.search(script)
             self.first_register = int(first.group(1)) if first else 0
-            self.program_name, self._program = CONTROL_SCRIPT, self._control_script()
+            self._starts_s = self.time_s + STARTING_S
 
     def load(self, name: str) -> str:
         """Take note of what `play` runs, and return the answer of the dashboard."""
@@ -361,7 +365,8 @@ class EmulatedController:
         """End the program, and with it every motion and the watchdog."""
         if self._program is not None:
             self.robot.halt(STOP_DECELERATION)
-        self._program, self.paused, self._watchdog_s = None, False, math.inf
+        self._program, self.paused = None, False
+        self._starts_s = self._watchdog_s = math.inf
 
     def protective_stop(self) -> None:
         """Stop hard; the program ends."""
