@@ -281,6 +281,7 @@ def test_connecting_releases_no_protective_stop(arm, emulator):
     arm.close()
     with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find out why'):
         arm.connect()
+    wait_for(lambda: 'releasing' in emulator.controller.ask('unlock protective stop'))  # as a person at the pendant
 
 
 def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, emulator, record_property):
