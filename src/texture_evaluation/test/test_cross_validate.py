@@ -373,7 +373,7 @@ def test_recipes_come_before_bags(tmp_path: Path) -> None:
         [bags],
     )
     assert evaluate.recipes_and_bags(['default', 'one.mcap']) == (['default'], ['one.mcap'])
-    with pytest.raises(InvalidParameter, match='default, fast are recipes; name the bags behind them'):
+    with pytest.raises(InvalidParameter, match='default, any-speed are recipes; name the bags behind them'):
         evaluate.recipes_and_bags(['default', 'any-speed'])
 
 
