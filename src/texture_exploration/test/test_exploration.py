@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import math
 import re
+from collections import deque
+from dataclasses import replace
 
 import pytest
 
@@ -313,3 +315,20 @@ def test_a_wall_in_the_path_ends_the_slide_and_the_finger_goes_back_before_it_is
     assert max(held) < 10.0 + 20000.0 * 0.035 * speed_m_s
     assert sum(force_n > 10.0 for force_n in held) <= 10  # steps of 10 ms
     assert held[-1] < 0.01
+
+
+def test_a_force_that_comes_late_at_a_wall_is_not_taken_for_something_above_the_finger(make_table):
+    """The force of the wall still grows in the readings while the finger is on its way back and up already."""
+    table = make_table(SimulatedArmParams(force_mode=False), shape=SurfaceShape(wall_m=0.02))
+    state, late = table.arm.state, deque(maxlen=5)
+
+    def state_with_late_force():
+        arm = state()
+        late.append(arm)
+        return replace(arm, force_n=late[0].force_n, along_n=late[0].along_n)
+
+    table.arm.state = state_with_late_force
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06))
+    assert (outcome.success, outcome.lifted) == (False, True)
+    assert 'along the surface' in outcome.message
+    assert 'not lifted' not in outcome.message

@@ -262,6 +262,7 @@ class Exploration:
             self._give_up(ExplorationError.FORCE_LIMIT, f'{self._guard.blocked}; the finger was not lifted')
             return True
         if command is not step.command:
+            self._motion.note_way_back()
             step = replace(step, command=command, phase=Phase.LIFT)
         self._arm.command(step.command)
         self._commanded = step.command

@@ -156,6 +156,10 @@ class Motion:
             self._finish_reason = reason
             self._slide.finish()
 
+    def note_way_back(self) -> None:
+        """Take note that the finger went the way back out of an obstacle instead of what the last step commanded."""
+        self._lift.watch_anew()
+
     def lift_from(self, place: Vector) -> LiftStage:
         """Return another lift from a place, for whoever cannot trust this motion any more."""
         along, (x, y, z) = self._slide.along, place

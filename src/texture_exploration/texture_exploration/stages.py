@@ -59,6 +59,9 @@ class Stage:
     def see(self, arm: ArmState) -> None:
         """Take note of a state after the end."""
 
+    def watch_anew(self) -> None:
+        """Forget the forces so far: others than this stage commanded the arm."""
+
     def timed_step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return what to do now; MotionAborted also if the stage takes too long."""
         command = self.step(time_ns, arm)
@@ -388,6 +391,10 @@ class LiftStage(Stage):
         if arm.position[2] >= self._goal_m - NEAR_M:
             return None
         return ArmCommand(normal_m_s=self._touch.lift_speed_m_s if self._proven else self._gentle_m_s)
+
+    def watch_anew(self) -> None:
+        """Watch the force from here on: what it did on the way back out of an obstacle says nothing of the rise."""
+        self._lowest_m = math.inf
 
     def see(self, arm: ArmState) -> None:
         """Take note of the force, also after the lift."""
