@@ -27,7 +27,7 @@ def test_a_stop_in_any_phase_lifts_the_finger_and_says_aborted(table, phase):
     assert table.arm.state().position[2] == pytest.approx(table.home[2], abs=0.001)
 
 
-def test_a_lift_that_fails_after_a_stop_is_reported_beside_the_stop(table, monkeypatch):
+def test_a_lift_that_fails_after_a_stop_is_reported_with_the_stop(table, monkeypatch):
     monkeypatch.setattr(TouchParams, 'lift_speed_m_s', 0.001)
     monkeypatch.setattr(SafetyLimits, 'lift_timeout_s', 0.5)
     table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
@@ -39,7 +39,7 @@ def test_a_lift_that_fails_after_a_stop_is_reported_beside_the_stop(table, monke
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
 
 
-def test_an_arm_that_hangs_in_the_lift_after_a_stop_is_reported_beside_the_stop(table):
+def test_an_arm_that_hangs_in_the_lift_after_a_stop_is_reported_with_the_stop(table):
     table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
     table.when[Phase.LIFT] = table.arm.freeze
     outcome = table.explore()

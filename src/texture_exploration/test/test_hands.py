@@ -207,7 +207,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(('name', 'changed', 'sentence'), REFUSED)
-def test_a_profile_that_presses_otherwise_than_told_is_refused(name, changed, sentence):
+def test_a_profile_that_contradicts_its_motors_is_refused(name, changed, sentence):
     content = load_yaml(find_file(name, 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')
     merged = {key: {**content[key], **one} if isinstance(one, dict) else one for key, one in changed.items()}
     with pytest.raises(InvalidParameter, match=sentence):

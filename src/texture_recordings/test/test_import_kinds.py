@@ -64,7 +64,7 @@ UNEVEN = np.floor(T * 41.7) / 41.7  # of a buffer that is read 41.7 times a seco
     (UNEVEN[~LOST], 0.0, 'in bursts of 1 to 3, so lost rows cannot be told', None),
     (bursts(3, 50e-6)[np.r_[0:100, 101, 100, 102:N]], 0.0, 'in bursts, and 2 of them are out of order', None),
 ])  # fmt: skip
-def test_losses_that_cannot_be_told_are_refused_until_the_rate_is_stated(
+def test_losses_that_the_times_leave_undecided_are_refused_until_the_rate_is_stated(
     tmp_path: Path, times: np.ndarray, rate_hz: float, sentence: str, lost: int | None
 ) -> None:
     csv(tmp_path, times, X[: len(times)])

@@ -112,7 +112,7 @@ def test_the_channels_keep_their_order(open_rig: Make) -> None:
     np.testing.assert_array_equal(last.samples[:, 7], -last.samples[:, 0])
 
 
-def test_a_silent_device_and_a_babbling_one_are_reported_apart(open_rig: Make) -> None:
+def test_a_silent_device_and_one_that_sends_other_bytes_have_different_reports(open_rig: Make) -> None:
     rig = open_rig('daq')
     rig.set(silent=True)
     assert 'sends nothing' in rig.fault()
