@@ -136,7 +136,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     A late integrator on a spring with friction, by an arm of ROS controllers that holds the last velocity: stiffness
     of 0.2 to 20 kN/m, delay of 0 to 50 ms, noise of 3 to 20 mN; a wall, wrong signs and axes, a surface upside down 1
     to 12 mm away; in each phase samples that are no numbers, broken links and a second explorer. Largest true forces of
-    each kind of trial, the longest time above 10 N, and how the trials ended. Trials that `force_trials` has written
+    each kind of trial, the most time above 10 N, and how the trials ended. Trials that `force_trials` has written
     into the folder of recorded data are taken from there.
     """
     if options.data is not None and (options.data / TRIALS_FILE).is_file():
