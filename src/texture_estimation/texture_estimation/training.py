@@ -234,7 +234,7 @@ class Followed:
     """The slides of examples, the distance to them, and how those that were held out are followed."""
 
     def __init__(self, recipe: Recipe, examples: LabelledFeatures) -> None:
-        self._recipe, self._examples = recipe, examples
+        self._recipe = recipe
         self._hop_share = min(examples.hop_s / examples.window_s, 1.0)
         self._classes = np.unique(examples.labels, return_inverse=True)[1]
         names, first, self._groups = np.unique(examples.groups, return_index=True, return_inverse=True)

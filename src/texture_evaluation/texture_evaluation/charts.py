@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from texture_core.errors import InvalidParameter
-from texture_core.types import AnyArray
 
 # Okabe & Ito 2008: distinguished by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
@@ -31,7 +29,6 @@ STYLE: Any = {
 }
 DPI = 130
 CHART_FORMATS = ('.png', '.svg', '.pdf')
-MANY = 25  # more labels than this: no numbers in the cells
 
 
 def refuse_chart_format(path: str | Path) -> None:
@@ -71,20 +68,3 @@ def line_styles() -> Iterator[dict[str, Any]]:
     for dashes in ('-', '--', ':'):
         for colour in COLOURS:
             yield {'color': colour, 'linestyle': dashes}
-
-
-def draw_confusion(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
-    """Draw a confusion table into a panel; each row adds up to 100 %."""
-    totals = np.maximum(table.sum(axis=1, keepdims=True), 1)
-    percent = 100 * table / totals
-    image = axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)
-    axes.grid(visible=False)
-    axes.set_xticks(range(len(labels)), labels, rotation=90 if len(labels) > 6 else 30, ha='center')
-    axes.set_yticks(range(len(labels)), labels)
-    axes.set(xlabel='taken for', ylabel='surface under the finger')
-    axes.figure.colorbar(image, ax=axes, label='windows of the surface (%)', fraction=0.046)
-    size = 8 if len(percent) <= 12 else 6
-    for row, column in np.argwhere(percent >= 0.5) if len(labels) <= MANY else ():
-        value = percent[row, column]
-        colour = 'white' if value > 60 else 'black'
-        axes.text(column, row, f'{value:.0f}', ha='center', va='center', fontsize=size, color=colour)

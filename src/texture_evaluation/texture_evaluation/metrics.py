@@ -63,23 +63,13 @@ def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
     return _share([estimate.label == surface for surface, estimate in decided if estimate is not None])
 
 
-def accuracy_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return `accuracy_at` the usual times, keyed '0.5', '1.0' and so on."""
-    return {f'{seconds:.1f}': accuracy_at(results, seconds) for seconds in TIMES_S}
-
-
-def accuracy_at_end(results: Sequence[SlideResult]) -> float:
-    """Return the share of slides that are recognised from all their windows, however long they are."""
-    return float(np.mean([result.estimates[-1].label == result.surface for result in results]))
-
-
 def unclassified_windows(results: Sequence[SlideResult]) -> float:
     """Return the share of windows that alone are taken for nothing."""
     return float(np.mean([not label for result in results for label in result.window_labels]))
 
 
 def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the share of slides without a label after the usual times, keyed as `accuracy_at_times`."""
+    """Return the share of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
     ends = {f'{seconds:.1f}': [result.after(seconds) for result in results] for seconds in TIMES_S}
     return {key: _share([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
 

@@ -54,7 +54,6 @@ LINEAR_VISITS = tuple(
     for speed in (0.10, 0.15, 0.20)
     for force in (1.0, 2.5, 5.0)
 )
-TABLE_1 = ((445, 2, 2, 1, 1), (1, 427, 15, 1, 6), (1, 4, 437, 2, 7), (1, 2, 2, 443, 2))
 ANN, SVM, ANN_VOTE, SVM_VOTE = 'ets-linear-ann', 'ets-linear-svm', 'ets-linear-ann-vote', 'ets-linear-svm-vote'
 METHODS = (
     Method(ANN, Figures(0.851, 0.787, 0.088)),

@@ -183,9 +183,9 @@ class SimulatedArm(Arm):
         self._clock = clock
         self._own_thread = own_thread
         self._last_command = (STANDSTILL, clock())  # the command, and when it came
-        self._delay_s = 0.0 if params.force_mode else params.loop_delay_s
+        delay_s = 0.0 if params.force_mode else params.loop_delay_s
         start: Vector = (0.0, 0.0, params.start_height_m)
-        self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0, delay_s=self._delay_s)
+        self._state = ArmState(clock(), start, (0.0, 0.0, 0.0), 0.0, delay_s=delay_s)
         self._frozen = self._jammed = False
         self._fault = ''
         self._push_n = 0.0
