@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import dataclasses
+import math
 import os
 import re
 import selectors
@@ -662,13 +663,26 @@ def _truth(text: str, where: str) -> bool:
     return value
 
 
+def _number(text: str, name: str, lowest: float) -> float:
+    """Return a number of a node that is finite and not below the lowest that is allowed."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not lowest <= number < math.inf:
+        raise InvalidLaunch(f"'{name}' of <node> is '{text}'; a number from {lowest:g} is needed")
+    return number
+
+
 def _wanted(element: Element, scope: Scope) -> bool:
-    """Return whether its conditions are met."""
-    return all(
-        _truth(scope.expand(element.attrib[name]), f"'{name}' of <{element.tag}>") == (name == 'if')
-        for name in CONDITIONS
-        if name in element.attrib
-    )
+    """Return whether its condition is met; true without one."""
+    given = [name for name in CONDITIONS if name in element.attrib]
+    if len(given) > 1:
+        raise InvalidLaunch(f"<{element.tag}> has both 'if' and 'unless'; give one of them")
+    if not given:
+        return True
+    met = _truth(scope.expand(element.attrib[given[0]]), f"'{given[0]}' of <{element.tag}>")
+    return met == (given[0] == 'if')
 
 
 class _Reader:
@@ -764,8 +778,8 @@ class _Reader:
                 parameters=tuple(_parameter(item, scope) for item in element.findall('param')),
                 remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),
                 respawn=_truth(texts['respawn'] or 'false', "'respawn' of <node>"),
-                respawn_delay_s=parameter_value(texts['respawn_delay'] or '0', 'float'),
-                respawn_max_retries=parameter_value(texts['respawn_max_retries'] or '-1', 'int'),
+                respawn_delay_s=_number(texts['respawn_delay'] or '0', 'respawn_delay', 0.0),
+                respawn_max_retries=int(_number(texts['respawn_max_retries'] or '-1', 'respawn_max_retries', -1.0)),
                 needed=texts['on_exit'] == 'shutdown',
                 environment=dict(scope.environment),
             )
