@@ -189,6 +189,9 @@ def test_an_address_that_sends_wrong_tokens_waits_longer_after_each_and_one_and_
     assert guesses.wait_s('b') == 0.0
     now[0] = 16.0
     assert guesses.wait_s('a') == 0.0
+    for number in range(2000):
+        guesses.note('a', f'another {number}')
+    assert guesses.wait_s('a') == 300.0
 
     async def story(client, nodes):
         for number in range(6):

@@ -122,7 +122,8 @@ class Guesses:
         count, last_s, _ = self._wrong.get(address, (0, 0.0, ''))
         if count <= FREE_GUESSES:
             return 0.0
-        return max(0.0, last_s + min(2.0 ** (count - FREE_GUESSES), LONGEST_WAIT_S) - self._clock())
+        doublings = min(count - FREE_GUESSES, 60)  # a power of thousands overflows
+        return max(0.0, last_s + min(2.0**doublings, LONGEST_WAIT_S) - self._clock())
 
     def note(self, address: str, token: str) -> None:
         """Count a wrong token; of too many addresses the one that is silent for longest is forgotten."""
