@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError
+from texture_core.config import from_mapping
+from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.framing import Frame
 from texture_core.types import TactileSignal, lost_samples
 from texture_drivers.biotac import (
@@ -206,6 +207,11 @@ def test_a_damaged_word_is_nan_in_its_own_channel_and_finger() -> None:
     assert np.flatnonzero(np.isnan(second)).tolist() == [2]
     assert (topics['finger1/signal'][-1].samples == 200).all()
     assert sensor.counts['damaged_words'] == len(topics['finger1/signal_static'])
+
+
+def test_a_sensor_has_at_most_five_fingers() -> None:
+    with pytest.raises(InvalidParameter, match='finger'):
+        from_mapping(SensorParams, {'finger': 5})
 
 
 def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:

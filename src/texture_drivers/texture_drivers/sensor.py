@@ -42,6 +42,7 @@ class BatchParams:
 class SensorParams(BatchParams):
     """Where the sensor is and how its samples are delivered."""
 
+    finger: int = param(0, 'Index of the finger that is read; 0 is the first one of the device.', low=0, high=4)
     device: str = param(
         '/dev/rq_tsf85_0',
         "Path of the device; a symbolic link is followed at each opening. 'auto' finds the only TSF-85 on USB.",
