@@ -104,7 +104,8 @@ def test_an_operator_explores_sees_the_estimate_tares_and_stops_the_next_explora
     said = next((said for _ in range(3) if 'ended as asked' in (said := operator.post('explore', SHORT))), '')
     assert said
     operator.until(lambda frame: frame['texture']['final'] and frame['texture']['label'] in SURFACES)
-    assert operator.post('tare', {}).endswith(' tared')
+    # Too few samples come while the machine is busy; the operator is told so, and presses again.
+    assert any(operator.post('tare', {}).endswith(' tared') for _ in range(5))
     with ThreadPoolExecutor() as pool:
         aborted = pool.submit(operator.post, 'explore', LONG)
         operator.until(lambda frame: frame['state']['phase'] == 'slide')

@@ -90,8 +90,11 @@ def test_the_arm_moves_as_commanded_and_stops(arm):
 
 
 def test_the_arm_stops_by_itself_when_it_hears_nothing(arm):
-    arm.command(ArmCommand(normal_m_s=0.01))
-    wait_for(lambda: arm.state().velocity[2] > 0)
+    def moves():
+        arm.command(ArmCommand(normal_m_s=0.01))
+        return arm.state().velocity[2] > 0
+
+    wait_for(moves)
     wait_for(lambda: not any(arm.state().velocity))
 
 
