@@ -431,7 +431,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'commands': (
         'Commands',
         'Each is called as `texture NAME`, and has `--help`. It ends with 0 for success, 2 if an argument is wrong or '
-        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C broke it off.',
+        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C interrupted it.',
         commands,
     ),
     'parameters': (
@@ -444,7 +444,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'catalogues': (
         'Catalogues',
         'All names that recipes, scenes, requests and parameters may use. Instead of a name write `module:Class` for '
-        'one of your own.',
+        'a custom one.',
         parts(
             ('Sensors', 'Values of the parameter `sensor`.', catalogue(SENSORS)),
             ('Arms', 'Values of the parameter `arm`.', catalogue(ARMS)),
@@ -491,7 +491,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
             ('Roughness', 'Mean error of the roughness grades, in the paper and here.', grades),
             (
                 'Experiments',
-                'All methods of each experiment: the share of the tested slides that were recognised, where a tie '
+                'All methods of each experiment: the fraction of the tested slides that were recognised, where a tie '
                 'counts as not recognised, and what was found about the claims of its paper.',
                 experiments,
             ),

@@ -206,7 +206,7 @@ class Commander:
         """Return that another commands the arm, once ROS has shown it."""
         begin_ns, found_s = self.machine.second_ns, self.machine.trial.found_s
         seen = begin_ns and (self.machine.now_ns - begin_ns) * 1e-9 >= found_s
-        return 'another explorer commands the arm, too' if seen else ''
+        return 'another explorer also commands the arm' if seen else ''
 
     def beat(self, *, moving: bool) -> None:
         """There is no guard."""

@@ -105,7 +105,7 @@ def map_forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> list[Out]:
         try:
             return list(pool.map(_do, jobs))
         except BrokenProcessPool as error:
-            sentence = 'a measurement ended without an answer; see above, or give it more memory'
+            sentence = 'a measurement ended without a result; see above, or give it more memory'
             raise DeviceError(sentence) from error
 
 

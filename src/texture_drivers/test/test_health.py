@@ -172,7 +172,7 @@ BOTH = ('finger0/signal', 'finger0/signal_imu', 'finger1/signal')
 def test_a_finger_that_drops_out_is_an_error_with_its_name() -> None:
     assert two_fingers_after(BOTH, BOTH) == ('OK', 'streaming')
     dropped = two_fingers_after(BOTH, BOTH[:2], BOTH[:2])
-    assert dropped == ('ERROR', 'no sample comes any more of finger1; check its plug')
+    assert dropped == ('ERROR', 'no more samples from finger1; check its plug')
     assert two_fingers_after(BOTH, BOTH[:2], BOTH[:2], BOTH) == ('OK', 'streaming')
 
 

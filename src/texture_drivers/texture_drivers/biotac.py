@@ -395,7 +395,7 @@ class Cheetah(SpiLink):
         free = [port for port in list(ports)[: max(0, found)] if not port & self._api.CH_PORT_NOT_FREE]
         if not free:
             raise DeviceError(
-                f'no free Cheetah adapter is there ({max(0, found)} found); plug it in, or close the program using it'
+                f'no free Cheetah adapter ({max(0, found)} found); plug it in, or close the program using it'
             )
         return int(self._checked(self._api.ch_open(free[0]), 'opening'))
 
@@ -633,7 +633,7 @@ class BioTac:
         missing = [finger for finger in self._prefixes if finger >= places]
         if missing:
             raise DeviceError(
-                f"finger {missing[0]} is asked for, and the board at '{self._params.device}' has places 0 to "
+                f"finger {missing[0]} is requested, and the board at '{self._params.device}' has places 0 to "
                 f'{places - 1}; set the parameter finger to one of them'
             )
 
@@ -642,8 +642,8 @@ class BioTac:
         limit_ns = now_ns - SILENCE_S * NANOSECONDS
         if self._last_received_ns[-1] < limit_ns:
             raise DeviceError(
-                f"device '{self._params.device}' is open but sends no whole frames; check that it is a BioTac bridge "
-                'and runs, or replug it'
+                f"device '{self._params.device}' is open but sends no complete frames; check that it is a BioTac "
+                'bridge and runs, or replug it'
             )
         if all(self._last_received_ns[finger] < limit_ns for finger in self._prefixes):
             places = ' or '.join(str(finger) for finger in self._prefixes)

@@ -72,7 +72,7 @@ def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
         raise InvalidParameter(f'settings {config} have the `channels` {safe_repr(listed)}; list one for each input')
     channels = [from_mapping(DaqChannel, item, f'settings {config}, channel {i + 1}') for i, item in enumerate(listed)]
     if len({channel.name for channel in channels} - {''}) < len(channels):
-        raise InvalidParameter(f'settings {config}: give each channel a `name` of its own')
+        raise InvalidParameter(f'settings {config}: give each channel a unique `name`')
     return from_mapping(DaqSettings, content, f'settings {config}'), channels
 
 

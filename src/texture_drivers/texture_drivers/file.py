@@ -316,9 +316,7 @@ class FilePlayer:
         except InvalidData as error:
             raise DeviceError(str(error)) from error
         if not (self._settings.rate_hz or recording.rate_hz):
-            raise DeviceError(
-                f"recording '{self._params.device}' does not tell its rate; set `rate_hz` in the settings"
-            )
+            raise DeviceError(f"recording '{self._params.device}' has no rate; set `rate_hz` in the settings")
         return recording
 
     def _has_more(self, samples: NDArray[np.float32]) -> bool:

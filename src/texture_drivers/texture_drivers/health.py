@@ -131,8 +131,8 @@ class TareParams:
     )
     auto_tare: bool = param(
         False,
-        'Tares by itself while no exploration touches anything, at the start and whenever the level has drifted; it '
-        "needs the topic 'exploration'.",
+        'Tares automatically while no exploration touches anything, at the start and whenever the level has drifted; '
+        "it needs the topic 'exploration'.",
     )
 
 
@@ -379,8 +379,8 @@ class SensorHealth:
         conditions = (
             (bool(self._reader.fault), 'ERROR', self._reader.fault),
             (age_s > NO_SAMPLE_TIMEOUT_S, 'ERROR', f'no sample for {age_s:.1f} s; check the sensor'),
-            (bool(dropped), 'ERROR', f'no sample comes any more of {" and ".join(dropped)}; check its plug'),
-            (new.get('reopened', 0) > 0, 'WARN', 'the sensor was gone and has been opened again'),
+            (bool(dropped), 'ERROR', f'no more samples from {" and ".join(dropped)}; check its plug'),
+            (new.get('reopened', 0) > 0, 'WARN', 'the sensor was disconnected and has been opened again'),
             (new.get('lost', 0) > 0, 'WARN', f'{new.get("lost", 0)} samples lost since the last report'),
             (
                 new.get('bogus', 0) > MAX_BAD_PACKETS_PER_S * period_s,

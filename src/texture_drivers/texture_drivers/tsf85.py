@@ -278,7 +278,7 @@ class Tsf85Settings:
     """Whether and how the inertial sensors of the finger are published, as topic 'signal_imu'."""
 
     imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'signal_imu'.")
-    magnetometer: bool = param(False, 'Publishes the magnetic field too, which only few firmware versions send.')
+    magnetometer: bool = param(False, 'Also publishes the magnetic field, which few firmware versions send.')
     # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
     acceleration_count_g: float = param(
         16384.0,

@@ -95,7 +95,7 @@ def trained_at(model, speed_m_s):
 
 def test_outside_what_was_trained_nothing_is_known_or_decided_and_every_estimate_says_why(model, examples):
     slow = under(vectors(examples), speed_m_s=0.02, motion='linear_slide')
-    sentence = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
+    sentence = 'outside the training: speed 0.02 m/s, trained 0.05 m/s'
     assert any(estimate.decided for estimate in predict(unlimited(model), slow))
     for estimate in predict(trained_at(unlimited(model), 0.05), slow):
         assert (estimate.accepted, estimate.decided, estimate.prediction_set) == (False, False, ())

@@ -89,7 +89,7 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
 # Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
-OUTSIDE = 'outside what was trained'
+OUTSIDE = 'outside the training'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
 REACH = {'sessions': 'session', 'places': 'place', 'fingers': 'sensor'}  # and what tells them of a slide
 

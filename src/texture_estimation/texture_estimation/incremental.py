@@ -113,7 +113,7 @@ class IncrementalClassifier:
             )
         if others:
             raise ChangeRefused(
-                f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
+                f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot also be '{label}': "
                 'undo that first, or explore again',
                 ChangeError.ALREADY_ADDED,
             )

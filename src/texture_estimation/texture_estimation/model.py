@@ -141,7 +141,7 @@ def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
         text = json.dumps(card, indent=1) + '\n'
     except TypeError as error:
         raise InvalidData(
-            f'this model cannot be saved: {error}; what a learner of your own trains must be arrays and plain values'
+            f'this model cannot be saved: {error}; what a custom learner trains must be arrays and plain values'
         ) from error
     replace_file(arrays_path, content)
     replace_file(card_path, text.encode())

@@ -89,7 +89,7 @@ class NextTouchModel:
             if not over.all():
                 raise InvalidData(f'{motion} has no slide over {", ".join(names[~over])}; slide over every texture')
         if counts.max() < LEAST:
-            raise InvalidData('one slide of a kind over each texture does not tell how much slides differ; add some')
+            raise InvalidData('one slide of a kind over each texture does not show how much slides differ; add some')
         (projection, means), sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
         return cls(tuple(names.tolist()), sure * projection, tuple(made), sure * means)
 

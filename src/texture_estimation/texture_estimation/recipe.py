@@ -114,14 +114,14 @@ class DecisionParams(TrainingParams):
     speed_margin: float = param(
         0.15,
         'How far the speed of an exploration may lie outside the speeds of the training, relative to them; '
-        'beyond, the estimate says that it is outside what was trained.',
+        'beyond, the estimate is rejected as outside the training.',
         low=0.0,
         high=100.0,
     )
     force_margin: float = param(
         0.3,
         'How far the force of an exploration may lie outside the forces of the training, relative to them; '
-        'beyond, the estimate says that it is outside what was trained.',
+        'beyond, the estimate is rejected as outside the training.',
         low=0.0,
         high=100.0,
     )

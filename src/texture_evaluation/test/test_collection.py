@@ -192,7 +192,7 @@ def test_it_ends_at_the_bound_not_before_the_fewest_places():
 def test_a_bound_that_is_not_met_says_what_is_missing():
     end, _ = run([PlaceAccuracy(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
     assert (end.error, end.slides) == (CollectionError.BOUND_MISSED, 9)
-    assert 'mostly misidentified as felt' in end.message and 'collect felt at more places, too' in end.message
+    assert 'mostly misidentified as felt' in end.message and 'also collect felt at more places' in end.message
 
 
 def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():

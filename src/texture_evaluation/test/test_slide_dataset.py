@@ -97,7 +97,7 @@ def test_speeds_within_five_per_cent_are_one_condition() -> None:
 def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> None:
     with pytest.raises(InvalidData, match="no condition 'colour'; use one of speed, force"):
         from_arrays().condition('colour')
-    with pytest.raises(InvalidData, match="slide 'cork/1' and 5 others do not tell their force"):
+    with pytest.raises(InvalidData, match="slide 'cork/1' and 5 others have no force"):
         from_arrays(force_n=math.nan).condition('force')
 
 

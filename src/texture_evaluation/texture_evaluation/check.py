@@ -30,7 +30,7 @@ from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
-UNMEASURED = 'noise and drift were not measured, for too little was recorded before the touch'
+UNMEASURED = 'noise and drift were not measured, as too little was recorded before the touch'
 
 
 def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
@@ -64,12 +64,12 @@ def store_reference(
 ) -> str:
     """Store the last slide over the plate as that of the finger of the training, once the one before shows the same."""
     if len(slides) < 2:
-        raise InvalidData('one slide over the plate does not prove itself; record two, and store again')
+        raise InvalidData('one slide over the plate does not show repeatability; record two, and store again')
     before, last = (statistics_of(slide, topics) for slide in slides[-2:])
     if faults := _faults({topic: compare(before[topic], last[topic]) for topic in last}):
         raise InvalidData(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
-            'finger, close what else the machine computes, and store again'
+            'finger, stop other programs on the computer, and store again'
         )
     path = write_reference(model, last, _numbers_of(request) if request else _numbers_shown(slides[-1]))
     unknown = '' if all(np.isfinite(one.rest_rms).all() for one in last.values()) else f'; {UNMEASURED}'

@@ -242,8 +242,8 @@ class PlaceAccuracy:
             f'{100 * band.far_m:.0f} cm {band.correct} of {band.places} ({band.accepted} accepted)'
             for band in self.bands
         )
-        spacing = f'be {100 * self.spacing_m:.0f} cm apart' if self.spacing_m else 'not even be that near'
-        return f'{found}; at most so far from the nearest trained place: {by_distance}; tracks may {spacing}'
+        spacing = f'up to {100 * self.spacing_m:.0f} cm' if self.spacing_m else 'smaller than these distances'
+        return f'{found}; by distance to the nearest trained place: {by_distance}; spacing of tracks: {spacing}'
 
 
 def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
@@ -358,7 +358,7 @@ def collect(
         return ended(CollectionError.NOT_RECORDED, str(error))
     missing = f'; the bound of {100 * params.bound:.0f} % is not met: '
     missing += (
-        f'collect {accuracy.confused} at more places, too, or other speeds and forces, or add slow channels'
+        f'also collect {accuracy.confused} at more places, use other speeds and forces, or add slow channels'
         if accuracy.confused
         else 'allow more places'
     )

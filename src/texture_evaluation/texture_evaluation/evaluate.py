@@ -293,8 +293,8 @@ def summary(report: EvaluationReport) -> list[str]:
         lines.append(f'of other surfaces, {by_reason(figures["rejections_of_untrained"])}')
     if report.trained_on:
         lines.append(
-            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures say too '
-            'much; leave them out with --slides'
+            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures are '
+            'optimistic; leave them out with --slides'
         )
     if report.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')

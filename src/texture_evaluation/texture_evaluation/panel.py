@@ -219,7 +219,7 @@ def _uneven_raters(ratings: Ratings) -> Iterator[str]:
         used = (np.rint(row)[:, None] == RATINGS_GRADES).sum(axis=0)
         if used.min() < low or used.max() > high:
             shown = ', '.join(f'{count} × {grade}' for grade, count in zip(RATINGS_GRADES, used, strict=True))
-            yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are asked'
+            yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are required'
 
 
 def _allowed_a_grade(n_textures: int) -> tuple[int, int]:

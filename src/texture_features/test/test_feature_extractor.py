@@ -111,7 +111,7 @@ def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
     bench.until(lambda: bench.features and bench.features[-1].last)
     assert bench.features[-1].skipped == 4
     assert [vector.sequence for vector in bench.features] == list(range(len(bench.features)))
-    bench.until(lambda: any('nothing has come yet on signal' in report.status[0].message for report in bench.reports))
+    bench.until(lambda: any('no message yet on signal' in report.status[0].message for report in bench.reports))
 
 
 def test_broken_messages_are_counted_and_survived(bench):

@@ -470,10 +470,10 @@ def fingerprint_difference(came: str, trained: str) -> str:
             return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
     if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
         return (
-            'the correction of the finger is another; start the feature_extractor and the classifier again, both with '
+            'the correction of the finger differs; start the feature_extractor and the classifier again, both with '
             "the model's card"
         )
-    return "features or window length are others; start the feature_extractor with the model's card as its recipe"
+    return "features or window length differ; start the feature_extractor with the model's card as its recipe"
 
 
 def _inputs(fingerprint: str) -> dict[str, tuple[str, str]]:

@@ -659,7 +659,7 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests:
     Each seed is kept in the folder `seeds`; what is there already, with the digests of now, is not run again.
     """
     if count < 2:
-        raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')
+        raise InvalidParameter(f'{count} seeds were requested; two or more are needed for an interval over seeds')
     seeds = [replace(experiment, seed=experiment.seed + number) for number in range(count)]
     first, *others = [_kept(run, name, one, digests) for one in seeds]
     return replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))

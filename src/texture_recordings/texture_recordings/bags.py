@@ -186,7 +186,7 @@ def _has_end(file: BinaryIO) -> bool:
     if summary and checksum:
         file.seek(min(summary, size))
         if crc32(file.read()[:-CHECKSUM_FROM_END]) != checksum:
-            raise FileRefused('its index was altered: the checksum is another')
+            raise FileRefused('its index was altered: the checksum differs')
     file.seek(0)
     return True
 

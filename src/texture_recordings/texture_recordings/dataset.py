@@ -247,7 +247,7 @@ class SlideDataset:
         unknown = np.flatnonzero(np.isnan(values))
         if len(unknown):
             raise InvalidData(
-                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others do not tell their {name}; "
+                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others have no {name}; "
                 f'use slides that were recorded with it, or another condition'
             )
         return _grouped(values, circular=name == 'direction')
@@ -335,7 +335,7 @@ class SlideDataset:
         if count < 2:
             raise InvalidData(f'slides are to be cut into {count} parts; 2 or more are needed')
         if cut := next((slide for slide in self.slides if slide.is_part or not slide.sliding), None):
-            why = 'is a part already' if cut.is_part else 'tells no time of sliding'
+            why = 'is a part already' if cut.is_part else 'has no time of sliding'
             raise InvalidData(f"slide '{cut.name}' in '{cut.bag}' {why}; cut whole slides with their states")
         runs: dict[str, list[Stretch]] = {}
         for surface in dict.fromkeys(slide.surface for slide in self.slides):

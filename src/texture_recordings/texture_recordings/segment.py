@@ -42,7 +42,7 @@ def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, na
     for topic, _, value in read_bag(path, (FAST_TOPIC, STATE_TOPIC), namespace):
         (reported if topic == STATE_TOPIC else signals).append(value)
     if not signals:
-        raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; record the vibration too")
+        raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
     found = segment_recording(signals, params, exploration_id=path.name)
     states = _labelled(found, sorted(reported, key=lambda state: state.stamp_ns), surface)
     _write(path, out, states, namespace)

@@ -141,7 +141,7 @@ class EmulatorParams:
         high=1.0,
     )
     finger_pipe: str = param(
-        f'{DEVICES}/finger', 'Path of the named pipe that appears, on which the emulated arm tells where the finger is.'
+        f'{DEVICES}/finger', 'Path of the created named pipe, on which the emulated arm sends the finger state.'
     )
 
 

@@ -68,7 +68,7 @@ class Graph:
         deadline = time.monotonic() + deadline_s
         while not condition():
             if time.monotonic() > deadline:
-                raise DeviceError(f'{what}: nothing of it within {deadline_s:g} s; see what the nodes say')
+                raise DeviceError(f'{what}: nothing of it within {deadline_s:g} s; see the logs of the nodes')
             self._executor.spin_once(timeout_sec=POLL_S)
 
     def spin(self, seconds: float) -> None:

@@ -51,7 +51,7 @@ UNLOADED = frozenset(
 class SensorNodeParams(TareParams, SensorParams):
     """Parameters of the sensor node."""
 
-    sensor: str = param('tsf85', "Sensor that is read: a name of the catalogue, or 'module:Class' of your own.")
+    sensor: str = param('tsf85', "Sensor that is read: a name of the catalogue, or the 'module:Class' of a custom one.")
     autostart: bool = param(
         True, 'Configures and activates the node at start-up, so that no lifecycle manager is needed.'
     )

@@ -333,7 +333,7 @@ def _classifier(name: str) -> Any:
     if not PUBLIC_CLASS.fullmatch(name):
         raise InvalidParameter(
             f'estimator is {safe_repr(name)}; a public class of scikit-learn such as {EXAMPLE} is needed; '
-            "one of your own is a Learner on PYTHONPATH, 'learner: {module:Class: {}}' (docs/extending.md)"
+            "a custom one is a Learner on PYTHONPATH, 'learner: {module:Class: {}}' (docs/extending.md)"
         )
     module, cls_name = name.split(':')
     try:

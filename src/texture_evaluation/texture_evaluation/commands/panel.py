@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
 def summary(report: Mapping[str, Any]) -> list[str]:
     """Return the figures in lines for people."""
     textures, violations = report['textures'], report['protocol_violations']
-    lines = [f'{report["raters"]} people, {len(textures)} textures; {report["note"] or "grades as they stand"}']
+    lines = [f'{report["raters"]} people, {len(textures)} textures; {report["note"] or "grades as given"}']
     width = max(map(len, textures))
     lines += [
         f'  {name:<{width}}  {one["mean"]:.2f} ± {_number(one["std"])}   '

@@ -19,7 +19,7 @@ from texture_evaluation.train import train_from_bags, train_grades_from_bags
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument(
-        'recipe', help='name of a shipped recipe, such as default, or roughness with --grades, or path of your own'
+        'recipe', help='name of a shipped recipe, such as default, or roughness with --grades, or path of a recipe'
     )
     parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
     parser.add_argument(

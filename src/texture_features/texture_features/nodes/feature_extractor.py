@@ -100,10 +100,10 @@ class FeatureExtractor(Node):
         numbers = {**self._cutter.counts, 'invalid_messages': self._invalid}
         waiting = self._cutter.waiting_for
         if waiting:
-            return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
+            return 'WARN', f'no message yet on {", ".join(waiting)}', numbers
         dropped = self._cutter.dropped(time.monotonic())
         if dropped:
-            return 'WARN', f'nothing comes any more on {", ".join(dropped)}; no window can be cut without it', numbers
+            return 'WARN', f'no more messages on {", ".join(dropped)}; no window can be cut without it', numbers
         tare_faults = self._feature_set.tare_faults(self._tared)
         if tare_faults:
             return 'WARN', '; '.join(tare_faults), numbers

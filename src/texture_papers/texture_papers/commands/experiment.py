@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         '--tune', action='store_true', help='search the variables of each pair of textures, or of a regressor, first'
     )
     parser.add_argument(
-        '--seeds', type=int, default=1, metavar='N', help='so many seeds from --seed on: mean and interval over them'
+        '--seeds', type=int, default=1, metavar='N', help='number of seeds from --seed on: mean and interval over them'
     )
     parser.add_argument(
         '--search',

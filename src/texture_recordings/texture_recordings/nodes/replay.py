@@ -153,9 +153,9 @@ class ReplayNode(Node):
                 break
             if time.monotonic() > deadline:
                 raise DeviceError(
-                    f"nobody listens to '{missing[0]}' (waited {self._params.deadline_s:g} s), so nothing is played; "
-                    f'`texture launch replay bag:={self._params.bag}` starts what listens, too, and --namespace names '
-                    'nodes that run elsewhere'
+                    f"nothing subscribes to '{missing[0]}' (waited {self._params.deadline_s:g} s); "
+                    f'`texture launch replay bag:={self._params.bag}` also starts the subscribers, and --namespace '
+                    'names nodes that run elsewhere'
                 )
 
     def _wait_alone(self) -> None:

@@ -127,7 +127,7 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
 
     ip: str = param(
         '127.0.0.2',
-        'Loopback address to listen on, as the ports are fixed; or a path, which stands for one of its own.',
+        'Loopback address to listen on, as the ports are fixed; or a path, from which an address is derived.',
     )
     version: str = param('5.12', 'Version of the emulated control software.', choices=tuple(VERSIONS))
     force_noise_n: float = param(0.02, 'Standard deviation of the noise of the force sensor.', unit='N', low=0.0)
@@ -761,7 +761,7 @@ class Server:
         except OSError as error:
             raise DeviceError(
                 f'the emulated UR controller cannot listen on {ip}:{port}: {error}; give each controller '
-                "a loopback address of its own, such as '127.0.0.3'"
+                "a separate loopback address, such as '127.0.0.3'"
             ) from error
         listener.setblocking(False)
         self._listeners[listener] = make_session
