@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The golden set: what recipes say of fixed slides and arms are sent, so that a change of the structure changes none.
+"""The golden set: results of recipes on fixed slides, and what arms are sent, so that refactoring changes none.
 
 `python tools/golden.py --check` computes all rows anew and compares them with `golden.json`; `--write` stores them.
 `--only WORD` takes the rows whose name contains the word, in both uses. A row is a recipe on a source of slides: a
@@ -12,8 +12,8 @@ replaced: a recipe whose pairs only vote, such as ets-linear-svm, shows a change
 A row 'arms: NAME' holds the phases of one exploration and what was sent to the arm or hand, thinned; where only real
 time exists, the kinds of commands on the wire.
 
-A difference is explained or mended, never re-recorded in silence: the commit that writes `golden.json` again says which
-rows changed, and why.
+A difference is explained or fixed, never re-recorded without a reason: the commit that writes `golden.json` names the
+changed rows, and why.
 """
 
 from __future__ import annotations
@@ -283,7 +283,7 @@ def _dataset(bags: Sequence[Path], slides: str, topics: Sequence[str], crossed: 
         signals = {}
         for topic, batches in x.signals.items():
             more = y.signals[topic]
-            # As many samples are missing between the parts as the clock says.
+            # As many samples are missing between the parts as the clock shows.
             end, gap_ns = batches[-1], more[0].stamp_ns + later_ns - batches[-1].end_ns
             shift = end.next_sample + round(gap_ns * 1e-9 * end.sampling_rate_hz) - more[0].first_sample
             signals[topic] = (
@@ -295,7 +295,7 @@ def _dataset(bags: Sequence[Path], slides: str, topics: Sequence[str], crossed: 
 
 
 def _recognised(name: str, bags: Sequence[Path]) -> dict[str, Any]:
-    """Return what a recipe learns, and what it says of slides it has not seen."""
+    """Return what a recipe learns, and its estimates of slides that were not trained."""
     recipe = load_recipe(name)
     crossed = any('@' in topic for topic in recipe.as_mapping()['inputs'])
     topics = recipe.feature_set.topics
@@ -538,7 +538,7 @@ def check(only: str = '', strict: bool = False) -> list[str]:
 
 
 def main() -> int:
-    """Write or check, as the command line says."""
+    """Write or check, as the command line requests."""
     parser = argparse.ArgumentParser(description='the golden set of the suite')
     use = parser.add_mutually_exclusive_group(required=True)
     use.add_argument('--write', action='store_true', help='store the rows; explain every change in the commit')

@@ -69,7 +69,7 @@ def parameter_table(cls: type) -> str:
 
 
 def messages(root: Path) -> str:
-    """Return all interfaces as Markdown: what a file says before its first field, then the file as it is."""
+    """Return all interfaces as Markdown: what a file documents before its first field, then the file as it is."""
     parts = []
     for kind, title in INTERFACE_KINDS.items():
         parts.append(f'## {title}\n')
@@ -398,7 +398,7 @@ def experiments(root: Path) -> str:
 
 
 def elements(root: Path) -> str:
-    """Return what each paper says and what is done here, element by element, from the docstrings of its module."""
+    """Return what each paper describes and what is done here, element by element, from the docstrings of its module."""
     return '\n\n'.join(_elements(root / PAPERS / f'{name}.py', title) for name, title in PAPER_MODULES.items())
 
 

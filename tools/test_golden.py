@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The suite says of fixed slides what it said when the golden set was stored; see golden.py on what to do if not."""
+"""The suite gives the results of the stored golden set on fixed slides; see golden.py on what to do if not."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ LAUNCHING = {'launch_ros', 'launch_xml', 'ros2launch'}
 
 @dataclass(frozen=True)
 class Layer:
-    """What a package may import of the suite, what its tests may beside, and which libraries it must do without."""
+    """What a package may import of the suite, what its tests may in addition, and which libraries it must not need."""
 
     may: frozenset[str]
     tests: frozenset[str] = frozenset()
@@ -104,7 +104,7 @@ def of(*short: str) -> frozenset[str]:
 LEARNING = frozenset({'sklearn', 'skops', 'pymoo', 'joblib', 'distributed'})
 DRAWING = frozenset({'matplotlib'})
 SCIPY = frozenset({'scipy'})
-# As in docs/architecture.md. A package stands below all that it may import, so there can be no cycle.
+# As in docs/architecture.md. A package comes after all that it may import, so there can be no cycle.
 LAYERS: Mapping[str, Layer] = {
     'texture_msgs': Layer(of()),
     'texture_core': Layer(of('msgs'), never=LEARNING | DRAWING | SCIPY),
@@ -254,7 +254,7 @@ def test_the_table_of_layers_has_every_package_once_and_below_what_it_imports() 
     assert set(LAYERS) == {package.name for package in PACKAGES}
     above: set[str] = set()
     for name, layer in LAYERS.items():
-        assert layer.may <= above, f'{name} may import what stands below it'
+        assert layer.may <= above, f'{name} may import what comes after it'
         above.add(name)
 
 

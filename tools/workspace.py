@@ -58,7 +58,7 @@ def main() -> int:
 
 
 class SetupError(Exception):
-    """A sentence that says what is missing and what to do."""
+    """A sentence that states what is missing and what to do."""
 
 
 def own_interpreter() -> list[str]:
@@ -109,7 +109,7 @@ def checked_distribution(sourced: str) -> str:
 
 
 def once(step: str, version: tuple[int, ...], inputs: list[Path], action: Callable[[], None], extra: str = '') -> str:
-    """Run `action` unless the stamp of `step` says that it ran on just these inputs; return the stamp."""
+    """Run `action` unless the stamp of `step` shows that it ran on these inputs; return the stamp."""
     digest = hashlib.sha256(f'{version} {ROOT} {extra}'.encode())
     for path in inputs:
         digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
@@ -136,7 +136,7 @@ def make_venv(interpreter: str, sourced: str) -> None:
 
 
 def install_packages(sourced: str) -> None:
-    """Install the locked packages, or what is missing beside a sourced installation."""
+    """Install the locked packages, or what is missing from a sourced installation."""
     print('set-up: installing packages')
     pip = [PYTHON, '-m', 'pip', '--disable-pip-version-check', '--quiet', 'install']
     if sourced:

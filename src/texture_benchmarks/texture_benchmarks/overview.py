@@ -303,7 +303,7 @@ def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def spread(wanted: Sequence[float], apart: float) -> list[float]:
-    """Return heights near those wanted, in the same order, at least so far apart."""
+    """Return heights near those wanted, in the same order, with at least this spacing."""
     order = sorted(range(len(wanted)), key=wanted.__getitem__)
     found = {order[0]: wanted[order[0]]} if order else {}
     for before, number in pairwise(order):

@@ -35,7 +35,7 @@ RECIPES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     'kaboli-em': ('kaboli-em', {}),
     'default, ours': ('default', {}),
 }
-# One finger gives 8 numbers; two slides over one material stand for the two fingers of the paper.
+# One finger gives 8 numbers; two slides over one material represent the two fingers of the paper.
 OF_TWO = ('kaboli-svm', 'kaboli-pa', 'kaboli-pa, 200 passes', 'kaboli-em')
 QUICK = ('ets-linear-svm-vote', 'kaboli-pa')
 PLACES = ('1/2', '2/2')
@@ -57,7 +57,7 @@ def recipe_of(name: str) -> Recipe:
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes of the papers on slides over one half of a track, and test other slides over both halves.
 
-    Fraction of the slides that are right at their end, of one finger; of two, where two slides stand for two fingers.
+    Fraction of the slides that are right at their end, of one finger; of two, where two slides represent two fingers.
     Intervals of 95 % by bootstrap over material × half.
     """
     some = ('1-12', ('material01', 'material02', 'material03')) if options.quick else ()

@@ -64,7 +64,7 @@ class FeatureSpread:
         )
 
     def textures(self, labels: int, rng: np.random.Generator) -> Array:
-        """Return the centres of so many textures."""
+        """Return the centres of this many textures."""
         return self.mean + rng.standard_normal((labels, len(self.mean))) @ self.among_textures
 
     def slides(
@@ -102,7 +102,7 @@ KIB_PER_MIB = 1024.0
 
 
 def _measure(recipe: Recipe, spread: FeatureSpread, seed: int, labels: int) -> dict[str, Any]:
-    """Return what one training on so many textures costs, and what its model recognises of another slide of each."""
+    """Return what one training on this many textures costs, and what its model recognises of another slide of each."""
     rng = np.random.default_rng(seed)
     textures = spread.textures(labels, rng)
     examples = spread.slides(textures, SLIDES, WINDOWS, rng)

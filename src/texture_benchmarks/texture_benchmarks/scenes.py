@@ -96,7 +96,7 @@ REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
     },
     'sticky': {'patch_growth': PatchGrowth(), 'unevenness': Unevenness(0.1)},
 }
-# Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
+# Effects that no scene names: each alone is added to `HOST`, with the default strength, to be measured.
 HOST = 'twelve_textures'
 ADDED = ('skids',)
 
@@ -158,7 +158,7 @@ def ablate(
 ) -> dict[str, Any]:
     """Return the accuracy on a scene, and how it changes without each of its terms, or of some, one at a time.
 
-    About so many slides are trained on, and as many tested; all is repeated with other random numbers. Of each term
+    About this many slides are trained on, and as many tested; all is repeated with other random numbers. Of each term
     'accuracy_without' is the change when neither training nor test has it, 'accuracy_trained_without' that when only
     the test has it.
     """

@@ -49,7 +49,7 @@ class BenchmarkOptions:
     budget_s: float = math.inf  # After so long such a study ends with the pieces that it has
 
     def recordings(self, name: str) -> Path:
-        """Return the folder of a recorded data set, by its name; InvalidData says that it is missing."""
+        """Return the folder of a recorded data set, by its name; InvalidData if it is missing."""
         if self.data is None or not (self.data / name).is_dir():
             missing = f"there is no '{name}' in '{self.data}'" if self.data else 'no folder of recorded data was given'
             raise InvalidData(f'{missing}; give the folder that holds {name}/ with --data')
@@ -145,7 +145,7 @@ def _do(job: Any) -> Any:
 def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
     """Return the 95 % interval of a share of slides: by bootstrap over surfaces, or exact over slides where wider.
 
-    Slides over one surface are no independent draws. Where all surfaces are alike, resampling them says nothing.
+    Slides over one surface are no independent draws. Where all surfaces are alike, resampling them shows nothing.
     Source of the exact one: Clopper & Pearson 1934.
     """
     drawn = interval(np.stack([right, np.ones(len(right))], axis=1), surfaces)

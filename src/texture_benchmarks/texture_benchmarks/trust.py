@@ -193,11 +193,11 @@ class Outcome:
     # others were never decided
     early_right: int
     early_wrong: int
-    # final_right, final_wrong: slides with a right and with a wrong label that were taken for known at the end;
+    # final_right, final_wrong: slides with a right and with a wrong label that were accepted at the end;
     # the others were rejected
     final_right: int
     final_wrong: int
-    label_right: int  # Slides with the right label at the end, whether they were taken for known or not
+    label_right: int  # Slides with the right label at the end, whether they were accepted or not
     interval: tuple[
         float, float
     ]  # Of the share of those, 95 %, over surfaces: slides over one are no independent draws
@@ -230,7 +230,7 @@ Outcomes = dict[str, dict[str, Outcome]]  # by recipe and row
 
 
 def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> list[SlideResult]:
-    """Return what a model says of slides, window by window."""
+    """Return the estimates of a model for slides, window by window."""
     results = []
     for slide, vectors in SlideDataset(tuple(slides)).vectors(model.recipe.feature_set):
         evidence = EvidenceAccumulator(model)

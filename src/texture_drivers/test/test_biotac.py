@@ -359,7 +359,7 @@ def test_frames_hold_what_the_biotac_answered_to_each_command(api: StandIn) -> N
     ]
     replies = decode(frames[0].reply, BIOTAC, 3)
     assert replies.damaged.tolist() == [0, 44, 44]
-    # The stand-in answers with bits 6..1 of the command: twice the index, in the upper seven bits of the word.
+    # The mock answers with bits 6..1 of the command: twice the index, in the upper seven bits of the word.
     slow = dict(zip(BIOTAC.slow_channels, replies.slow[0, :, 0].tolist(), strict=True))
     assert (slow['tdc'], slow['pdc'], slow['electrode1']) == (3 * 32, 1 * 32, 17 * 32)
     assert (replies.pac[:, 0] == 0).all()

@@ -155,7 +155,7 @@ class TwoFingers(Scripted):
 
 
 def two_fingers_after(*seconds: tuple[str, ...]) -> tuple[str, str]:
-    """Return the last of the reports, one for each second, in which so many topics streamed."""
+    """Return the last of the reports, one for each second, in which this many topics streamed."""
     reader = SensorReader(TwoFingers(''), lambda *_: None)
     reader.fault = ''
     health = SensorHealth(reader, 0.0)
@@ -247,7 +247,7 @@ def unloaded() -> ChannelWatch:
 
 
 def feed(watched: ChannelWatch, stream: Stream, seconds: int, **added: float) -> list[str]:
-    """Feed so many seconds, with a review at the end of each; return the sentences of the last one."""
+    """Feed this many seconds, with a review at the end of each; return the sentences of the last one."""
     faults: list[str] = []
     for _ in range(seconds):
         for batch in stream.seconds(1.0, **added):

@@ -117,7 +117,7 @@ class Line:
         self.errors_s: list[float] = []
 
     def run(self, seconds: float, lost: int = 0, told: int = 0) -> list[int]:
-        """Return the difference between index and true number of each block; first so many samples are lost."""
+        """Return the difference between index and true number of each block; before it this many samples are lost."""
         self.sent += lost
         self.now_s = max(self.now_s, self.sent / RATE_HZ)
         offsets, until_s = [], self.now_s + seconds

@@ -69,7 +69,7 @@ class Wire:
         return os.write(self.device, bytes([0x9A, 0, 0x58, len(items)]) + items)
 
     def wait_until_there(self, count: int) -> None:
-        """Wait until so many bytes can be read: the kernel carries them over in its own time."""
+        """Wait until this many bytes can be read: the kernel transfers them asynchronously."""
         deadline_s = time.monotonic() + DEADLINE_S
         while struct.unpack('i', fcntl.ioctl(self.host, termios.FIONREAD, bytes(4)))[0] < count:
             assert time.monotonic() < deadline_s

@@ -33,7 +33,7 @@ END = b'\r\n'
 LOWEST_TEMPERATURE_C, HIGHEST_TEMPERATURE_C = -20.0, 85.0  # MLX90393 data sheet: where it works
 LARGEST_FIELD_UT = 50_000.0  # MLX90393 data sheet: its measurement range
 # At the gain and resolution that the vendor's library sets (0.15 µT a count, inferred) 16 bits end here: an axis that
-# stands there is saturated.
+# at that value is saturated.
 RANGE_UT = 4_900.0
 # The finest steps of an MLX90393 are some tenths of a microtesla and 0.02 °C: what is smaller than this and not 0 is no
 # measurement.

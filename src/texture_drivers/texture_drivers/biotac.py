@@ -150,7 +150,7 @@ class BioTacLayout:
         return SLOT_RATE_HZ / 2
 
     def frame_bytes(self, fingers: int) -> int:
-        """Return the length of the reply to one frame from a board with so many BioTacs."""
+        """Return the length of the reply to one frame from a board with this many BioTacs."""
         return len(self.slots) * (ECHO_BYTES + WORD_BYTES * fingers)
 
 
@@ -301,7 +301,7 @@ class FrameTracker:
 #
 # That module and its library are not free and not part of this project; who owns the adapter has them from the vendor.
 # The calls and their values are those of kth-ros-pkg/biotac_driver @6fb8e33 `biotac_sensors/src/biotac.c`. This file
-# has never met the hardware; its tests run against a stand-in.
+# has never been run on the hardware; its tests run against a mock.
 
 MODULE = 'cheetah_py'
 BITRATE_KHZ = 4400

@@ -58,7 +58,7 @@ class DaqSettings:
 
 
 def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
-    """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` says otherwise."""
+    """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` names others."""
     settings, channels = load_daq(params.config or DEFAULT_SETTINGS)
     decoder = StreamDecoder([stream(settings.rate_hz, channels)], params.frame_id)
     return SerialSensor(params, now_ns, decoder, baud=settings.baud)

@@ -170,7 +170,7 @@ def load_npy(file: BinaryIO) -> FileRecording:
 
 
 def load_npz(file: BinaryIO) -> FileRecording:
-    """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there.
+    """Return the array `samples`; `rate_hz` and `channels` next to it are used if present.
 
     Raises
     ------

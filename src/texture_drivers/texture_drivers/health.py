@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Is a stream as it should be: rate, dead or clipping channels, baseline, and what is said on /diagnostics."""
+"""Health of a stream: rate, dead or clipping channels, baseline, and the status on /diagnostics."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Tare:
 def saturated(
     samples: NDArray[np.float32], lowest: Array, highest: Array, least_fraction: float = 0.01
 ) -> NDArray[np.bool_]:
-    """Return which channels stand at an end of their range in more than a share of the samples."""
+    """Return which channels are at an end of their range in more than a fraction of the samples."""
     at_end = (samples <= lowest) | (samples >= highest)
     return at_end.mean(axis=0) > least_fraction
 
@@ -319,7 +319,7 @@ class SensorHealth:
     ERROR: the sensor cannot be reached, no sample came for 1 s, or none of a finger that came before. WARN: samples
     were lost or the sensor was opened again since the last report, a rate is more than 5 % off, more than 5 packets a
     second are refused, a channel is saturated, dead or has drifted, or a tare was refused. All that is assessed over
-    the time since the last report, so the level falls back by itself.
+    the time since the last report, so the level recovers automatically.
     """
 
     def __init__(self, reader: SensorReader, now_s: float, watch: ChannelWatch | None = None) -> None:

@@ -132,7 +132,7 @@ class SerialPort:
 
 
 def reason_of(error: Exception) -> str:
-    """Return what the operating system says of a fault, without the path that pyserial repeats in its own text."""
+    """Return the message of the operating system about a fault, without the path that pyserial repeats."""
     code = error.args[0] if len(error.args) > 1 else None  # termios.error has no errno
     return os.strerror(code) if isinstance(code, int) else str(error)
 
@@ -158,7 +158,7 @@ class Decoder:
 
     @property
     def details(self) -> Mapping[str, float]:
-        """What the device's stream shows beside the samples, by name."""
+        """What the device's stream shows in addition to the samples, by name."""
         raise NotImplementedError
 
     @property
@@ -249,7 +249,7 @@ class SerialSensor:
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """What the decoder knows beside the samples, such as how much the device's clock is slow."""
+        """What the decoder knows in addition to the samples, such as how much the device's clock is slow."""
         return self._decoder.details
 
     @property
@@ -364,7 +364,7 @@ class StreamDecoder(Decoder):
     """
 
     def __init__(self, streams: Sequence[FramedStream], frame_id: str = '') -> None:
-        self.malformed = 0  # frames that passed the checksum and hold another number of bytes than they say
+        self.malformed = 0  # frames that passed the checksum and hold another number of bytes than declared
         self.other_frames = 0  # frames of other kinds
         self.restarts = 0  # of the device's clock
         self.deframer = FrameDecoder()

@@ -120,7 +120,7 @@ class StreamClock:
         self._before = self._now = DelayModel(drift=self._drift)
 
     def skip(self, samples: int) -> None:
-        """Take the samples of this stream for later ones by so many: their times stay, their indices do not."""
+        """Shift the indices of the samples of this stream by this many; their times stay."""
         if self._origin is not None:
             first_index, first_ns = self._origin
             self._origin = first_index + samples, first_ns
@@ -176,7 +176,7 @@ class StreamClock:
         """Return whether the stream or the host's clock cannot be the one of before."""
         if not self._bins:
             return False
-        # No sample arrives before it was taken: times that say so are those of a stream at another rate.
+        # No sample arrives before it was taken: such times are those of a stream at another rate.
         if self._now.delay_ns_at(arrival.elapsed_ns, self._slew_rate) - arrival.delay_ns > self._step_ns:
             return True
         late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
@@ -359,7 +359,7 @@ class PacketNumbering:
     """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
 
     A stream that begins again need not begin on the beat of packets: what is less than a packet is carried on to the
-    next interruption, so that many of them do not add up to a loss that nobody counts.
+    next interruption, so that many of them do not add up to an uncounted loss.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -402,7 +402,7 @@ RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong sett
 class BlockCounter:
     """Count samples by the device's time of each block, cross-checked with the numbers of the frames they came in.
 
-    The time says how many samples are missing, whoever lost them: frames lost on the line show in their numbers too,
+    The time shows how many samples are missing, wherever they were lost: lost frames of the line show in their numbers,
     what is missing beyond them was left out by the device itself and counts as `overrun`.
     """
 

@@ -31,7 +31,7 @@ from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumberin
 # robotiq/ros @18335fa (`robotiq_tsf/src/PollData.cpp`). Both agree.
 
 START_BYTE = 0x9A
-HEADER_BYTES = 4  # start, checksum (sent as 0, checked by nobody), command, payload length
+HEADER_BYTES = 4  # start, checksum (sent as 0, never checked), command, payload length
 
 READ_SENSORS = 0x61
 AUTOSEND = 0x58
@@ -51,7 +51,7 @@ ITEMS: Mapping[int, Struct] = {
     MAGNETOMETER: Struct('>3h'),
     TEMPERATURE: Struct('>h'),
 }
-# Firmware up to 1.0.6 sends 16 bits, from 1.1.7 on 64 bits; the packet does not say which. The short one is tried
+# Firmware up to 1.0.6 sends 16 bits, from 1.1.7 on 64 bits; the packet does not show which. The short one is tried
 # first: it never fits a long stamp, whose third byte, taken as the next item, is below 0x10 and no type (for 200 days
 # of microseconds). The vendor's sources called the long one milliseconds (robotiq/ros @2347d23) and since call it
 # microseconds (@73cb1b5); so the stamps themselves decide.

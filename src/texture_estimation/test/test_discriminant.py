@@ -27,7 +27,7 @@ RECIPE = Recipe.from_mapping(CONTENT, 'lines')
 
 
 def of_days(examples, days=2):
-    """Return examples whose slides come from so many days: 'cork/0' from the first, 'cork/1' from the second."""
+    """Return examples whose slides come from this many days: 'cork/0' from the first, 'cork/1' from the second."""
     slides = np.unique(examples.groups).tolist()
     made = {slide: SlideConditions(session=f'day {int(slide.rpartition("/")[2]) % days}') for slide in slides}
     return replace(examples, conditions=made)

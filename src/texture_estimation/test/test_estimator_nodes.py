@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes that answer feature vectors: what they share, and what each does besides."""
+"""The nodes that answer feature vectors: what they have in common, and what each adds."""
 
 import dataclasses
 

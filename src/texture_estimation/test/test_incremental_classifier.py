@@ -224,7 +224,7 @@ def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, 
 
 
 def with_slides(measured, model, values, count):
-    """Return the model after so many slides with these windows were added as silk."""
+    """Return the model after this many slides with these windows were added as silk."""
     classifier = IncrementalClassifier(model)
     for number in range(count):
         measured(classifier, values, f'e{number}')

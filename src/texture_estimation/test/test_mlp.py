@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The multilayer perceptron against what mathematics says of it."""
+"""The multilayer perceptron against analytical results."""
 
 import numpy as np
 import pytest

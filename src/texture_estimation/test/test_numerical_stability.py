@@ -25,7 +25,7 @@ RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
 
 
 def nearly_dependent(values):
-    """Six features of which any two are the same but for 1e-9: a covariance of rank one for all that can be told."""
+    """Six features of which any two are the same but for 1e-9: a covariance of rank one within numerical precision."""
     return values[:, :1] + 1e-9 * values
 
 

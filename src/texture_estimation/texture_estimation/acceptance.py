@@ -8,7 +8,7 @@ the evidence for the label exceeds that for the next one, and the distance of th
 label. As unknown surfaces serve the held-out slides themselves, with their label taken away.
 
 Sources: Cox 1958 for the regression; Vovk, Gammerman & Shafer 2005 for limits by rank; Clopper & Pearson 1934 and
-Hanley & Lippman-Hand 1983 for what so many slides can show; Ioffe 2006 for the distance;
+Hanley & Lippman-Hand 1983 for what a number of slides can show; Ioffe 2006 for the distance;
 Wald 1945 for the end of a slide.
 """
 
@@ -263,7 +263,7 @@ def _score(fitted: tuple[float, float, float], rows: Array) -> Array:
 
 @dataclass(frozen=True)
 class Rates:
-    """How often what may go wrong: what the recipe says."""
+    """Error rates that the recipe allows."""
 
     max_accepted_wrong: float = 0.033
     false_rejection_rate: float = 0.04
@@ -272,7 +272,7 @@ class Rates:
 
 
 class Assessment(NamedTuple):
-    """What is said of a slide so far."""
+    """Decision about a slide so far."""
 
     rejection: Rejection
     decided: bool
@@ -381,7 +381,7 @@ class Acceptance:
         return [Limits(*row) for row in self.levels.tolist()]
 
     def limits(self, effective_windows: float) -> Limits:
-        """Return the limits after so many windows, linear between two lengths of evidence."""
+        """Return the limits after this many windows, linear between two lengths of evidence."""
         after = bisect_right(LEVELS, effective_windows)
         if after == 0 or after == len(LEVELS):
             return self._rows[max(after - 1, 0)]
@@ -391,7 +391,7 @@ class Acceptance:
         return Limits(*(one if one == other else one + share * (other - one) for one, other in pairs))
 
     def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
-        """Return what is said of a slide by the margin of its label and the distance to the slides of it."""
+        """Return the decision about a slide from the margin of its label and the distance to the slides of it."""
         if self.distance is None or (self.added and self.reason):
             return Assessment(Rejection.TOO_LITTLE_TRAINING, decided=False)
         limits = self.limits(effective_windows)

@@ -57,9 +57,9 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
-    A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the label is
+    A new exploration id, or a vector after the `last` one, starts a new slide. Each estimate tells whether the label is
     rejected, and why; it is decided only while it is not. An exploration under conditions that were not trained is
-    rejected, and the message says which condition it is. Equally probable labels give no label: unclassified.
+    rejected, and the message states which condition it is. Equally probable labels give no label: unclassified.
     No confidence is above what the slides held out of the training can show.
     """
 
@@ -100,7 +100,7 @@ class EvidenceAccumulator:
         self._deviation = ''  # of these conditions from those of the training
 
     def _note_skipped(self, skipped: int) -> None:
-        """Say in the final estimate how much of the slide is missing from it."""
+        """State in the final estimate how much of the slide is missing from it."""
         if skipped and not self._message:
             self._message = (
                 f'{skipped} of {skipped + self._windows} windows were left out, as samples were lost or not finite'

@@ -24,7 +24,7 @@ FULL_WINDOWS = 5.0
 
 @dataclass(frozen=True)
 class EvidenceRule:
-    """Frozen parameters of a rule, which counts each window alike unless it says otherwise.
+    """Frozen parameters of a rule, which weights all windows equally unless stated otherwise.
 
     Where several labels share the highest log-probability nothing is decided: the surface is unclassified.
     """

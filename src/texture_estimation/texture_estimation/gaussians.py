@@ -338,5 +338,5 @@ def compared_start(values: Array, hop_share: float) -> Array:
 
 
 def window_count(effective_windows: float, hop_share: float) -> int:
-    """Return how many windows count as so many that do not overlap."""
+    """Return how many windows are equivalent to this many that do not overlap."""
     return 1 + round((effective_windows - 1.0) / hop_share)

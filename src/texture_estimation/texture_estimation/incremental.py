@@ -171,7 +171,7 @@ class IncrementalClassifier:
         raise unknown_name(label, added, 'added texture')
 
 
-DIRECTIONS = 40  # of largest variance over slides, in which covariances can be told from some hundred slides
+DIRECTIONS = 40  # of largest variance over slides, in which covariances can be estimated from some hundred slides
 SHRINKAGE = 0.1  # of the covariances, towards their diagonal and towards a round one
 DAY_SUFFIX = '-today'
 
@@ -180,7 +180,7 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     """Return the model as a discriminant whose classes are where slides of today and of the training place them.
 
     A class of a session is Gaussian about its mean over sessions, and slides are Gaussian about the class of their
-    session (two covariances); the slides of today say where the classes are today, and each counts as much as it is
+    session (two covariances); the slides of today show where the classes are today, and each counts as much as it is
     certain. A surface without a slide of today moves by the mean of those that have some. The answer is a label alone:
     nothing shows which slides of today would be unknown, so none is accepted.
 

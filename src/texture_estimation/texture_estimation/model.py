@@ -100,7 +100,7 @@ BROKEN = (
 
 @contextmanager
 def usable(target: Path) -> Iterator[None]:
-    """Say in one sentence, within a `with` block, that what it makes of the files of a model cannot be used."""
+    """Report, within a `with` block, that the files of a model cannot be used."""
     try:
         yield
     except MissingLibrary:
@@ -127,7 +127,7 @@ def both_files(path: str | Path) -> tuple[Path, Path]:
 def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
     """Write NAME.npz and NAME.json, and return NAME.npz.
 
-    A reader never sees half a file: both are written beside their places and then moved.
+    A reader never sees half a file: both are written to temporary files and then moved.
     """
     arrays_path, card_path = both_files(path)
     card_path.parent.mkdir(parents=True, exist_ok=True)
@@ -218,7 +218,7 @@ class StoredModel:
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
         """Write NAME.npz and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.npz.
 
-        Slides added to a model are not written: they lie beside the model to which they were added.
+        Slides added to a model are not written: they are stored next to the model to which they were added.
         """
         return write_tree(path, {**self.tree, **(facts or {})})
 
@@ -272,7 +272,7 @@ def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
 
 
 # --------------------
-# Slides added to a model after its training, stored in the folder NAME.added beside it.
+# Slides added to a model after its training, stored in the folder NAME.added next to it.
 
 ADDED_SLIDES_MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
 
@@ -364,13 +364,13 @@ class TrainingExamples:
 
     @classmethod
     def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
-        """Return what contributes keeping: of each label at most so many that more would hardly help."""
+        """Return what contributes keeping: of each label at most as many as are useful."""
         own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
         kept = np.concatenate([rows[spread(len(rows))] for rows in own])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
     def check(self, n_features: int, n_labels: int) -> None:
-        """Raise ValueError unless they are examples of so many features and labels."""
+        """Raise ValueError unless they are examples of this many features and labels."""
         n = len(self.codes)
         if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
             raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
@@ -379,7 +379,7 @@ class TrainingExamples:
 
 
 def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
-    """Return at most so many of the numbers 0 to count - 1, evenly spread."""
+    """Return at most `most` of the numbers 0 to count - 1, evenly spread."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))
 
 

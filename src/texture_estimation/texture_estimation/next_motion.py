@@ -41,7 +41,7 @@ def log_likelihoods(places: Array, means: Array) -> Array:
 def least_information(means: Array, log_prior: Array) -> float:
     """Return a lower bound of the information about the texture that one slide gives, in nats.
 
-    From the distances between textures alone: nothing for equal ones, the entropy of the prior for ones far apart.
+    From the distances between textures alone: nothing for equal ones, the entropy of the prior for distant ones.
 
     Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the Bhattacharyya
     distance, which of all Chernoff distances bounds best where the covariance is shared.
@@ -169,7 +169,7 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
 
     Return the axes, (n_features, n_axes), and on them the mean of each texture, (n_motions, n_textures, n_axes).
 
-    Slides share their covariance, whatever the texture and the motion. Means of few slides lie apart by chance: along
+    Slides share their covariance, whatever the texture and the motion. Means of few slides differ by chance: along
     each axis they are drawn to the middle of their motion as far as their spread is not more than chance, and what
     stays uncertain about them is added to what differs between slides.
 

@@ -238,7 +238,7 @@ def load_recipe(name_or_path: str) -> Recipe:
     Raises
     ------
     UnknownName, InvalidParameter
-        With one sentence that says what is wrong and what is allowed.
+        With one sentence that states what is wrong and what is allowed.
     """
     name, content = read_recipe(name_or_path)
     return Recipe.from_mapping(content, name)

@@ -102,7 +102,7 @@ class GaussianProcess:
     """A straight line of standardised features, plus noise for each texture.
 
     The windows of a texture share its grade and its noise: they are one point, their mean. So three thousand windows of
-    fifteen textures are fifteen opinions, not three thousand, and the standard deviation says so. The hyperparameters
+    fifteen textures are fifteen opinions, not three thousand, and the standard deviation shows it. The hyperparameters
     maximise the marginal likelihood times a wide prior. The line passes through the middle of the scale, 3, at the mean
     of the training textures, so these should span the scale.
 
@@ -186,7 +186,7 @@ TRAIN, TEST = 'train', 'test'
 class Grades:
     """The grade of each texture, and for which each is meant.
 
-    A grade is an opinion; the physical roughness of a surface stands elsewhere.
+    A grade is an opinion; the physical roughness of a surface is another quantity.
     """
 
     grades: Mapping[str, float]
@@ -423,9 +423,9 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
 SILENT = 'no grade: the surface resembles no training surface'
-# The scatter of the windows of a texture, known from the training, counts as so many windows.
+# The scatter of the windows of a texture, known from the training, counts as this many windows.
 PRIOR_WINDOWS = 4.0
-# A grade is final once more sliding would narrow its 90 % interval by less, after so many graded windows.
+# A grade is final once more sliding would narrow its 90 % interval by less, after this many graded windows.
 MIN_NARROWING_GRADES, MIN_WINDOWS = 0.1, 3
 
 
@@ -589,7 +589,7 @@ def hold_out(
 
 
 def calibrate(grades: Array, stds: Array, true: Array, textures: Codes) -> tuple[Calibration, dict[str, Any]]:
-    """Return the calibration, and facts for the card, from what was said of textures held out, (n,) each.
+    """Return the calibration, and facts for the card, from the estimates of held-out textures, (n,) each.
 
     The scale makes the mean square of error over standard deviation, each texture counting alike, what it is for a
     Student distribution with as many degrees of freedom as there are textures, whose 90 % interval ours then is.

@@ -55,7 +55,7 @@ def fit_learner(
     Slides of one of these parts, (n_slides,), are held out together; slides are held out by themselves without parts.
 
     Where a label has a single slide, its windows are held out one by one and must not be there twice: then every window
-    counts once, and nothing is drawn besides.
+    counts once, and nothing else is drawn.
     """
     of_load = np.array([name.endswith(LOAD) for name in examples.names])
     if of_load.any():  # what is constant tells nothing, and weighs nothing
@@ -107,7 +107,7 @@ def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
 def _augmented_examples(
     recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
 ) -> AugmentedExamples | None:
-    """Return what the learner draws besides the examples; None without augmentation or without copies of the slides."""
+    """Return what the learner draws in addition to the examples; None without augmentation or copies of the slides."""
     if examples.augmented is None or not recipe.augmentation.copies:
         return None
     copies = examples.augmented.copies
@@ -163,7 +163,7 @@ GAP = 0.2  # of a part of the track, left out before the next one: neighbours ar
 
 
 def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
-    """Return slides over one track cut into so many parts of it, each a slide at a place of its own.
+    """Return slides over one track cut into this many parts of it, each a slide at a separate place.
 
     Windows that lie in two parts are left out, and more, so that a gap lies between the parts. Where the slides are of
     several places, sessions or fingers already, and where a slide has too few windows, they stay as they are.
@@ -196,7 +196,7 @@ def _ranks(names: Any, rows: Codes) -> Codes:
     return np.argsort(np.argsort(first))[numbers]
 
 
-# What learners may declare as their `extras`: keyword arguments of `fit` besides the examples.
+# What learners may declare as their `extras`: keyword arguments of `fit` in addition to the examples.
 EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
     'augmented': _augmented_examples,
 }

@@ -78,7 +78,7 @@ def test_the_reference_tells_how_its_slide_was_made(trained):
     assert read_reference(model)[1] == {
         'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': 0.5
     }  # fmt: skip
-    # Of a slide from a bag nobody knows what was asked: 3 s at 0.05 m/s and 1 N were simulated.
+    # Of a slide from a bag the commanded conditions are unknown: 3 s at 0.05 m/s and 1 N were simulated.
     store_reference(model, TOPICS, slides[:2])
     made = read_reference(model)[1]
     assert (made['speed_m_s'], made['force_n'], made['distance_m']) == pytest.approx((0.05, 1.0, 0.15), rel=0.05)

@@ -351,7 +351,7 @@ def test_slides_of_one_place_are_one_case_of_the_test() -> None:
 
 
 def test_the_interval_of_the_difference_is_that_of_pairs() -> None:
-    """Slides that both recognise, or both do not, say nothing of the difference and widen it little."""
+    """Slides that both recognise, or both do not, carry no information on the difference and widen it little."""
     common = [True, False] * 50
     one = compare(cross_validation('a', common), cross_validation('b', common))
     assert one.slide_interval == (0.0, 0.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Charts that explain themselves: what is shown stands in the title, units on the axes, colours safe for all eyes."""
+"""Self-explanatory charts: what is shown is in the title, units on the axes, colours safe for colour blindness."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def _at_rest(slide: LabelledSlide, topic: str) -> Array:
     approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
     touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
     batches = slide.signals[topic]
-    # The rest ends where the approach does; without an approach nobody knows what was rest.
+    # The rest ends where the approach does; without an approach the rest is unknown.
     until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
     # By sample, not by batch: the batches of a slide are joined, so one holds the rest and the touch.
     counts = [max(0, int((until_ns - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for one in batches]

@@ -222,7 +222,7 @@ class PlaceAccuracy:
 
     @property
     def spacing_m(self) -> float:
-        """How far apart tracks may be: the farthest point between two is half of it from either; 0 if unknown."""
+        """Largest spacing of tracks: the farthest point between two is half of it from either; 0 if unknown."""
         near = list(takewhile(lambda band: band.correct >= ENOUGH * band.places, self.bands))
         return 2.0 * near[-1].far_m if near else 0.0
 

@@ -55,7 +55,7 @@ def single_blas_thread() -> AbstractContextManager[Any]:
 
 @contextmanager
 def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
-    """Have joblib use so many cores (-1: all) within a `with` block, or the cluster whose address is given.
+    """Have joblib use this many cores (-1: all) within a `with` block, or the cluster whose address is given.
 
     Threads, not processes: what takes the time (libsvm, products of arrays) lets go of Python's lock, and nothing is
     copied.
@@ -477,7 +477,7 @@ def _draw_shares(axes: Any, results: Sequence[CrossValidation]) -> None:
 
 
 # --------------------
-# What `texture cross-validate` names: a splitter, and what must not be on both sides of a split.
+# What `texture cross-validate` names: a splitter, and what must not be in training and test.
 
 TEST_SIZE = 0.25  # of a random split
 
@@ -554,7 +554,7 @@ def split_slides(
 ) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return the training and test slides of each split, by their index in the data set.
 
-    Where parts of one slide would be on both sides, a split becomes two, each of which trains on every other slide of
+    Where parts of one slide would be in training and test, a split becomes two, each trained on every other slide of
     a surface and tests on those between.
     """
     labels, columns = dataset.labels, slide_groups(dataset, groups)
@@ -574,7 +574,7 @@ def split_slides(
 def _of_other_slides(
     dataset: SlideDataset, train: NDArray[np.intp], test: NDArray[np.intp]
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield a split as it is, or as two if parts of a slide are on both sides."""
+    """Yield a split as it is, or as two if parts of a slide are in training and test."""
     wholes = np.array([slide.whole_name for slide in dataset])
     if not np.isin(wholes[test], wholes[train]).any():
         yield train, test
@@ -642,7 +642,7 @@ def cross_validate(
 ) -> CrossValidation:
     """Train a recipe on some slides and test it on others, for each split of the slides.
 
-    Features are computed once for all folds. The splitter divides slides, so no slide is ever on both sides. A slide
+    Features are computed once for all folds. The splitter divides slides, so no slide is in training and test. A slide
     is tested as on the robot: window by window, from the accumulated evidence.
 
     Parameters
@@ -656,9 +656,9 @@ def cross_validate(
         for each slide.
     n_jobs
         Number of folds computed at once, as joblib counts (-1: one per core). None: 1, or what a surrounding
-        `joblib.parallel_config` says, such as the workers of a Dask cluster.
+        `joblib.parallel_config` selects, such as the workers of a Dask cluster.
     groups
-        What must not be on both sides: 'slide', a condition of the data set, such as 'speed', or an array (n_slides,).
+        What must not be in training and test: 'slide', a condition such as 'speed', or an array (n_slides,).
 
     Returns
     -------
@@ -717,7 +717,7 @@ def cross_validate(
 
 
 def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str, SlideResult]:
-    """Return what a model says of each slide, by its name, window by window as on the robot."""
+    """Return the estimates of a model for each slide, by its name, window by window as on the robot."""
     results = {}
     for slide in dict.fromkeys(features.groups.tolist()):
         # The empty last vector closes the evidence as on the robot.

@@ -49,7 +49,7 @@ class EvaluationReport:
 
     @property
     def confusion(self) -> AnyArray:
-        """How many windows of each surface (row) were taken for each label (column)."""
+        """How many windows of each surface (row) got each label (column)."""
         return metrics.confusion(self.known, self.labels)
 
     @property
@@ -169,7 +169,7 @@ def run_model(
 
 
 def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEvent]) -> tuple[SlideResult, Array]:
-    """Return what the model says of each usable window of a slide, and the computing times of all."""
+    """Return the estimate for each usable window of a slide, and the computing times of all."""
     vectors, estimates, taken_us = run_model(model, events)
     used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
@@ -269,7 +269,7 @@ def summary(report: EvaluationReport) -> list[str]:
         *(
             [
                 f'accuracy of single windows: {percent(figures["window_accuracy"])}',
-                f'accuracy of slides: {", ".join(at) or "no slide is long enough to say"}',
+                f'accuracy of slides: {", ".join(at) or "no slide is long enough"}',
             ]
             if report.known
             else [

@@ -19,7 +19,7 @@ TOLERANCE_S = 1e-6  # sums of hops are not exact
 
 @dataclass(frozen=True, eq=False)
 class SlideResult:
-    """What a model said during one slide."""
+    """Estimates of a model during one slide."""
 
     surface: str
     window_labels: Sequence[str]
@@ -52,7 +52,7 @@ class SlideResult:
 
 
 def window_accuracy(results: Sequence[SlideResult]) -> float:
-    """Return the share of windows that are recognised each by itself."""
+    """Return the accuracy of single windows."""
     right = [label == result.surface for result in results for label in result.window_labels]
     return float(np.mean(right))
 
@@ -64,7 +64,7 @@ def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
 
 
 def unclassified_windows(results: Sequence[SlideResult]) -> float:
-    """Return the share of windows that alone are taken for nothing."""
+    """Return the fraction of single windows that are unclassified."""
     return float(np.mean([not label for result in results for label in result.window_labels]))
 
 
@@ -156,9 +156,9 @@ def _share(which: Sequence[bool]) -> float | None:
 
 
 def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray:
-    """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels).
+    """Return how many windows of each surface (row) got each label (column), (n_labels, n_labels).
 
-    Unclassified windows stand in no column.
+    Unclassified windows are in no column.
     """
     place = {label: index for index, label in enumerate(labels)}
     table = np.zeros((len(labels), len(labels)), dtype=int)

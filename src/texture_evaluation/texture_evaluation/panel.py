@@ -29,7 +29,7 @@ COLUMNS = ('rater', 'texture', 'grade')
 
 @dataclass(frozen=True, eq=False)
 class Ratings:
-    """What each person says of each texture."""
+    """Grades of each person for each texture."""
 
     raters: tuple[str, ...]
     textures: tuple[str, ...]
@@ -172,7 +172,7 @@ def agreement(grades: Array) -> dict[str, float]:
 
 
 def report_of(ratings: Ratings) -> dict[str, Any]:
-    """Return what a panel says and how far its people agree, as panel.json holds it; null for what cannot be said."""
+    """Return the results and the agreement of a panel, as panel.json holds them; null for what is undefined."""
     rows = zip(ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True)
     return {
         'raters': len(ratings.raters),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Augmented copies against what physics says of them."""
+"""Augmented copies against analytical results."""
 
 import dataclasses
 import math

@@ -62,7 +62,7 @@ def test_any_finite_window_gives_finite_values(name, samples):
     assert np.isfinite(FEATURES[name]()(windows(samples))).all()
 
 
-# How the values of a signal follow from those of one 1000 times as weak; the rest says nothing of the kind.
+# How the values of a signal follow from those of one 1000 times as weak; the rest does not follow such a rule.
 SAME, TIMES, SHIFTED = 'the same', 'times 1000', 'plus log 1000 squared'
 SCALING = {
     'log_bands': SHIFTED,

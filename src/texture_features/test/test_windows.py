@@ -381,7 +381,7 @@ RECIPE = {'windows': {'length_s': 0.5, 'hop_s': 0.5}, 'inputs': {'signal': {'fea
 
 
 def states(tangential_n, seconds=1.0):
-    """Slide under 2 N; each state says how much the surface drags at its time."""
+    """Slide under 2 N; each state holds the drag of the surface at its time."""
     for number in range(round(seconds * 1e9 / STEP_NS)):
         stamp_ns = number * STEP_NS
         yield ExplorationState(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of training windows under computed disturbances, so that a model knows what lies beside its training."""
+"""Copies of training windows under computed disturbances, so that a model covers what lies next to its training."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class SlideWindows:
         return self.samples.std(axis=(0, 1))
 
 
-# Takes the windows of one input, a strength, of which each disturbance says the unit, and the source of all that is
+# Takes the windows of one input, a strength, of which each disturbance defines the unit, and the source of all that is
 # random; returns the samples (n_windows, n_samples, n_channels) as the disturbance would change them.
 Disturbance = Callable[[SlideWindows, float, np.random.Generator], Array]
 

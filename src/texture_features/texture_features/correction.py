@@ -250,7 +250,7 @@ def file_beside(model: str | Path, kind: str) -> Path:
 
 
 def read_correction(model: str | Path) -> Correction | None:
-    """Return the correction beside a model; None if there is none."""
+    """Return the correction next to a model; None if there is none."""
     path = file_beside(model, CORRECTION)
     if not path.exists():
         return None

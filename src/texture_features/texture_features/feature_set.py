@@ -110,7 +110,7 @@ def read_recipe(
 ) -> tuple[str, Mapping[str, Any]]:
     """Return name and content of a recipe (YAML) that texture_estimation ships, or of any file.
 
-    A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card beside it.
+    A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card next to it.
     """
     path = find_file(name_or_path, 'texture_estimation', subfolder, kind)
     if path.suffix == '.npz':
@@ -167,7 +167,7 @@ class InputFeatures:
 
 @dataclass(frozen=True)
 class InputOptions:
-    """What an input of a recipe may say besides its features."""
+    """What an input of a recipe may define in addition to its features."""
 
     stretch_to_m_s: float = param(
         0.0, 'Speed to which windows are resampled before feature extraction; 0: no resampling.', unit='m/s', low=0.0
@@ -200,7 +200,7 @@ class FeatureSet:
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
-        """Read the feature set of a recipe (YAML), or of a model's card (JSON) with the correction beside it.
+        """Read the feature set of a recipe (YAML), or of a model's card (JSON) with the correction next to it.
 
         Raises
         ------

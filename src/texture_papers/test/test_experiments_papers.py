@@ -331,7 +331,7 @@ def test_a_verdict_follows_from_the_interval_over_seeds_or_over_textures(name: s
 
 
 def guessed(protocol: PaperProtocol) -> dict[tuple[str, str], MethodResult]:
-    """Return results of each method in each task by which every slide is taken for any surface."""
+    """Return results of each method in each task by which every slide gets any surface as its label."""
     rng = np.random.default_rng(0)
     results = {}
     for task in protocol.tasks:

@@ -87,7 +87,7 @@ SEARCHES = 'searches.jsonl'
 def run_searches(
     name: str, experiment: Experiment, count: int = 1, jobs: int = 1, until_s: float = math.inf
 ) -> Experiment:
-    """Search the variables of all pairs for so many seeds; return the experiment with what was found.
+    """Search the variables of all pairs for this many seeds; return the experiment with what was found.
 
     Each search is a line of a file in the folder of the results, written when it is done: another call goes on there.
     """
@@ -135,7 +135,7 @@ def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult,
 
 
 def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
-    """Run one experiment with so many seeds from its own on; return what `run_experiment` does."""
+    """Run one experiment with this many seeds, from its seed on; return what `run_experiment` does."""
     run_of = _run_of(name, experiment)
     experiment = experiment if experiment.found else run_searches(name, experiment, count)
     result = over_seeds(run_of, name, experiment, count, DIGESTS[f'{name}{"-tuned" if experiment.tune else ""}']())

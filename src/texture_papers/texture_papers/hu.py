@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fabrics by a finger of PVDF (Hu et al. 2014): power spectrum, principal components, machines by Max Wins.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 slide
     Paper: 25.5 mm/s, 1.5 N, along x and along y, 60 places on each linen (5.1). Time and sampling rate are not
@@ -25,7 +25,7 @@ x and y
     Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, each with its components, about 150 numbers; the experiment
         has 39 + 39, too.
 machine
-    Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not told.
+    Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not given.
     Here: `SvmMaxWins`: those of scikit-learn's `SVC`, with C = 10.
 """
 

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects in a hand by texture (Kaboli et al. 2015): Hjorth parameters, correlations; three learners.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 motion
     Paper: Index and middle finger slide for 2 s while the others hold, to train; thumb and index finger, to test
-        (III.B). Speed and force are not told.
+        (III.B). Speed and force are not given.
     Here: Preset `kaboli`: 2.1 s at 0.008 m/s and 1 N with the finger sets `kaboli-train`, `kaboli-test`; the
         experiment 2 s at 0.02 m/s.
 signals
@@ -31,7 +31,7 @@ online learning
     Here: `PassiveAggressive`, all planes together, one pass; `passes` gives more. `texture add` updates the planes
         live.
 clusters
-    Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not told.
+    Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not given.
     Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, whose labels name the
         clusters; by the recipe of the training slides.
 objects

@@ -35,7 +35,7 @@ from texture_papers.slides import Mask, View, Visits, gather
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 
-# Time is the paper's; speed and force are not told. The preset `kaboli` is slower, so that 2 s pass without a turn.
+# Time is the paper's; speed and force are not given. The preset `kaboli` is slower, so that 2 s pass without a turn.
 SLIDING = SimulatedSlide(0.02, 1.0, duration_s=2.0)
 THUMB, INDEX, MIDDLE = View(finger=0), View(finger=1), View(finger=2)
 TRAINED = 'index and middle finger'
@@ -94,7 +94,7 @@ def _on_average(claim: str, outcome: MethodResult) -> Finding:
 
 
 def pa(rounds: int) -> str:
-    """Return the name of online learning after so many slides of each object."""
+    """Return the name of online learning after this many slides of each object."""
     return f'{PA}, t = {rounds}'
 
 

@@ -89,7 +89,7 @@ def apart(first: Array, second: Array) -> Interval:
 
 
 def _uncertainty(values: Array) -> float:
-    """Return the variance of a mean; one value says nothing of it."""
+    """Return the variance of a mean; one value does not determine it."""
     return float(np.var(values, ddof=1)) / len(values) if len(values) > 1 else math.inf
 
 
@@ -121,12 +121,12 @@ class MethodResult:
 
     @property
     def unclassified(self) -> float:
-        """Share of the slides held out that are taken for nothing."""
+        """Fraction of the held-out slides that are unclassified."""
         return float((self.decided == UNDECIDED)[~self.trained_on].mean())
 
     @property
     def confusion(self) -> AnyArray:
-        """Share of the test slides of each surface (row) that are taken for each surface, or for nothing (last)."""
+        """Fraction of the test slides of each surface (row) with each label, or unclassified (last)."""
         n = len(self.surfaces)
         table = np.zeros((n, n + 1))
         true, said = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
@@ -138,21 +138,21 @@ class MethodResult:
         return self._tested(self.decided == self.codes, of)
 
     def taken_for(self, first: str, second: str, of: NDArray[np.bool_] | None = None) -> Array:
-        """Return how often each slide was taken for the other one of two surfaces, (n_tested,)."""
+        """Return how often each slide was misidentified as the other one of two surfaces, (n_tested,)."""
         pair = [self.surfaces.index(first), self.surfaces.index(second)]
         other = np.select([self.codes == pair[0], self.codes == pair[1]], [pair[1], pair[0]], default=UNDECIDED - 1)
         return self._tested(self.decided == other, of)
 
     def wrong(self) -> Array:
-        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not."""
+        """Return how often each slide was misidentified as another surface, (n_tested,), without unclassified ones."""
         return self._tested((self.decided != self.codes) & (self.decided != UNDECIDED))
 
     def nothing(self) -> Array:
-        """Return how often each slide was taken for nothing, (n_tested,)."""
+        """Return how often each slide was unclassified, (n_tested,)."""
         return self._tested(self.decided == UNDECIDED)
 
     def pairs(self) -> list[tuple[str, str]]:
-        """Return all pairs of surfaces, those taken for each other most often first."""
+        """Return all pairs of surfaces, those confused most often first."""
         n = len(self.surfaces)
         table = self.confusion[:, :n]
         both = table + table.T
@@ -327,7 +327,7 @@ class ExperimentResult:
     charts: tuple[Path, ...] = ()
 
     def lines(self) -> Iterator[str]:
-        """Yield our figures beside the paper's, and the findings, for people: means over seeds where there are some."""
+        """Yield our figures next to the paper's, and the findings, as text: means over seeds if there are any."""
         seeds = self.numbers.get('seeds', [self.numbers['seed']])
         yield f'over {len(seeds)} seeds: mean, and its interval of 95 %' if seeds[1:] else f'seed {seeds[0]}'
         for task, methods in self.numbers.get('tasks', {}).items():
@@ -371,7 +371,7 @@ class ExperimentResult:
 Run = Callable[[Experiment], ExperimentResult]
 
 
-# What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
+# What of `training` decides the label after a whole slide. The rest decides on early ends and on what is outside.
 DECISIVE_OF_TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
 # Values with which a parameter of evidence rule or learner changes nothing: stored digests are older than it.
 NEUTRAL = {'late_weight': 1.0, 'passes': 1}
@@ -454,7 +454,7 @@ def _set(sliding: SimulatedSlide) -> dict[str, Any]:
 
 
 def _short_name(found: re.Match[str]) -> str:
-    """Return 'region_peaks' of 'texture_papers.jamali:RegionPeaks': in which module a class stands decides nothing."""
+    """Return 'region_peaks' of 'texture_papers.jamali:RegionPeaks': the module of a class decides nothing."""
     return re.sub(r'(?<!^)(?=[A-Z])', '_', found.group(1)).lower()
 
 
@@ -643,7 +643,7 @@ def evaluate_method(
 
 
 def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
-    """Return the task with fewer slides: so many over each surface, as equally as may be among the visits."""
+    """Return the task with fewer slides: this many over each surface, as equally as may be among the visits."""
     each = max(1, count // len(task.visits))
     visits = tuple(replace(visit, count=min(visit.count, each)) for visit in task.visits)
     return replace(task, visits=visits)
@@ -654,7 +654,7 @@ VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 
 
 def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests: Mapping[str, str]) -> ExperimentResult:
-    """Run an experiment with so many seeds, each alike, and add means and intervals over them to the first's result.
+    """Run an experiment with this many seeds, each alike, and add means and intervals over them to the first's result.
 
     Each seed is kept in the folder `seeds`; what is there already, with the digests of now, is not run again.
     """
@@ -685,7 +685,7 @@ def _kept(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str
 
 
 def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the numbers of the first seed with mean and interval over all seeds beside each figure and finding."""
+    """Return the numbers of the first seed with mean and interval over all seeds next to each figure and finding."""
     numbers: dict[str, Any] = json.loads(json.dumps(first))
     runs = [numbers, *others]
     numbers['seeds'] = [run['seed'] for run in runs]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the papers beside ours: tables, charts, and whether the claims hold."""
+"""Figures of the papers next to ours: tables, charts, and whether the claims hold."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
 
 
 def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Finding:
-    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused."""
+    """Check that surfaces of these pairs are confused more often than those of the next most confused pairs."""
     own = sum((outcome.taken_for(*pair) for pair in pairs), start=np.zeros(1))
     others = [pair for pair in outcome.pairs() if frozenset(pair) not in {frozenset(one) for one in pairs}]
     rivals = sum((outcome.taken_for(*pair) for pair in others[: len(pairs)]), start=np.zeros(1))
@@ -95,7 +95,7 @@ def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
 
 
 def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Finding:
-    """Check that two surfaces are taken for each other in fewer than a share of their slides."""
+    """Check that two surfaces are confused in fewer than a fraction of their slides."""
     of_pair = np.isin(outcome.codes, [outcome.surfaces.index(name) for name in pair])
     taken = share(outcome.taken_for(*pair, of=of_pair))
     below = Interval(border - taken.value, border - taken.high, border - taken.low)
@@ -103,7 +103,7 @@ def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Find
 
 
 def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Sequence[Pair]) -> Finding:
-    """Check that by the first method more slides are taken for a surface that is not alike than by the second."""
+    """Check that the first method confuses more slides with a dissimilar surface than the second."""
     novel = [one.wrong() - sum((one.taken_for(*pair) for pair in alike), start=np.zeros(1)) for one in (first, second)]
     more = mean(novel[0] - novel[1])
     reported = ' against '.join(f'{100 * part.mean():.1f} %' for part in novel)

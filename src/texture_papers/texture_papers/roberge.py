@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 slide
     Paper: 500 ms at 0.10, 0.15, 0.20 m/s and 1, 2.5, 5 N; ten textures: 10 cm at 0.125 m/s and 2 N (IV.A, V.A).
@@ -17,10 +17,10 @@ integral, length
     Paper: Equations 1 and 2.
     Here: The same: `SignalEnergy`, `ArcLength`.
 network
-    Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not told.
+    Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not given.
     Here: `AnnPairs`, trained as by MATLAB's default.
 machine
-    Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not told.
+    Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not given.
     Here: `SvmPairs` with the RBF kernel.
 decision
     Paper: Most pairs; a tie is unclassified (III.C).
@@ -41,7 +41,7 @@ variables
     Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
         recipes have one set for all pairs.
 standardisation
-    Paper: Not told.
+    Paper: Not given.
     Here: Features have zero mean and unit variance.
 friction
     Paper: The next question (VI).
@@ -394,7 +394,7 @@ def fitted_predictor(learner: Any, X: Array, y: Codes, groups: Codes) -> Predict
 
 
 def decided_by_slide(scores: Array, n_slides: int, rule: EvidenceRule, hop_share: float) -> Codes:
-    """Return what each slide is taken for by all its windows, (n_slides,) of (n_slides · n_windows, n_labels)."""
+    """Return the label of each slide by all its windows, (n_slides,) of (n_slides · n_windows, n_labels)."""
     n_labels = scores.shape[1]
     evidence = rule.window_evidence(log_softmax(scores)).reshape(n_slides, -1, n_labels).swapaxes(0, 1)
     means, counts = followed(rule, evidence.reshape(len(evidence), -1), min(hop_share, 1.0))

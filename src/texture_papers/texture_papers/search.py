@@ -88,7 +88,7 @@ def variables_of(recipe: str) -> tuple[str, ...]:
 
 
 def varied(base: Any, individual: Individual) -> Any:
-    """Return the recipe, of textures or of roughness, that an individual stands for."""
+    """Return the recipe, of textures or of roughness, that an individual encodes."""
     content = copy.deepcopy(base.as_mapping())
     section = content['inputs']['signal']
     names = (PEAKS, 'speed', *USED.values())

@@ -179,7 +179,7 @@ def test_a_bag_without_messages_of_the_suite_is_refused(tmp_path: Path) -> None:
         list(read_bag(tmp_path / 'bag'))
 
 
-# Writes batches, brings all but the last five to the disk, and ends as told.
+# Writes batches, brings all but the last five to the disk, and ends as requested.
 WRITER = """
 import os, resource, signal, sys
 import numpy as np

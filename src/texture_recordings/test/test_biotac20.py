@@ -115,7 +115,7 @@ def test_slides_follow_each_other_even_if_the_clock_went_back(tmp_path: Path) ->
 
 def test_the_sign_of_a_rectified_tone_is_restored() -> None:
     tone = np.sin(2 * np.pi * 130.0 * np.arange(2200) / 2200.0 + 0.3)
-    clear = np.abs(tone) > 0.1  # next to a zero crossing a curved line may be taken for either sign
+    clear = np.abs(tone) > 0.1  # next to a zero crossing a curved line may have either sign
     np.testing.assert_array_equal(restore_sign(np.abs(tone))[clear], tone[clear])
 
 

@@ -30,7 +30,7 @@ def csv(folder: Path, *columns: Any, names: str = 't,x', name: str = 'cork_1.csv
 
 
 def run(folder: Path, kinds: tuple[str, ...] = ('.csv', '.mat', '.h5', '.npz'), **content: Any) -> Any:
-    """Import what lies in a folder, by time in column t unless told otherwise."""
+    """Import what lies in a folder, by time in column t unless given otherwise."""
     unit, source = content.pop('unit', 's'), content.pop('source', folder)
     mapping = mapping_from({
         'files': '{material}_{run}.*',

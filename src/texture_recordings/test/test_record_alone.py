@@ -41,7 +41,7 @@ importlib.import_module(sys.argv.pop(1)).main()
 
 @contextmanager
 def alone(module: str, log: Path, **parameters: str) -> Iterator[subprocess.Popen]:
-    """Run a node by itself, and end it as Ctrl-C does."""
+    """Run a single node, and end it as Ctrl-C does."""
     given = [part for name, value in parameters.items() for part in ('-p', f'{name}:={value}')]
     command = [sys.executable, '-c', ALONE, module, '--ros-args', *given]
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
@@ -59,13 +59,13 @@ def alone(module: str, log: Path, **parameters: str) -> Iterator[subprocess.Pope
 
 
 def recorded(reports: list[DiagnosticArray]) -> int:
-    """Return how many samples the recorder says it has."""
+    """Return how many samples the recorder reports."""
     values = [value for report in reports for status in report.status for value in status.values]
     return max((int(value.value) for value in values if value.key == 'samples /signal'), default=0)
 
 
 def ended(reports: list[DiagnosticArray]) -> list[str]:
-    """Return the nodes that said that they ended."""
+    """Return the nodes that reported their end."""
     return [status.name for report in reports for status in report.status if has_ended(status)]
 
 
@@ -86,7 +86,7 @@ def recording(folder: Path) -> Iterator[tuple[LocalGraph, list[DiagnosticArray],
 
 
 def samples_in_order(bag: Path) -> int:
-    """Return how many samples a bag has, each of which has the value that its number says."""
+    """Return how many samples a bag has, each of which has the value of its number."""
     batches = [batch for _, _, batch in read_bag(bag, ('signal',))]
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
     return sum(len(batch.samples) for batch in batches)

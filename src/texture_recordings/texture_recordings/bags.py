@@ -77,7 +77,7 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 # it ended behind its last whole chunk.
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
-MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # a bag may unpack to so much, or to so many times its size
+MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # largest unpacked size of a bag, and its ratio to the packed size
 CHUNK = 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
@@ -372,7 +372,7 @@ class RawMessage(NamedTuple):
 
 
 def is_bag(path: Path) -> bool:
-    """Say whether something looks like a bag: a folder with metadata.yaml or that was cut off, or an MCAP file."""
+    """Return whether something looks like a bag: a folder with metadata.yaml or that was cut off, or an MCAP file."""
     whole = (path / 'metadata.yaml').is_file() or (path.is_file() and path.suffix == '.mcap')
     return whole or _cut_off_file(path) is not None
 
@@ -393,7 +393,7 @@ def _cut_off_file(path: Path) -> Path | None:
 
 
 def is_cut_off(path: Path) -> bool:
-    """Say whether a file of a bag has no end, as that of a recorder that was killed."""
+    """Return whether a file of a bag has no end, as that of a recorder that was killed."""
     for one in path.glob('*.mcap') if path.is_dir() else [path]:
         with open_regular(one, None) as file:
             if not _has_end(file):
@@ -533,7 +533,7 @@ class Continuity:
 
     @property
     def losses(self) -> str:
-        """What was lost, in words, '' if nothing: of a restart, which numbers anew, nobody can tell how much."""
+        """What was lost, in words, '' if nothing; losses in a restart, which numbers from 0, are unknown."""
         lost, restarts = self.lost.total(), self.restarts.total()
         unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
         return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
@@ -623,7 +623,7 @@ class BagWriter:
             raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
         storage: Any = self._writer.storage
         self._storage = storage
-        # rosbags writes 0 for the checksum of a chunk, so that nobody could tell a whole chunk from one that the disk
+        # rosbags writes 0 for the checksum of a chunk, so that a whole chunk would look like one that the disk
         # has in part: the checksum is written over it.
         self._close_chunk = self._storage.close_chunk
         self._storage.close_chunk = self._close_with_checksum

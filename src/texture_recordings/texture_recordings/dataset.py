@@ -268,7 +268,7 @@ class SlideDataset:
         labels
             Surfaces; None for all.
         where
-            Says of a slide whether to keep it.
+            Whether to keep a slide.
 
         Returns
         -------

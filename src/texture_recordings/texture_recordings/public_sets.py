@@ -466,7 +466,7 @@ IMPORTS: Mapping[str, Importer] = {
         order=lambda date, fabric, force, speed, repeat: (fabric, (date, float(force), int(speed), int(repeat or 0))),
         slide=_fingersense_slide, session=_fingersense_session,
     ),
-    # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as it stands in the history of
+    # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as stored in the history of
     # github shinolab/vibrotactile-autoencoder, joined into one file. The whole stroke counts as sliding; speed, force
     # and direction are unknown.
     'lmt29': SlideSet(

@@ -264,7 +264,7 @@ def find_slides(
 ) -> list[LabelledSlide]:
     """Return the labelled slides in bags, by bag and time, with the signals of topics; each bag is read once.
 
-    Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
+    Slides are counted separately for each surface, over all the bags, in the order in which they were recorded.
     """
     wanted = parse_selection(slides)
     paths = find_bags(bags)
@@ -327,7 +327,7 @@ def _begins(was: ExplorationState | None, now: ExplorationState) -> bool:
 
 
 def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
-    """Return slides numbered for each surface by itself from 1, in the order of their start."""
+    """Return slides numbered separately for each surface from 1, in the order of their start."""
     by_surface: defaultdict[str, list[LabelledSlide]] = defaultdict(list)
     for slide in slides:
         by_surface[slide.surface].append(slide)

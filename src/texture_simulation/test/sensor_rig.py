@@ -79,7 +79,7 @@ def feed_tsf85(shape: tuple[int, ...]) -> Feed:
 
 
 def feed_biotac(slots: int, fingers: int) -> Feed:
-    """Return what feeds a board with frames of so many slots."""
+    """Return what feeds a board with frames of this many slots."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first * slots, (first + ticks) * slots) % 4096
@@ -89,7 +89,7 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
 
 
 def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
-    """Return what feeds so many channels alike, with numbers of this type."""
+    """Return what feeds this many channels alike, with numbers of this type."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first, first + ticks) % 30_000
@@ -208,7 +208,7 @@ class Rig:
             action()
 
     def read_s(self, seconds: float) -> dict[str, list[TactileSignal]]:
-        """Return, by topic, what comes until so many seconds of samples have; a device that is gone is opened again."""
+        """Return, by topic, what comes until this many seconds of samples have; a lost device is opened again."""
         topics: dict[str, list[TactileSignal]] = {}
         deadline_s = time.monotonic() + DEADLINE_S
         while sum(len(batch.samples) for batch in topics.get(self.case.topic, [])) < seconds * self.case.rate_hz:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every sensor that has a device must do, on that device emulated at the wire."""
+"""What every sensor that has a device must do, on that device emulated at protocol level."""
 
 from __future__ import annotations
 

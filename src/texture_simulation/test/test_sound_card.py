@@ -111,7 +111,7 @@ def test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on(make: Cal
 
 
 class Blocks:
-    """What stands for the capture: hands over blocks by hand."""
+    """A mock of the capture: hands over blocks on request."""
 
     def __init__(self) -> None:
         self.waiting: list[AudioBlock] = []

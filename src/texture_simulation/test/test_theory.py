@@ -92,7 +92,7 @@ def test_what_a_contact_averages_weakens_ridges_as_the_gaussian_s_transfer_funct
 
 
 def odd_way(rate_hz: float, step_points: int) -> Trajectory:
-    """Return a way that stands, goes, turns round, lifts off, jumps, touches again, and is pressed with nothing."""
+    """Return a path that rests, moves, turns round, lifts off, jumps, touches again, and is pressed with nothing."""
     speed = [0.0, 0.1, -0.1, 0.1, 0.0, 0.3, 0.1, 0.0]
     force = [2.0, 2.0, 2.0, 0.0, 0.0, 5.0, 1e-9, 0.0]
     count = step_points * round(0.1 * rate_hz / step_points)

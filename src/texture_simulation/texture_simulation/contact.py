@@ -17,7 +17,7 @@ from texture_simulation.surfaces import Surface
 MAX_TILT_RAD = 0.5
 START_TILT_RAD = 0.15  # assumption: how far the grip turns a finger to a curved object, at most, in either direction
 SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
-# A point of a fast path stands for the stretch up to the next: the texture is blurred by at least so much of the step.
+# A point of a fast path represents the stretch up to the next: the texture is blurred by at least so much of the step.
 # Half of the sampling rate is then measured to 17 %, what would be folded down to nearly 0 Hz to 0.1 %.
 MIN_BLUR_PER_STEP = 0.6
 

@@ -15,7 +15,7 @@ from texture_core.types import Array, Samples
 from texture_simulation.path import Trajectory, interpolated_field
 
 # --------------------
-# Where in the chain from slide to sample an effect acts is told by the method that it has:
+# Where in the chain from slide to sample an effect acts is defined by the method that it has:
 #
 # slide(speed_m_s, force_n, rng)              a slide begins: (count,) planned speeds and forces become others
 # start_path(rng, rate_hz, batch_shape)       where the skin goes: a `TrajectoryFilter`
@@ -92,7 +92,7 @@ class FingerSpread:
 
 @dataclass(frozen=True)
 class Dropouts:
-    """Now and then all channels stand still for a moment: the converter repeats its last sample.
+    """Occasionally all channels freeze for a moment: the converter repeats its last sample.
 
     Samples that are missing altogether are a fault of the line: see devices/fingers.py.
     """
@@ -165,7 +165,7 @@ FORGOTTEN = 8.0  # time constants after which nothing of a skid is left
 class Skids:
     """Now and then the skin stays where it is for a moment while the finger goes on, then catches up.
 
-    A cheap stand-in for stick-slip, for slides of which some went wrong.
+    A cheap approximation of stick-slip, for slides of which some failed.
     """
 
     per_s: float = param(

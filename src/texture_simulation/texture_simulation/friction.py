@@ -91,7 +91,7 @@ class StickSlip(Stribeck):
 #
 # σ1 fades as the Stribeck curve does, which keeps friction passive at all speeds. What comes into contact when the
 # force grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend
-# stays when N falls. So a change of force adds no energy, and a new touch begins unbent by itself.
+# stays when N falls. So a change of force adds no energy, and a new touch begins unbent.
 
 Value = Any  # a float, or an array over scans: the same formulas serve both
 
@@ -299,7 +299,7 @@ class TipDrag:
         self._forward: tuple[Array, Array] | None = None  # the direction that counts as forward, (..., 1)
 
     def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses beside the shape of the surface, (..., n), N."""
+        """Return the force that the sensor senses in addition to the shape of the surface, (..., n), N."""
         if not len(path):
             return np.zeros_like(path.x_m)
         speed_m_s, force_n = self._along(path), np.maximum(path.force_n, 0.0)

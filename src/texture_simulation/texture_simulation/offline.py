@@ -149,7 +149,7 @@ def simulate_exploration(
     )
     streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
     friction = scene.surface(surface).friction
-    # What a wrist sensor without errors would measure; NaN of a surface whose friction nobody states.
+    # What a wrist sensor without errors would measure; NaN of a surface whose friction is not defined.
     tangential_n = math.nan if friction is None else float(force[0] * sliding_coefficient(friction, speed)[0])
     slide = {
         'speed_m_s': speed_m_s,

@@ -20,7 +20,7 @@ from texture_core.types import NANOSECONDS, AnyArray, Array, FingerState
 
 @lru_cache(maxsize=64)
 def _steady(sections: bytes) -> Array:
-    """Return the state of sections, (n_sections, 2), that 1 has passed for ever."""
+    """Return the state of sections, (n_sections, 2), that 1 has passed."""
     return np.asarray(signal.sosfilt_zi(np.frombuffer(sections).reshape(-1, 6)))
 
 
@@ -56,7 +56,7 @@ MAX_POINTS = 16  # from one reckoned point to the next
 
 
 def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_m: Array, within_m: float) -> AnyArray:
-    """Return a field at places along ways, (..., n), straight between places that are `within_m` apart or nearer.
+    """Return a field at places along ways, (..., n), straight between places at most `within_m` from each other.
 
     Between places h apart, a wave of wave number k is wrong by at most (k·h)²/8 of its amplitude.
     """

@@ -105,7 +105,7 @@ class Scene:
 
 
 def load_scene(name_or_path: str) -> Scene:
-    """Return a scene that the package ships in config/scenes, or that stands in a file.
+    """Return a scene that the package ships in config/scenes, or that is in a file.
 
     Raises
     ------

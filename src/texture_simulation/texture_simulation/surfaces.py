@@ -145,7 +145,7 @@ class Relief:
 
 @dataclass(frozen=True)
 class Cut(Relief):
-    """A relief as a tool cuts it: its depth and the cross-section of what stands out."""
+    """A relief as a tool cuts it: its depth and the cross-section of the ridges or posts."""
 
     depth_m: float = param(
         2e-4, 'Height above the grooves; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
@@ -206,7 +206,7 @@ MEAN = {'sine': 0.5}
 class Grid(Cut):
     """Posts in rows and columns, or a net of ribs between hollows.
 
-    The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
+    The relief is a product of two profiles; a round Gaussian blurs each of them separately, so this is exact.
     """
 
     pitch_x_m: float = param(
@@ -224,9 +224,7 @@ class Grid(Cut):
         high=0.1,
     )
     angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
-    relief: str = param(
-        'posts', "What stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
-    )
+    relief: str = param('posts', "Raised part: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net'))
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""
@@ -484,7 +482,7 @@ KNOT_M = 2.5e-4  # straight between such places the shift is wrong by 1 % at mos
 
 @dataclass(frozen=True)
 class Weave(Seeded):
-    """Two sets of yarns: those met when sliding along x stand `pitch_x_m` apart.
+    """Two sets of yarns: those met when sliding along x have the spacing `pitch_x_m`.
 
     Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
     in a plain weave (`repeat` 2). Each wave is blurred by its own factor, which is exact. `irregular_m` shifts the
@@ -507,14 +505,14 @@ class Weave(Seeded):
     )
     thickness_x_m: float = param(
         1e-4,
-        'How far the yarns crossed along x stand out; larger values give a stronger signal.',
+        'Height of the yarns crossed along x; larger values give a stronger signal.',
         unit='m',
         low=0.0,
         high=0.01,
     )
     thickness_y_m: float = param(
         1e-4,
-        'How far the yarns crossed along y stand out; larger values give a stronger signal.',
+        'Height of the yarns crossed along y; larger values give a stronger signal.',
         unit='m',
         low=0.0,
         high=0.01,

@@ -248,7 +248,7 @@ class Rig(Graph):
         self._forces.append((to_ns(wrench.header.stamp) / NANOSECONDS, math.hypot(force.x, force.y, force.z)))
 
     def start(self, name: str, more: Mapping[str, Any] = {}) -> None:
-        """Start a node, again if it runs; wait until an explorer answers, whom nobody hears while it connects."""
+        """Start a node, again if it runs; wait until an explorer answers, which it cannot do while it connects."""
         if name in self._nodes:
             self._nodes[name].stop()
         given = {**self._given[name], **more}

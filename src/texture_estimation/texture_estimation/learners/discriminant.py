@@ -203,7 +203,7 @@ class ForceDiscriminant(Discriminant):
 
     Amplitude and spectrum of a vibration change with the force, and on a surface that is not level the force changes
     from place to place. A window is therefore judged by what was trained near its force, and one that was made far from
-    any trained force says little. Differences between the places along a slide count more in the covariance than what
+    any trained force carries little information. Differences between places along a slide count more than what
     varies at one place. Needs the feature `force`; without it there is one discriminant for all.
 
     Source: Fisher 1936; Friedman 1989; Hatch et al. 2006; Cleveland & Devlin 1988, "Locally weighted regression", for

@@ -27,7 +27,7 @@ BLOCK = 16  # batches that are drawn at once
 
 @dataclass(frozen=True, eq=False)
 class AugmentedExamples:
-    """What a learner draws besides the examples of the undisturbed slides."""
+    """What a learner draws in addition to the examples of the undisturbed slides."""
 
     values: Inputs
     codes: Codes
@@ -70,7 +70,7 @@ class AugmentedBatches:
         self._drawn: list[tuple[Inputs, Codes]] = []
 
     def draw(self, count: int) -> tuple[Inputs, Codes]:
-        """Return so many inputs, (count, n_features), and their labels, (count,); the same count at each call."""
+        """Return `count` inputs, (count, n_features), and their labels, (count,); the same count at each call."""
         if not self._drawn:
             self._drawn = self._draw_block(count)
         return self._drawn.pop()
@@ -287,7 +287,7 @@ class Mlp:
         }
 
     def _steps(self, n_examples: int, work: int, share: float) -> int:
-        """Return the number of batches, fewer where each costs much: with so many features and labels."""
+        """Return the number of batches, fewer where each costs much: with this many features and labels."""
         passes, most = math.ceil(share * self.epochs), round(share * MAX_WORK / work)
         return min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
 
@@ -295,7 +295,7 @@ class Mlp:
         self, drawn: AugmentedBatches | _Batches, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator,
         share: float,
     ) -> Weights:  # fmt: skip
-        """Return the weights after this share of all passes over so many examples, (n, n_features)."""
+        """Return the weights after this fraction of all passes over the examples, (n, n_features)."""
         n_examples, n_features = shape
         network = MlpTraining(n_features, self.hidden, n_labels, rng)
         # Noise is cut from a table at random places: a new number for each input took a fifth of the training.

@@ -243,7 +243,7 @@ class SklearnLearner:
         values
             The section.
         where
-            Where it stands, for the sentence of an error.
+            Where it is listed, for the error message.
 
         Raises
         ------

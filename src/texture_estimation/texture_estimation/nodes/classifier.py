@@ -75,7 +75,7 @@ class EstimatorNode(Node):
         return self._evidence.update(vector)
 
     def _facts(self) -> Mapping[str, Any]:
-        """Return what the report says besides faults."""
+        """Return the content of the report in addition to faults."""
         return {}
 
     def _faults(self) -> Mapping[str, int]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""`texture panel`: say what a panel of people grades as rough, and how far they agree."""
+"""`texture panel`: evaluate the grades of a panel of people, and their agreement."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Examine the panel, print what it says, and write it if asked to."""
+    """Evaluate the panel, print the results, and write them with --out."""
     ratings = read_ratings(options.ratings, options.scale)
     print('\n'.join(summary(report_of(ratings))))
     for file in write_panel(ratings, options.out) if options.out else ():

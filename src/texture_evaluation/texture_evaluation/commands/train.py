@@ -31,7 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Train, save, and say what was trained."""
+    """Train, save, and report what was trained."""
     _check_place(Path(options.out), replace=options.force)
     if options.grades:
         graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)

@@ -218,7 +218,7 @@ def welch_spectrum(windows: WindowBatch, points: int, rate_of_change: bool) -> t
 
 
 def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> Array:
-    """Return at which frequencies the lines would stand at another speed, (..., 1, n_lines); 0 m/s: where they stand.
+    """Return the frequencies of the lines at another speed, (..., 1, n_lines); 0 m/s: their frequencies as measured.
 
     A wave of the surface met at f is met at f · speed_m_s / v at that speed; NaN if that is unknown or not above 0.
     """
@@ -440,7 +440,7 @@ LEAST_RATIO = 1e-3  # added before the logarithm: a lag without any power gives 
 class PowerAutocorrelation(Feature):
     """Log of the mean product of the squared signal and itself some samples later, over its mean squared; of steps too.
 
-    0 where the one says nothing of the other, above where bursts last so long, below where they keep such a distance.
+    0 where they are independent, above where bursts last so long, below where they keep such a distance.
     The gain of the sensor changes nothing.
 
     Examples
@@ -449,7 +449,7 @@ class PowerAutocorrelation(Feature):
     >>> clicks[::12] = 1.0
     >>> feature = PowerAutocorrelation()
     >>> values = dict(zip(feature.names, feature(WindowBatch(clicks, rate_hz=100.0))[0].tolist()))
-    >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks are 12 samples apart, never 8
+    >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks have a spacing of 12 samples, never 8
     True
     """
 

@@ -279,7 +279,7 @@ class SpatialBandPower(WelchPower):
         """Return log(mean density + floor) of each band."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         speed = windows.moving_m_s[..., None, None, None]
-        # Line n, from 0, stands for the stretch from n to n + 1; edges are in lines, too.
+        # Line n, from 0, covers the stretch from n to n + 1; edges are in lines, too.
         edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
         high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
@@ -316,7 +316,7 @@ def _edges_1_m(feature: SpatialBandPower) -> Array:
 class SpatialBands(Feature):
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
-    Bands are equally wide in octaves, over the whole window: a grating of pitch λ stands in the band of 1/λ whatever
+    Bands are equally wide in octaves, over the whole window: a grating of pitch λ is in the band of 1/λ whatever
     the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
     measures what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is
     unknown or 0.
@@ -395,7 +395,7 @@ class MeanSpatialBands(SpatialBands):
 
 @dataclass(frozen=True)
 class SpatialVariation(WelchPower):
-    """Logarithm of the mean square difference between places `lag_m` apart along the way of the finger.
+    """Logarithm of the mean square difference between places at a distance of `lag_m` along the path of the finger.
 
     In nerves the rougher surface makes neighbouring fibres differ more; here one channel meets the places one after
     the other, lag_m / speed apart in time. The mean square is 2·∫ S(f)·(1 - cos(2πf·lag_m/speed)) df, so that no lag

@@ -50,7 +50,7 @@ def _differences(rows: Array) -> Array:
 
 @dataclass(frozen=True)
 class Force(Feature):
-    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say.
+    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not report it.
 
     Examples
     --------
@@ -267,7 +267,7 @@ class Moments(Feature):
 
 @dataclass(frozen=True)
 class Speed(Feature):
-    """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say.
+    """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not report it.
 
     Examples
     --------
@@ -337,12 +337,12 @@ class Stretched(Feature):
 
     @property
     def per_channel(self) -> bool:  # type: ignore[override]
-        """As the feature says."""
+        """As the feature defines it."""
         return self.feature.per_channel
 
     @property
     def per_pair(self) -> bool:
-        """As the feature says."""
+        """As the feature defines it."""
         return getattr(self.feature, 'per_pair', False)
 
     @property

@@ -110,7 +110,7 @@ class RecordNode(Node):
         depth = max(1, offered.depth)  # unknown of a publisher in another process: 0
         quality = Quality(depth, offered.reliability == reliable, offered.durability == latched)
         self._bag.qualities[name] = quality
-        # Deep queues: a burst must not be lost while the executor is busy. Volatile, but for what is said once for all:
+        # Deep queues: a burst must not be lost while the executor is busy. Volatile, but for what is published once:
         # of an exploration that was over before the recording began, the states alone would come.
         once = name in COMMON or name.endswith(('_baseline', '/model_info'))
         durability = offered.durability if once else DurabilityPolicy.VOLATILE
@@ -152,7 +152,7 @@ class RecordNode(Node):
             self._counts['dropped'] += 1
 
     def _write(self) -> None:
-        """Take messages from the queue to the disk until told to stop."""
+        """Write messages from the queue to the disk until stopped."""
         flushed_s = time.monotonic()
         while (message := self._next()) is not None:
             try:

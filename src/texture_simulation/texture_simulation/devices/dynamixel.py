@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Dynamixel motors and a hand emulated at the wire."""
+"""Dynamixel motors and a hand emulated at protocol level."""
 
 from __future__ import annotations
 

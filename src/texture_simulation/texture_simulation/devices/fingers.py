@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Fingers emulated at the wire: encoders of their protocols and the devices that send them."""
+"""Fingers emulated at protocol level: encoders of their protocols and the devices that send them."""
 
 from __future__ import annotations
 
@@ -238,7 +238,7 @@ class EmulatedDevice:
 
     @property
     def dropped_bytes(self) -> int:
-        """How many bytes nobody took."""
+        """How many bytes were not read."""
         return self._port.dropped_bytes
 
     def plug(self) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Two rails and a pressing motor emulated at the wire."""
+"""Two rails and a pressing motor emulated at protocol level."""
 
 from __future__ import annotations
 

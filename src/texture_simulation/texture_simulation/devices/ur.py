@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A UR controller emulated at the wire: RTDE, dashboard, program, and a robot in contact."""
+"""A UR controller emulated at protocol level: RTDE, dashboard, program, and a robot in contact."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
 
 
 class SpeedMove:
-    """Gain a velocity and keep it (speedl); `done` when it will not move any further by itself."""
+    """Gain a velocity and keep it (speedl); `done` when it will not move any further."""
 
     def __init__(self, wanted: Array, acceleration: float) -> None:
         self.done = False
@@ -383,7 +383,7 @@ class EmulatedController:
         return True
 
     # What the control script of ur-rtde does, without being URScript. It looks at its command register, number 0 or
-    # 24, once per cycle. Realtime commands are obeyed in every cycle in which they stand there; others once, until the
+    # 24, once per cycle. Realtime commands are obeyed in every cycle in which they are there; others once, until the
     # client has written 0 in between. A command that is overwritten within a cycle is lost, as on the real controller.
 
     def _control_script(self) -> Steps:
@@ -440,7 +440,7 @@ class EmulatedController:
 
 
 class Session:
-    """One conversation with one client; `greeting` is said first, `package` unasked in each cycle."""
+    """One conversation with one client; `greeting` is sent first, `package` unrequested in each cycle."""
 
     greeting = b''
 
@@ -456,11 +456,11 @@ class Session:
         """Leave nothing behind."""
 
 
-# The dashboard: one line asks, one line answers. Beside the real commands it obeys the fault switches of the emulator:
-# `emulate protective stop`, `emulate silence SECONDS`, in which nobody is heard or answered, `emulate slow SECONDS`,
+# The dashboard: one line asks, one line answers. Next to the real commands it obeys the fault switches of the emulator:
+# `emulate protective stop`, `emulate silence SECONDS`, in which nothing is answered, `emulate slow SECONDS`,
 # which lets stops, the end of force control and zeroing be acknowledged so much later, `emulate speed SHARE`, as of
 # the slider on the pendant, and `emulate friction COEFFICIENT`, as of another sample under the finger.
-# `load NAME` and `play` start a program of somebody else, which takes no commands.
+# `load NAME` and `play` start a foreign program, which takes no commands.
 
 SERIAL_NUMBER = '20205500001'
 BANNER = b'Connected: Universal Robots Dashboard Server\n'

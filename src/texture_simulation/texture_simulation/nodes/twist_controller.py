@@ -61,7 +61,7 @@ class ControllerTopicParams(FingerPipeParams):
 class TwistControllerNode(Node):
     """Follow TwistStamped, publish PoseStamped and WrenchStamped; all parameters but the topics may be changed.
 
-    The force on the finger as it is, in the base frame and without delay, stands on `true_wrench`.
+    The force on the finger as it is, in the base frame and without delay, is on `true_wrench`.
     """
 
     shares_file = True  # of the explorer, which says where the surface is
@@ -89,7 +89,7 @@ class TwistControllerNode(Node):
         self._thread.start()
 
     def shutdown(self) -> None:
-        """Let time stand still, once nobody commands the arm any more.
+        """Stop the time once the arm is no longer commanded.
 
         Ctrl-C in the terminal of a launch also reaches this node, while the explorer lifts the finger. A real
         controller is no part of that launch.
