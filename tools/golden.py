@@ -82,7 +82,7 @@ SMALLEST = 1e-9  # features below it do not count in a digest
 class GoldenSlides:
     """Slides over a few surfaces: of a scene, or of a public data set where `data_set` names one."""
 
-    recipes: tuple[str, ...]  # names; '*' stands for anything
+    recipes: tuple[str, ...]  # names; '*' matches anything
     surfaces: tuple[str, ...]
     scene: str = ''
     plan: SlidePlan | None = None
@@ -253,7 +253,7 @@ def _recipes(source: GoldenSlides) -> list[str]:
 
 
 def _bags(source: GoldenSlides, folder: Path) -> list[Path]:
-    """Write the bags of a source; a second set along y lies in a folder of its own."""
+    """Write the bags of a source; a second set along y lies in a separate folder."""
     if source.data_set:
         command = ['texture', 'import', source.data_set, str(DATA), str(folder / 'x'), '--slides', '1-7']
         subprocess.run([*command, '--materials', *source.surfaces], check=True, stdout=subprocess.DEVNULL)

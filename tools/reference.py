@@ -231,7 +231,7 @@ def experiment(name: str, root: Path) -> str:
                 rows.append(f'| {task} | {method}: {condition} | – | – | {shares} |')
     table = '\n'.join(rows) if numbers.get('tasks') else ''
     anchor = difficulty(numbers.get('difficulty') or {})
-    unit = 100.0 if numbers.get('tasks') else 1.0  # points of a share, or grades
+    unit = 100.0 if numbers.get('tasks') else 1.0  # percentage points, or grades
     data = f'Data: {content["data"]}. Split: {content["split"]}.'
     return f'{data}\n\n{table}\n\n{anchor}\n{_findings(numbers["findings"], seeds[0], count, unit)}\n'
 
@@ -333,7 +333,7 @@ def _definition(recipe: str, cell: dict[str, Any]) -> str:
 
 
 def percent(share: float | list[float] | None) -> str:
-    """Return a share in percent, with its interval if it has one."""
+    """Return a fraction in percent, with its interval if it has one."""
     if share is None:
         return '–'
     if isinstance(share, list):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Explorations in virtual time, on physics of their own: how hard a finger presses, and how each one ends.
+"""Explorations in virtual time, on independent physics: how hard a finger presses, and how each one ends.
 
 Needs neither ROS nor recorded data: `python -m texture_benchmarks.force_trials --out FOLDER` runs the whole sweep on
 all cores, and `texture benchmark motion --data FOLDER` makes the tables and charts of it.
@@ -323,7 +323,7 @@ class Second(threading.Thread):
 
 
 def explored(trial: ForceTrial) -> TrialEnd:
-    """Explore once, or with a second explorer that begins meanwhile; what raises is an end, too."""
+    """Explore once, or with a second explorer that begins meanwhile; an exception is also an end."""
     machine, seconds, seen = VirtualMachine(trial), list[Second](), 0
 
     def happens(phase: str) -> None:

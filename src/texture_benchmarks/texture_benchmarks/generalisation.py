@@ -57,7 +57,7 @@ BETWEEN, THERE = 'between', 'at trained places'
 # Slides trained and tested: three draws, each trained before it is tested.
 DRAWS = {'1-20 → 21-30': ('1-20', '21-30'), '11-30 → 31-40': ('11-30', '31-40'), '1-20 → 31-40': ('1-20', '31-40')}
 FIRST_DRAW = next(iter(DRAWS))
-# Parts of ten of the track that are trained, and those that are tested then; from the other end, too.
+# Parts of ten of the track that are trained, and those that are tested then; also from the other end.
 PARTS = 10
 Span = tuple[int, int]
 GAPS: Sequence[tuple[Span, Mapping[str, Span]]] = (
@@ -627,7 +627,7 @@ def _read_bags(name: str, options: BenchmarkOptions) -> SlideDataset:
 
 
 def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
-    """Read the materials at once, each by a process of its own: one after the other takes minutes."""
+    """Read the materials in parallel processes: one after the other takes minutes."""
     names = sorted(path.stem for path in options.recordings('biotac20').glob('material*.npz'))
     return SlideDataset(tuple(one for slides in map_forked(partial(_read_material, options), names) for one in slides))
 

@@ -40,9 +40,9 @@ from texture_simulation.sensor_models import SENSORS
 
 @dataclass(frozen=True)
 class Score:
-    """Shares of test windows and of whole test slides that are right, 0 to 1.
+    """Accuracy of test windows and of whole test slides, 0 to 1.
 
-    `known` is the share of slides that are reported as known surfaces, `certain_and_wrong` that of slides which could
+    `known` is the fraction of slides that are accepted, `certain_and_wrong` that of slides that could
     have been stopped at their end with a wrong label.
     """
 
@@ -148,7 +148,7 @@ TOUCH_M, TOUCHES = 0.006, 4  # each texture of ntp21 has one slide of 52 to 60 m
 def right_after_slides(
     known: NextTouchModel, motions: Sequence[SlideMotion], values: Array, rng: np.random.Generator, n_slides: int
 ) -> dict[str, Array]:
-    """Return the share of trials that are right after each slide, by the way in which motions are chosen.
+    """Return the accuracy of trials after each slide, by the strategy that chooses motions.
 
     `values` are features of slides (n_motions, n_textures, n_trials · n_slides, n_features), in the order of the known
     textures. The fixed order is the one that is chosen most often.
@@ -210,7 +210,7 @@ def recorded_touches(slide: SlideSamples) -> Array:
 
 
 def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str, dict[str, list[float]]]:
-    """Return the share right after each slide, simulated and recorded, by the way in which motions are chosen."""
+    """Return the accuracy after each slide, simulated and recorded, by the strategy that chooses motions."""
     found: dict[str, list[dict[str, Array]]] = {SIMULATED: [], RECORDED: []}
 
     # Simulated: other slides of the same textures and motions.
@@ -266,8 +266,8 @@ FOLDS = 2  # for the calibration alone: less to wait for
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on 15 materials, add 5 more, test on later slides of all; several draws of the five.
 
-    Share of test windows and of whole test slides (final estimate) that are right, mean over the draws; processor
-    time of adding a slide, stored on disk. Chosen motions: share of trials in which the most probable texture is right
+    Accuracy of test windows and of whole test slides (final estimate), mean over the draws; processor
+    time of adding a slide, stored on disk. Chosen motions: accuracy of the most probable texture over trials
     after each slide, of simulated slides of 0.5 s (scene oriented, 16 motions) and of recorded touches of 6 mm (ntp21,
     16 speeds and forces, every other touch of each slide trained on), both described by mean_log_bands and moments.
     """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How hard a finger presses in virtual time, on physics of its own; and where the force control is stable."""
+"""How hard a finger presses in virtual time, on independent physics; and where the force control is stable."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from texture_exploration.force_control import (
 # --------------------
 # The stability limit: predicted by eigenvalues, and that of the running controller.
 
-CYCLES = 60  # a simulated loop is judged after so many delays
+CYCLES = 60  # number of delays after which a simulated loop is evaluated
 SMALL = 0.1
 FINE = 20  # simulation steps per period
 
@@ -135,7 +135,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     A late integrator on a spring with friction, by an arm of ROS controllers that holds the last velocity: stiffness
     of 0.2 to 20 kN/m, delay of 0 to 50 ms, noise of 3 to 20 mN; a wall, wrong signs and axes, a surface upside down 1
-    to 12 mm away; in each phase samples that are no numbers, broken links and a second explorer. Largest true forces of
+    to 12 mm away; in each phase non-finite samples, broken links and a second explorer. Largest true forces of
     each kind of trial, the most time above 10 N, and how the trials ended. Trials that `force_trials` has written
     into the folder of recorded data are taken from there.
     """

@@ -83,11 +83,11 @@ _Tried = tuple[dict[str, Any], Callable[[], Array]]
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Train every method on earlier slides and test it on later ones, each with its own windows.
+    """Train every method on earlier slides and test it on later ones, each with the windows of its recipe.
 
     Recipes as released, those of papers with one set of variables each, their training windows at least 0.5 s apart;
-    peers with windows of 0.5 s that do not overlap. Share of slides recognised over the sliding time, with 95 %
-    intervals by bootstrap over surfaces, or exact over slides where these are wider; mean sliding time and share right
+    peers with windows of 0.5 s that do not overlap. Accuracy of slides over the sliding time, with 95 %
+    intervals by bootstrap over surfaces, or exact over slides where these are wider; mean sliding time and accuracy
     when each slide ends as soon as it is decided; computing time of a training (s) and of one window from samples to
     estimate (µs, median and 99th percentile), by the clock of the processor, of the round of 5 over all methods whose
     median was lowest.
@@ -214,7 +214,7 @@ def _time_peer(classifier: Any, windows: AnyArray) -> Array:
 
 
 def _over_time(right: Mapping[float, Sequence[bool]], surfaces: Sequence[str]) -> dict[str, Any]:
-    """Return the share of slides that are right after each time, with intervals over the surfaces."""
+    """Return the accuracy of slides after each time, with intervals over the surfaces."""
     intervals = {seconds: share_interval(own, surfaces) for seconds, own in right.items()}
     share = {seconds: float(np.mean(own)) for seconds, own in right.items()}
     usual = (*metrics.TIMES_S, AT_S)

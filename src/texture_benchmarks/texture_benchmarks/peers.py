@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""General classifiers on the same slides: a support vector machine on log bands, and some in packages of their own."""
+"""General classifiers on the same slides: a support vector machine on log bands, and some in separate packages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from texture_features.feature_set import read_recipe
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.slides import LabelledSlide
 
-SVC = 'SVC on log bands'  # the typical spectrum of each window; it has no rejection of its own
+SVC = 'SVC on log bands'  # the typical spectrum of each window; it has no rejection
 PACKAGES = 'TEXTURE_PEERS'  # environment variable: the folder of the packages that `make peers` installs
 MINIROCKET, QUANT, CNN = 'MiniRocket', 'QUANT', 'convolutional network'
 CLASSIFIERS: Mapping[str, str] = {

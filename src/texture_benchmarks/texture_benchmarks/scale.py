@@ -126,7 +126,7 @@ def _measure(recipe: Recipe, spread: FeatureSpread, seed: int, labels: int) -> d
 
 
 def _tested(model: TextureModel, examples: LabelledFeatures) -> tuple[tuple[float, float], Array]:
-    """Return the shares of windows and of slides recognised, and the times from features to estimate."""
+    """Return the accuracy of windows and of slides, and the times from features to estimate."""
     slides = np.unique(examples.groups)
     chosen = slides[:: max(1, len(slides) // MOST_TESTED)]
     windows = examples.of_slides(chosen)
@@ -177,7 +177,7 @@ TARGETS = {'1000 textures': {'train_s': 300.0, 'memory_mib': 2048.0, 'window_us'
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train a recipe on drawn features of more and more textures.
 
-    Computing time (s) and memory (MiB) of a training; time from features to estimate (µs); share of single windows
+    Computing time (s) and memory (MiB) of a training; time from features to estimate (µs); fraction of single windows
     and of slides (of as many windows as those trained on) recognised.
     """
     recipe = load_recipe(RECIPE)

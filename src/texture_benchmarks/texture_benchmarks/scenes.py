@@ -55,7 +55,7 @@ class TouchProtocol:
     radius_m: float = 0.0
     # A surface is measured once in each of these directions, and all are evaluated together
     turned_rad: Sequence[float] = (0.0,)
-    slow: bool = False  # Whether the slow channels are used, too
+    slow: bool = False  # Whether the slow channels are also used
     tested_forces_n: Sequence[float] = ()  # Other forces for the test; as in learning if empty
     # training_by, tested_by: individuals of the sensor
     training_by: Sequence[int] = (0,)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every study is given and hands back; recordings and workers that several of them share."""
+"""What every study is given and hands back; their common recordings and workers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class BenchmarkOptions:
     """Where a benchmark writes, where recorded data lies, and whether to hurry."""
 
     out: Path  # Folder for the JSON and the chart
-    # Folder that holds the recorded data sets, each in its own folder; None if there is none
+    # Folder that holds the recorded data sets, each in a separate folder; None if there is none
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
@@ -143,7 +143,7 @@ def _do(job: Any) -> Any:
 
 
 def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
-    """Return the 95 % interval of a share of slides: by bootstrap over surfaces, or exact over slides where wider.
+    """Return the 95 % interval of a fraction of slides: by bootstrap over surfaces, or exact over slides where wider.
 
     Slides over one surface are no independent draws. Where all surfaces are alike, resampling them shows nothing.
     Source of the exact one: Clopper & Pearson 1934.

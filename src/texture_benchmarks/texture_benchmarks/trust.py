@@ -198,13 +198,11 @@ class Outcome:
     final_right: int
     final_wrong: int
     label_right: int  # Slides with the right label at the end, whether they were accepted or not
-    interval: tuple[
-        float, float
-    ]  # Of the share of those, 95 %, over surfaces: slides over one are no independent draws
+    interval: tuple[float, float]  # Of their fraction, 95 %, over surfaces: slides over one are no independent draws
 
     @property
     def worst_wrong(self) -> float:
-        """The larger share of slides that were accepted but wrong: at the first decided estimate, or at the end."""
+        """The larger fraction of slides that were accepted but wrong: at the first decided estimate, or at the end."""
         return max(self.early_wrong, self.final_wrong) / self.slides
 
     @classmethod
@@ -365,7 +363,7 @@ def breakdown(places: Sequence[float], shares: Sequence[float]) -> float | None:
 
 
 def breakdowns(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]) -> list[float]:
-    """Return the places on the axis of a sweep, 0 for its first strength, where the share of right labels breaks."""
+    """Return the places on the axis of a sweep, 0 for its first strength, where the accuracy breaks down."""
     rows = ordered(sweep)
     shares = [outcomes[name].label_right / outcomes[name].slides for _, name in rows]
     clean = [name for _, name in rows].index(UNDISTURBED)

@@ -247,7 +247,7 @@ def test_samples_that_neither_count_nor_stamp_are_missed_by_time_half_a_second_l
 
 
 class Driver:
-    """The vendor's TSF-85 driver: a sample, and behind it its stamp, in messages of their own."""
+    """The vendor's TSF-85 driver: a sample, and after it its stamp, in separate messages."""
 
     def __init__(self, ticks: int = 1) -> None:
         self.ticks = ticks

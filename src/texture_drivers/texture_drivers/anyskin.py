@@ -60,7 +60,7 @@ def field_channels(magnetometers: int) -> tuple[str, ...]:
 # The AnySkin's protocol: bytes to frames. Knows no port and no clock.
 
 Values = NDArray[np.float32]
-LOCK_FRAMES = 3  # so many in a row, and nothing between them, make sure where frames begin
+LOCK_FRAMES = 3  # consecutive frames, with nothing between them, that confirm where frames begin
 
 
 class FrameRun(NamedTuple):

@@ -40,7 +40,7 @@ class SpiFrame(NamedTuple):
 class SpiLink:
     """The way to a board; `counts` are totals kept over reopening."""
 
-    max_drift: float  # by what share its clock may be wrong
+    max_drift: float  # largest relative error of its clock
     serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
 
     def open(self) -> None:
@@ -176,7 +176,7 @@ FINGERS = 5  # most that one board holds
 # --------------------
 # A microcontroller that samples a BioTac board over SPI and streams the replies over a serial line.
 #
-# Our own design, for whoever has no Cheetah adapter: see docs/sensors.md. It sends without being asked, framed as in
+# A design of this project, for users without a Cheetah adapter: see docs/sensors.md. It sends unrequested, framed as in
 # `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
 
 VERSION = 1
@@ -297,7 +297,7 @@ class FrameTracker:
 
 
 # --------------------
-# The Total Phase Cheetah SPI adapter, through the vendor's own Python module `cheetah_py`.
+# The Total Phase Cheetah SPI adapter, through the vendor's Python module `cheetah_py`.
 #
 # That module and its library are not free and not part of this project; who owns the adapter has them from the vendor.
 # The calls and their values are those of kth-ros-pkg/biotac_driver @6fb8e33 `biotac_sensors/src/biotac.c`. This file
@@ -620,7 +620,7 @@ class BioTac:
             self._damaged += int(replies.damaged[finger])
             self._refused += int(replies.refused[finger])
             if replies.damaged[finger] == len(run) * len(self._layout.slots):
-                continue  # nobody there
+                continue  # no answer
             self._last_received_ns[finger] = now_ns
             pac, slow = self._signals
             stamp_ns, first = start_ns + round(SLOT_NS), index * self._layout.pac_per_frame

@@ -18,7 +18,7 @@ from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecode
 # --------------------
 # Numbers of the data acquisition finger.
 #
-# The layout of the frames is our own (see `texture_core.framing`); rate and channels are of Jamali & Sammut 2010.
+# The frame layout is of this project (see `texture_core.framing`); rate and channels are of Jamali & Sammut 2010.
 
 TOPIC = 'signal'
 SENSOR = 'daq'

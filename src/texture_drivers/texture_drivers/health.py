@@ -24,7 +24,7 @@ from texture_drivers.sensor import SensorReader
 # of a half is right to a small part of one.
 MOST_MOVED = 3.0
 LEAST_SAMPLES = 4
-RELATIVE_FLOOR = 1e-4  # the noise of a channel is taken for at least this share of its baseline: some have none
+RELATIVE_FLOOR = 1e-4  # smallest noise of a channel, as a fraction of its baseline: some have none
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ MOST_KEPT_S = 5.0  # of samples between two reviews
 NAMED = 3  # channels in a sentence
 # Of an unloaded channel, in standard deviations of its noise: farther off is a drift.
 DRIFT_LIMIT = 10.0
-DRIFT_REVIEWS = 3  # so many in a row show a drift: one may be a touch
+DRIFT_REVIEWS = 3  # consecutive reviews that show a drift: one may be a touch
 
 
 Flags = NDArray[np.bool_]
@@ -228,7 +228,7 @@ class ChannelWatch:
     """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are asked for in another."""
 
     def __init__(self, params: TareParams, topics: Sequence[str], limits: Limits) -> None:
-        self.unloaded: bool | None = None  # whether nothing touches the finger; None if nobody tells
+        self.unloaded: bool | None = None  # whether nothing touches the finger; None if unknown
         self.refusal = ''  # why the last tare was refused
         self._params = params
         self._streams = {topic: StreamWatch(limits.get(topic)) for topic in topics}
@@ -306,9 +306,9 @@ RATE_TOLERANCE = 0.05  # WARN: a rate this far off
 MAX_BAD_PACKETS_PER_S = 5.0  # WARN: a damaged line; single refusals come with every opening
 
 HealthReport = tuple[str, str, Mapping[str, Any]]
-# Who is started again numbers anew: nobody can tell what its stream lost until then, least of all in a flood.
+# A restarted driver numbers from 0: what its stream lost before is unknown, above all at high rates.
 BEFORE_THE_START = {'lost before the start': 'unknown'}
-# A bridge that starts again numbers anew, too: what was lost between is told by the time, to about a packet.
+# A restarted bridge also numbers from 0: what was lost in between is estimated by time, to about a packet.
 INTERRUPTIONS = ('restarts', 'reopened')
 AT_INTERRUPTIONS = {'lost at restarts': 'estimated by time; less than a packet is unknown'}
 
@@ -333,7 +333,7 @@ class SensorHealth:
 
     @property
     def details(self) -> Mapping[str, Any]:
-        """What the sensor reports about itself, such as its 'serial number'; a user's own need not."""
+        """What the sensor reports about itself, such as its 'serial number'; optional in custom sensors."""
         return getattr(self._reader.sensor, 'details', {})
 
     def report(self, now_s: float) -> HealthReport:

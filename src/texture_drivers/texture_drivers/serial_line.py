@@ -144,7 +144,7 @@ SILENCE_S = 1.0  # the device sends without being asked; opening the port again 
 
 
 class Decoder:
-    """Turns the bytes of one protocol into batches; knows no port and no clock of its own."""
+    """Turns the bytes of one protocol into batches; knows no port and no clock."""
 
     @property
     def valid_frames(self) -> int:

@@ -20,7 +20,7 @@ from texture_core.errors import DeviceError
 from texture_core.types import NANOSECONDS, Array
 
 # --------------------
-# How long samples of a device were on the way, against its own clock.
+# Transport delay of samples of a device, against its clock.
 
 
 @dataclass
@@ -270,7 +270,7 @@ class StampStatus(enum.Enum):
 
 
 class SampleCounter:
-    """Count samples through the device's own stamps, `ticks` of them a sample; 0 measures by the first four stamps.
+    """Count samples by the device's stamps, `ticks` of them a sample; 0 measures by the first four stamps.
 
     A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
     not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
@@ -395,7 +395,7 @@ class PacketNumbering:
 # Give blocks of samples their running index, so that a jump of the index is exactly what was lost.
 
 RATE_CHECK_S = 1.0
-MAX_FAILED_CHECKS = 3  # so many in a row are no hiccup
+MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
 RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
 
 

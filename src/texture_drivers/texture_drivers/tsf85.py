@@ -266,7 +266,7 @@ class SampleFrameSplitter:
 
 
 # --------------------
-# Settings of the TSF-85 beside those of every sensor: its inertial sensors.
+# Settings of the TSF-85 in addition to those of every sensor: its inertial sensors.
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 TESLA_PER_UT = 1e-6
@@ -473,7 +473,7 @@ class FingerStream:
 # The TSF-85 fingertip as a sensor of the suite.
 
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
-REVIVALS = 3  # so many times, as the vendor does, before the port is given up
+REVIVALS = 3  # restarts, as the vendor does, before the port is given up
 REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
@@ -560,7 +560,7 @@ class Tsf85Decoder(Decoder):
 class Tsf85(SerialSensor):
     """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
 
-    The device's own stamps number the samples, so losses are known exactly; over an interruption the host's clock
+    The device's stamps number the samples, so losses are known exactly; over an interruption the host's clock
     does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
     at each tick of the static rate. See `texture_core.types.Sensor`.
 

@@ -174,7 +174,7 @@ def test_a_slide_of_the_training_scores_as_it_does_window_by_window():
 
 
 # --------------------
-# What so many slides show.
+# What a number of slides can show.
 
 
 @pytest.mark.parametrize('slides', [1, 12, 149, 600])

@@ -99,7 +99,7 @@ def trees_model(examples):
 
 @pytest.fixture(scope='module')
 def pairs_model(examples):
-    """Return a model in which two pairs have features and learners of their own."""
+    """Return a model in which two pairs have separate features and learners."""
     pairs = [
         {
             'pair': ['cork', 'felt'],

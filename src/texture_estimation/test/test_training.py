@@ -138,7 +138,7 @@ def test_windows_of_other_lengths_train_the_learner_and_decide_nothing_else(make
     assert accuracy(wider, moved) > 0.9 > accuracy(alone, moved)
     assert wider.training['windows'] == alone.training['windows'] == len(examples.labels)
     kept = dataclasses.replace(both.of_slides(sorted(set(examples.groups) - {'cork/0'})))
-    assert train(ANY_SPEED, kept).training['slides'] == 15  # those of the slide left out are left out, too
+    assert train(ANY_SPEED, kept).training['slides'] == 15  # those of the omitted slide are also omitted
 
 
 def test_no_slide_is_on_both_sides_and_parts_are_stretches_of_time():

@@ -5,7 +5,7 @@
 A label is accepted if its slide scores above a limit. The score is the log-odds, by logistic regression, that the slide
 is one of its label's rather than one of a surface that the model does not know. It has two inputs: the margin by which
 the evidence for the label exceeds that for the next one, and the distance of the slide to the training slides of the
-label. As unknown surfaces serve the held-out slides themselves, with their label taken away.
+label. As unknown surfaces serve the held-out slides themselves, with their label removed.
 
 Sources: Cox 1958 for the regression; Vovk, Gammerman & Shafer 2005 for limits by rank; Clopper & Pearson 1934 and
 Hanley & Lippman-Hand 1983 for what a number of slides can show; Ioffe 2006 for the distance;
@@ -33,11 +33,11 @@ from texture_estimation.learners.learner import Codes, is_tied
 from texture_features.feature_set import SlideConditions
 
 # --------------------
-# What so many slides held out of the training can show.
+# What a number of held-out slides can show.
 
-SIGNIFICANCE = 0.05  # the error rate exceeds its upper bound in so many of all trainings
+SIGNIFICANCE = 0.05  # fraction of all trainings in which the error rate exceeds its upper bound
 LEAST_SLIDES_A_LABEL = 5  # with one held out, four tell how much slides differ
-TRIALS = 2  # of each held-out slide: with its label in the model, and with that taken away
+TRIALS = 2  # of each held-out slide: with its label in the model, and with that removed
 MAX_SLIDES = 1_000_000
 
 
@@ -374,7 +374,7 @@ class Acceptance:
         kept = (limit - equal) / (highest - equal)
         return [equal + kept * (probability - equal) for probability in probabilities]
 
-    # ---- what is said of a slide
+    # ---- decisions about a slide
 
     @cached_property
     def _rows(self) -> list[Limits]:

@@ -134,7 +134,7 @@ class MajorityVote(EvidenceRule):
         return (best & alone).astype(np.float64)
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
-        """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.
+        """Return the logarithm of the fractions of the votes; equal ones for all labels where the majority is lacking.
 
         What did not vote is shared out equally. `tempering_exponent` does not matter: votes are counted.
         """

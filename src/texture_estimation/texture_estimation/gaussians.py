@@ -18,10 +18,10 @@ from texture_estimation.learners.learner import Codes, group_means, log_softmax,
 # Gaussian classes with one covariance, to which classes of a few samples can be added.
 
 # Chosen on slides 21-30 of recorded materials, five of twenty added to a model of slides 1-20 of the others.
-PRIOR_SAMPLES = 30.0  # the covariance is drawn to its diagonal as by so many further samples
+PRIOR_SAMPLES = 30.0  # the covariance is shrunk towards its diagonal as by this many further samples
 MIN_VARIANCE = 0.01  # within classes, in that of all samples: few samples may agree by chance
 MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides tell it
-CONSTANT = 1e-12  # deviation of a feature that is taken for constant, relative to its largest value
+CONSTANT = 1e-12  # largest deviation of a constant feature, relative to its largest value
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def _projected(samples: Array, projection: Array) -> Array:
 # --------------------
 # Gaussians of whole slides: what tells added textures from the trained ones and from each other.
 
-# Lengths of the start of a slide that have Gaussians of their own, in windows that do not overlap: the start of a
+# Lengths of the start of a slide that have separate Gaussians, in windows that do not overlap: the start of a
 # slide is like no other part of it.
 LENGTHS = (1.0, 2.0, 3.0, 5.0, 9.0)
 WHOLE = 0.9  # of the typical length of the trained slides: from here on a slide is compared with whole ones
@@ -104,10 +104,10 @@ SPREAD_FLOOR = 0.01  # of the mean variance of the windows within a slide, added
 
 @dataclass(frozen=True, eq=False)
 class SlideGaussians:
-    """Share of each texture in a slide, by the mean and the deviation of its features so far.
+    """Probability of each texture in a slide, by the mean and the deviation of its features so far.
 
     The first classes are the trained textures. The further ones are the textures of the added slides, which may include
-    trained ones: slides that were added to a trained texture are a class of their own.
+    trained ones: slides that were added to a trained texture are a separate class.
     """
 
     windows: GaussianClasses
@@ -178,7 +178,7 @@ class SlideGaussians:
         return self.windows.log_probabilities(X)
 
     def combined(self, trained: Array, shares: Array) -> Array:
-        """Return the probability of each label: the trained textures share what they have together as they were."""
+        """Return the probability of each label: the trained textures keep the ratios of their probabilities."""
         own = np.exp(shares)
         n_labels = max(self.n_trained, int(self.added.max(initial=-1)) + 1)
         probabilities = np.zeros((*own.shape[:-1], n_labels))
@@ -188,7 +188,7 @@ class SlideGaussians:
         return probabilities
 
     def check(self, mean: Array) -> None:
-        """Raise ValueError unless the shares of a slide with this mean, (n_features,), are numbers at every length."""
+        """Raise ValueError unless a slide with this mean, (n_features,), has finite probabilities at every length."""
         if not all(np.isfinite(self.shares(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
             raise ValueError('its values are too large to be features')
 
@@ -238,7 +238,7 @@ class SlideMoments:
 # Distance of the mean features of a slide to the training slides of one class.
 
 # Chosen on slides 1-24 against 25-30 of recorded materials, five of twenty left out of the training.
-DISTANCE_WINDOWS = 5.0  # the distance rests on the first so many: later ones drift
+DISTANCE_WINDOWS = 5.0  # number of first windows that determine the distance: later ones drift
 NEAREST = 3  # slides to which the distance counts: one alone may be an odd one
 SHRINKAGE = 0.6  # of the covariances towards their diagonals: there are hardly more slides than features
 FLOOR = 0.18  # of the mean variance within classes, added to each

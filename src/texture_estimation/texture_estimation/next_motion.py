@@ -33,7 +33,7 @@ class NextTouch(NamedTuple):
 
 
 def log_likelihoods(places: Array, means: Array) -> Array:
-    """Return those of slides under one motion by texture, (..., n_textures), less what all textures share."""
+    """Return those of slides under one motion by texture, (..., n_textures), less the mean over all textures."""
     off = places[..., None, :] - means
     return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
 

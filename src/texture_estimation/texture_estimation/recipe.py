@@ -221,7 +221,7 @@ class Recipe:
 
 
 def _training(section: Any, where: str) -> tuple[DecisionParams, Augmentation]:
-    """Return the parameters of the section `training`, and those of its own section for augmentation."""
+    """Return the parameters of the section `training`, and those of the section for augmentation."""
     augmentation: Any = {}
     if isinstance(section, Mapping):
         augmentation = section.get(AUGMENTATION) or {}
@@ -233,7 +233,7 @@ def _training(section: Any, where: str) -> tuple[DecisionParams, Augmentation]:
 
 
 def load_recipe(name_or_path: str) -> Recipe:
-    """Read a shipped recipe by name, or any by path; a model's card holds one too.
+    """Read a shipped recipe by name, or any by path; a model's card also holds one.
 
     Raises
     ------

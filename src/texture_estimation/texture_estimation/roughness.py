@@ -319,7 +319,7 @@ class RoughnessRecipe:
 
 
 def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
-    """Read a recipe that the package ships in config/roughness, or any by path; a model's card holds one too."""
+    """Read a recipe that the package ships in config/roughness, or any by path; a model's card also holds one."""
     name, content = read_recipe(name_or_path, 'config/roughness', 'roughness recipe')
     return RoughnessRecipe.from_mapping(content, name)
 
@@ -327,7 +327,7 @@ def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
 # --------------------
 # A trained roughness model.
 
-NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
+NORMAL_90 = 1.6449  # standard deviations around the mean within which 90 % of normal values lie
 
 
 @dataclass(frozen=True)
@@ -371,7 +371,7 @@ class RoughnessModel(StoredModel):
 
     def refusal(self, vector: FeatureVector) -> str:
         """Return why a window cannot be graded; '' if it can."""
-        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and says nothing
+        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and is ignored
             return f'no contact: the force is {vector.force_n:.2f} N'
         finite = np.isfinite(vector.values)
         if not finite.all():
@@ -385,7 +385,7 @@ class RoughnessModel(StoredModel):
         return ''
 
     def grade(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features)."""
+        """Return grade and standard deviation of the regressor, (...) each, of (..., n_features)."""
         return self.predictor(X.take(self._graded, axis=-1))
 
     @property

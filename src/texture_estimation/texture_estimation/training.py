@@ -133,9 +133,9 @@ def _augmented_examples(
 def held_out_parts(examples: LabelledFeatures, *, by_speed: bool = False) -> Codes | None:
     """Return the part in which each slide is held out, (n_slides,), by session, place and finger; None to go by slides.
 
-    `by_speed` slides at other speeds are in other parts, too.
+    `by_speed` also slides at other speeds are in other parts.
 
-    Slides of one session share what is of that day: with one of them in the training, another tells nothing of the next
+    Slides of one session share the conditions of that day: with one of them in training, another is no test of the next
     day. A label with one session is held out slide by slide, as if its slides were sessions.
     """
     slides, rows = np.unique(examples.groups, return_index=True)
@@ -206,7 +206,7 @@ EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = 
 # Follow slides and disturbed copies window by window, as models do that have not seen them.
 
 FOLDS = 5
-# Of the copies of each slide, so many are among the slides to which the distance is measured, at random gains, if they
+# Of the copies of each slide, this many lie among those to which the distance is measured, at random gains, if they
 # have no noise: what is tolerated as noise would let strong noise pass. Chosen on slides 21-30, trained on 1-20.
 REFERENCE_COPIES = 6
 
@@ -270,7 +270,7 @@ class Followed:
                 )
 
     def distance(self, predictor: Predictor | None, held_out: Collection[int] = ()) -> ClassDistance:
-        """Return the distance to slides that are not held out: their metric, and among the references copies, too."""
+        """Return the distance to slides that are not held out: their metric, with copies among the references."""
         means, codes = [], []
         for those in (self._slides, self._copies):
             kept = [slide for slide in those if slide.group not in held_out]
@@ -391,7 +391,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         slides = Followed(bound, examples)
         near = [*slides.held_out(fitted, fitted.temperature, None)]
         far: list[HeldOutSlide] = []
-        # Where slides are of several places, sessions or fingers, fit without each of these in turn, too.
+        # Where slides are of several places, sessions or fingers, also fit without each of these in turn.
         placed = in_places(examples, recipe.training.held_out_places)
         parts = held_out_parts(placed, by_speed=bool(recipe.training.slowest_m_s))
         if parts is not None:

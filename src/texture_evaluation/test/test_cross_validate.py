@@ -105,7 +105,7 @@ def test_slides_that_are_all_right_or_all_wrong_have_the_exact_bound(n: int) -> 
 
 def test_shuffled_labels_are_recognised_by_chance_alone() -> None:
     figures = cross_validate(RECIPE, tones(15, shuffled=True), StratifiedGroupKFold(5)).as_json()
-    # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial share are 17 %.
+    # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial fraction are 17 %.
     assert 0.08 < figures['slide_accuracy'] < 0.42
 
 

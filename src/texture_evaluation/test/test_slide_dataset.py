@@ -214,7 +214,7 @@ def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
     topics = ('finger0/signal', 'finger1/signal')
     assert model.recipe.feature_set.topics == topics
     slides = SlideDataset.from_bags(bags, topics=topics).slides
-    for slide in slides:  # each finger has traits of its own, at the same time
+    for slide in slides:  # each finger has individual traits, at the same time
         first, second = (slide.signals[topic] for topic in topics)
         assert first[0].stamp_ns == second[0].stamp_ns
         assert not np.array_equal(first[0].samples, second[0].samples)

@@ -38,7 +38,7 @@ def refuse_chart_format(path: str | Path) -> None:
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Return the points, by rising cost, of which no other has at most the cost and at least the share."""
+    """Return the points, by rising cost, of which no other has at most the cost and at least the accuracy."""
     front: list[int] = []
     for index in sorted(range(len(points)), key=lambda index: (points[index][0], -points[index][1])):
         if not front or points[index][1] > points[front[-1]][1]:

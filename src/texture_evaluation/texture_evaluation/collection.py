@@ -86,7 +86,7 @@ class Patch:
 
 
 UNLIMITED = (0.0, math.inf)
-# By the names of the lowest and the highest: the usual lowest, so many times which is the usual highest, and the unit.
+# By the names of the lowest and the highest: default of the lowest, ratio of the default highest to it, and the unit.
 USUAL = {('force_low_n', 'force_high_n'): (1.0, 2.0, 'N'), ('speed_low_m_s', 'speed_high_m_s'): (0.02, 2.5, 'm/s')}
 
 
@@ -107,7 +107,7 @@ def fitted_range(params: CollectionParams, names: tuple[str, str], allowed: tupl
 CANDIDATES = 200
 EDGE = 0.5  # of a slide beyond its end, for the ramps before and after it
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-PLASTIC = 0.7548776662466927  # the same for a second sequence beside it (Roberts 2018)
+PLASTIC = 0.7548776662466927  # the same for a second, parallel sequence (Roberts 2018)
 
 
 class PlacePlan:
@@ -179,7 +179,7 @@ class PlacePlan:
 
 
 def _between(low: float, high: float, fraction: float) -> float:
-    return float(low * (high / low) ** fraction)  # equal ratios apart, not equal steps
+    return float(low * (high / low) ** fraction)  # equal ratios, not equal steps
 
 
 # --------------------
@@ -187,7 +187,7 @@ def _between(low: float, high: float, fraction: float) -> float:
 
 RECIPE, SHRINKAGE = 'default', 0.5  # few slides show no correlations
 CONFIDENCE = 0.9
-# Within which other places of the surface are left out, too: neighbours show more than a new place will.
+# Within which other places of the surface are also left out: neighbours show more than a new place will.
 GAPS_M = (0.01, 0.03, 0.06)
 BANDS_M = (0.02, 0.04, 0.08)  # largest distance of each band from the nearest trained place
 ENOUGH = 0.8  # accuracy of a band up to which tracks are near enough
@@ -323,7 +323,7 @@ def collect(
 ) -> CollectionEnd:
     """Touch place after place until the bound is met, the places are used up, or it cannot or shall not go on.
 
-    Ctrl-C, a recorder that ends and recordings that cannot be read are such ends, too: the slides so far count.
+    Ctrl-C, a recorder that ends and recordings that cannot be read are also such ends: the slides so far count.
     """
     slides, failures, accuracy = 0, 0, PlaceAccuracy(0, 0)
 
@@ -348,7 +348,7 @@ def collect(
                 continue
             accuracy = evaluate_all(slides)
             tell(accuracy.sentence, slides)
-            # The first surface of a folder has nothing to be told from.
+            # The first surface of a folder has nothing to be distinguished from.
             met = accuracy.bound >= params.bound if accuracy.others else True
             if slides >= params.places and met:
                 return ended(CollectionError.NONE, accuracy.sentence)

@@ -40,7 +40,7 @@ from texture_recordings.dataset import CONDITIONS, SlideDataset
 
 ANSWER_S, WORKERS_S = 4, 4  # for a scheduler to answer, and for its first worker to come
 # What scheduler and workers must have as this process has it: both unpack what is computed, and a scheduler that cannot
-# says so in its own log alone, while everybody waits.
+# reports it in its log only, while all others wait.
 ON_CLUSTER = ('texture_core', 'texture_features', 'texture_estimation', 'texture_recordings', 'texture_evaluation')
 CLUSTER_ADVICE = (
     'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
@@ -49,7 +49,7 @@ CLUSTER_ADVICE = (
 
 
 def single_blas_thread() -> AbstractContextManager[Any]:
-    """Keep linear algebra from starting threads of its own within a `with` block: the cores are busy already."""
+    """Keep linear algebra from starting threads within a `with` block: the cores are busy already."""
     return threadpool_limits(limits=1, user_api='blas')
 
 
@@ -108,7 +108,7 @@ def _check_cluster(client: Any, address: str) -> None:
 
 
 # --------------------
-# Shares of windows and slides that are right, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
+# Accuracy of windows and slides, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
 
 RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
@@ -150,16 +150,16 @@ def _counted(which: Sequence[bool]) -> Array:
 
 
 def _share_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[float] | None]:
-    """Return a share and its interval; None for both without an answer."""
+    """Return an accuracy and its interval; None for both without an answer."""
     right, answers = counts.sum(axis=0)
     return (float(right / answers), interval(counts, clusters)) if answers else (None, None)
 
 
 def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) -> list[float]:
-    """Return the 95 % interval of a share by bootstrap over clusters: answers within one are not independent.
+    """Return the 95 % interval of an accuracy by bootstrap over clusters: answers within one are not independent.
 
     Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
-    the share of clusters, about 3/n wide.
+    the fraction of clusters, about 3/n wide.
     """
     counts = counts if clusters is None else clustered(counts, clusters)
     right, answers = counts.sum(axis=0)
@@ -176,7 +176,7 @@ def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:
 
 
 def _resampled(counts: Array) -> Array:
-    """Return the share that is right in each resample of the rows, (..., RESAMPLES), of (..., n_clusters, 2)."""
+    """Return the accuracy in each resample of the rows, (..., RESAMPLES), of (..., n_clusters, 2)."""
     # Always the same resamples: the figures of a page do not change from run to run.
     n_rows = counts.shape[-2]
     drawn = np.random.default_rng(0).integers(n_rows, size=(RESAMPLES, n_rows))
@@ -419,7 +419,7 @@ def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool)
 
 
 def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
-    """Return second minus first share, and its interval; `counts` is (2, n_clusters, 2)."""
+    """Return second minus first accuracy, and its interval; `counts` is (2, n_clusters, 2)."""
     first, second = (right / answers for right, answers in counts.sum(axis=1))
     # Both recipes on the same resampled clusters: what is hard for both widens no interval.
     drawn = _resampled(counts)
@@ -428,13 +428,13 @@ def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
 
 
 # --------------------
-# Draw cross-validated recipes beside each other: shares with their intervals, and slides over sliding time.
+# Draw cross-validated recipes next to each other: accuracies with intervals, and slides over sliding time.
 
 KINDS = (('window', 'single windows', 'o'), ('slide', 'whole slides', 's'))
 
 
 def comparison_chart(results: Sequence[CrossValidation], title: str, path: str | Path) -> Path:
-    """Draw the shares of windows and slides that are right with 95 % intervals, and how slides do over their time.
+    """Draw the accuracy of windows and slides with 95 % intervals, and that of slides over their time.
 
     Parameters
     ----------
@@ -594,7 +594,7 @@ Rows = NDArray[np.intp]
 def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -> list[tuple[Rows, Rows]]:
     """Return splits that test no slide of a surface that they do not train: it could not be right."""
     if any(len(np.unique(labels[train])) < 2 for train, _ in splits):
-        return list(splits)  # the training says it better: it names the fold
+        return list(splits)  # the error of the training is better: it names the fold
     possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
     left = [(train, test) for train, test in possible if len(test)]
     if not left:
@@ -733,7 +733,7 @@ def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str,
 def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> str:
     left_out = np.unique(groups[test_rows])
     if len(left_out) != 1 or len(test_rows) < 2:
-        return str(number)  # the name of a single slide says nothing of the fold
+        return str(number)  # the name of a single slide does not describe the fold
     return f'{left_out[0]:g}' if np.issubdtype(left_out.dtype, np.number) else str(left_out[0])
 
 

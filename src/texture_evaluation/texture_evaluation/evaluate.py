@@ -302,5 +302,5 @@ def summary(report: EvaluationReport) -> list[str]:
 
 
 def percent(share: float | None) -> str:
-    """Return a share in per cent, or a dash if there is none."""
+    """Return a fraction in per cent, or a dash if there is none."""
     return '–' if share is None else f'{100 * share:.1f} %'

@@ -58,7 +58,7 @@ def window_accuracy(results: Sequence[SlideResult]) -> float:
 
 
 def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
-    """Return the share of slides that are recognised after so much sliding; None if no slide is long enough."""
+    """Return the accuracy of slides after a time of sliding; None if no slide is long enough."""
     decided = [(result.surface, result.after(seconds)) for result in results]
     return _share([estimate.label == surface for surface, estimate in decided if estimate is not None])
 
@@ -69,7 +69,7 @@ def unclassified_windows(results: Sequence[SlideResult]) -> float:
 
 
 def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the share of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
+    """Return the fraction of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
     ends = {f'{seconds:.1f}': [result.after(seconds) for result in results] for seconds in TIMES_S}
     return {key: _share([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
 
@@ -130,7 +130,7 @@ def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]
 def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides that were rejected, early ('early') or at their end ('final'); None without slides.
 
-    A slide that is never decided goes on to its end: there its last estimate counts as early, too.
+    A slide that is never decided goes on to its end: there its last estimate also counts as early.
     """
     early = [not estimate.accepted for _, estimate in _early_ends(results)]
     return {'early': _share(early), 'final': _share([not result.end.accepted for result in results])}
@@ -169,7 +169,7 @@ def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray
 
 
 def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
-    """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches.
+    """Return seconds of sliding and the accuracy of slides after them, as far as every slide reaches.
 
     The times are those at which decisions are made: windows that vote together decide when their vote is complete.
     """

@@ -134,7 +134,7 @@ def one_against_rest(grades: Array) -> tuple[float, float]:
             continue
         rest = np.nanmean(others[:, shared], axis=0)
         errors.append(float(np.abs(own[shared] - rest).mean()))
-        if own[shared].std() > 0 and rest.std() > 0:  # who gives one grade to all correlates with nobody
+        if own[shared].std() > 0 and rest.std() > 0:  # a rater with one grade for all has no correlation
             correlations.append(float(np.corrcoef(own[shared], rest)[0, 1]))
     return _mean(errors), _mean(correlations)
 

@@ -274,7 +274,7 @@ PLACES_M = np.array([0.0, 1e-3, 5e-3, 9e-3])
 
 
 def slide(speed_m_s, distance_m=0.05, places_m=PLACES_M, surface=None):
-    """Slide an array of taxels over a surface: each measures the height at its own place."""
+    """Slide an array of taxels over a surface: each measures the height at its place."""
     along = np.arange(round(distance_m / speed_m_s * SPATIAL_RATE_HZ)) / SPATIAL_RATE_HZ * speed_m_s
     surface = surface or (lambda x: np.sin(2 * np.pi * x / PITCH_M))
     return surface(along[:, None] + places_m)

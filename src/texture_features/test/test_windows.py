@@ -37,7 +37,7 @@ def state(at_s, phase=Phase.SLIDE, steady_s=0.0, name='e1', **others):
 
 
 def stream(duration_s, rate_hz=1000.0, batch=5, begin_s=0.0, columns=1):
-    """Return batches whose samples are their own running index."""
+    """Return batches whose samples are their running index."""
     total = round(duration_s * rate_hz)
     rows = np.repeat(np.arange(total, dtype=np.float32)[:, None], columns, axis=1)
     channels = tuple(f'c{column}' for column in range(columns))

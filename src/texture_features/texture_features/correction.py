@@ -233,7 +233,7 @@ class Correction:
 
 
 # --------------------
-# The files beside a model: what the finger of the training showed, and by what another one is corrected.
+# The files next to a model: what the finger of the training showed, and by what another one is corrected.
 
 CORRECTION, REFERENCE = 'correction', 'reference'
 SLIDE_NUMBERS = ('speed_m_s', 'force_n', 'distance_m', 'direction_rad')  # by which a slide over the plate is repeated

@@ -318,7 +318,7 @@ class FeatureSet:
         return self._names_and_fingerprint(layout)[1]
 
     def _kind(self, event: WindowEvent) -> tuple[Any, ...]:
-        """Return what events must share to be described together; () for the end of a slide."""
+        """Return the layout that events described together have in common; () for the end of a slide."""
         if isinstance(event, SlideEnd):
             return ()
         return tuple(
@@ -450,7 +450,7 @@ def _parameters(feature: Feature) -> dict[str, Any]:
 
 
 # --------------------
-# Say in which part two fingerprints of feature sets differ.
+# Report in which part two fingerprints of feature sets differ.
 
 PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
 

@@ -393,7 +393,7 @@ class BufferedStream:
 Interval = tuple[float, float]
 UNKNOWN: Interval = (math.nan, math.nan)
 
-# Two slide states at most so far apart cover the time between them.
+# Largest difference of two slide states that cover the time between them.
 LINK_NS = NANOSECONDS // 2
 # No guarantee holds for longer: a wrong one must not make millions of windows.
 MAX_STEADY_S = 3600.0

@@ -28,7 +28,7 @@ from texture_papers.kaboli import (
 )
 from texture_papers.roberge import Network, SvmPairs, fit_network, pairs_won
 
-# What the papers add: the shared checks hold for it, too.
+# What the papers add: the shared checks also hold for it.
 PAPERS = (
     *(f'texture_papers.roberge:{name}' for name in ('AnnPairs', 'SvmPairs', 'TunedPairs')),
     *(f'texture_papers.kaboli:{name}' for name in ('SvmLinear', 'PassiveAggressive', 'EmMixture')),

@@ -23,7 +23,7 @@ components
 x and y
     Paper: Joined, 78 numbers (5.2).
     Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, each with its components, about 150 numbers; the experiment
-        has 39 + 39, too.
+        also has 39 + 39.
 machine
     Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not given.
     Here: `SvmMaxWins`: those of scikit-learn's `SVC`, with C = 10.
@@ -163,7 +163,7 @@ class SvmMaxWins:
 
 
 def principal_components(centred: Array, share: float, wanted: int = 0) -> Array:
-    """Return the fewest components, (n_features, n_components), that explain a share of the variance, or so many.
+    """Return the fewest components, (n_features, n_components), that explain a fraction of the variance, or `wanted`.
 
     Source: Hu et al. 2014, eq. 7 to 12.
     """

@@ -128,7 +128,7 @@ def components(slides: Slides, method: str) -> Mapping[str, Mapping[str, int]]:
 
 
 def kept(values: Array, share: float) -> int:
-    """Return how many components explain a share of the variance, the mean of each example subtracted (eq. 7)."""
+    """Return how many components explain a fraction of the variance, the mean of each example subtracted (eq. 7)."""
     return principal_components(values - values.mean(axis=1, keepdims=True), share).shape[1]
 
 

@@ -66,11 +66,11 @@ class Interval:
 
 
 def share(right: Array) -> Interval:
-    """Return the share of slides that are right (Wilson's interval)."""
+    """Return the accuracy of slides (Wilson's interval)."""
     n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
     reach = NORMAL_95 * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
-    # Where all or none are right, rounding may leave the share just outside.
+    # Where all or none are right, rounding may leave the fraction just outside.
     return Interval(p, min(p, float(middle - reach)), max(p, float(middle + reach)))
 
 
@@ -106,7 +106,7 @@ class MethodResult:
 
     @property
     def learning(self) -> float | None:
-        """Share of the training slides that are recognised; None if none is used for training as a whole."""
+        """Accuracy on the training slides; None if none is used for training as a whole."""
         return float((self.decided == self.codes)[self.trained_on].mean()) if self.trained_on.any() else None
 
     @property
@@ -116,7 +116,7 @@ class MethodResult:
 
     @property
     def test(self) -> Interval:
-        """Share of the slides held out that are recognised."""
+        """Accuracy on the held-out slides."""
         return share(self.right())
 
     @property
@@ -171,7 +171,7 @@ Splitter = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
 
 @dataclass(frozen=True)
 class Figures:
-    """What a paper reports of a method, as shares; None if it does not."""
+    """Figures that a paper reports of a method, 0 to 1; None if it does not."""
 
     learning: float | None = None
     test: float | None = None
@@ -233,7 +233,7 @@ MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what
 
 @dataclass(frozen=True)
 class Anchor:
-    """The one reported figure by which the difficulty of a scene is set: the share of test slides that are right."""
+    """The one reported figure by which the difficulty of a scene is set: the accuracy on test slides."""
 
     task: str
     method: str
@@ -290,7 +290,7 @@ def folds(count: int, repeats: int) -> Splitter:
 
 
 def drawn(share: float, count: int) -> Splitter:
-    """Return what draws so large a share of all slides for training, whatever their surface."""
+    """Return what draws this fraction of all slides for training, whatever their surface."""
     return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=share, random_state=seed))
 
 
@@ -533,7 +533,7 @@ class PairSearch:
 
     @property
     def kind(self) -> tuple[str, str, tuple[str, ...], int]:
-        """What another search must share to begin with its individuals."""
+        """What must be equal in another search that begins with its individuals."""
         return self.task, self.method, self.pair, self.params.seed
 
 
@@ -741,7 +741,7 @@ def mean_over_seeds(values: Sequence[float]) -> Interval:
 
 
 def _add(figures: dict[str, Any], found: Sequence[float], *, share: bool = False) -> None:
-    """Add values and interval of the seeds, which is cut where no share can lie."""
+    """Add values and interval of the seeds, which is cut to the range of fractions."""
     if len(found) > 1:
         figures['by_seed'] = list(found)
         interval = mean_over_seeds(found).as_json()

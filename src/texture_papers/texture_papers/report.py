@@ -117,7 +117,7 @@ def built_in(why: str, *findings: Finding) -> Iterator[Finding]:
 
 
 def percent(part: Interval) -> str:
-    """Return a share with its interval."""
+    """Return a fraction with its interval."""
     return f'{100 * part.value:.1f} % ({100 * part.low:.1f} to {100 * part.high:.1f})'
 
 
@@ -249,7 +249,7 @@ def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = Fa
 
 
 def _by_condition(outcome: MethodResult) -> dict[str, Any]:
-    """Return the share recognised under each condition in which slides were tested."""
+    """Return the accuracy under each condition in which slides were tested."""
     names = dict.fromkeys(outcome.conditions[outcome.tested].tolist())
     return {
         'conditions': {name: {'test': share(outcome.right(outcome.conditions == name)).as_json()} for name in names}

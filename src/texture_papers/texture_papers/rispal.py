@@ -75,7 +75,7 @@ def grade_membership(grades: Array) -> NDArray[np.bool_]:
     return np.rint(grades)[:, None] == GRADES
 
 
-# One of so many windows of each texture tells when to stop: MATLAB holds out 15 %.
+# One of this many windows of each texture decides when to stop: MATLAB holds out 15 %.
 HELD_OUT = 7
 
 

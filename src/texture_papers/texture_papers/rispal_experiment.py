@@ -69,7 +69,7 @@ class Answers:
         )
 
     def figures(self) -> dict[str, Any]:
-        """Return error, spread within a texture, share without a grade, and how often the 90 % interval holds."""
+        """Return error, spread within a texture, fraction without a grade, and how often the 90 % interval holds."""
         given = np.isfinite(self.grades)
         errors = np.abs(self.grades - self.true)
         within = errors <= NORMAL_90 * self.stds

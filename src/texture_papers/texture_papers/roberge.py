@@ -6,7 +6,7 @@ What the paper describes and what is done here, element by element:
 
 slide
     Paper: 500 ms at 0.10, 0.15, 0.20 m/s and 1, 2.5, 5 N; ten textures: 10 cm at 0.125 m/s and 2 N (IV.A, V.A).
-    Here: The same in the presets, 50 ms longer, so that an arm that answers late covers it, too.
+    Here: The same in the presets, 50 ms longer, so that a late arm also covers it.
 transform
     Paper: The signal less its mean, 1024 values from 0 to 500 Hz (III.B).
     Here: The same: 2048 points at 1 kHz.
@@ -27,7 +27,7 @@ decision
     Here: The same: `pairs_won`.
 vote
     Paper: Five parts of one scan of 500 ms, at least three equal (III.C, IV.B.1).
-    Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a decision of its own.
+    Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a separate decision.
 parts of a circle
     Paper: 1 to 9, most votes; 7 or 9 in almost all cases (IV, IV.B.2).
     Here: 7 of 70 ms for all pairs.
@@ -461,7 +461,7 @@ class SvmPairs:
 
 
 ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair
-# One of so many is held out of each network's training to stop it: MATLAB holds out 15 %.
+# One of this many is held out of each network's training to stop it: MATLAB holds out 15 %.
 HELD_OUT = 7
 
 
@@ -516,7 +516,7 @@ def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
     return held
 
 
-TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have variables of their own'
+TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have separate variables'
 KEYS = ('learner', 'pairs')
 PAIR_KEYS = ('pair', 'inputs', 'learner')
 # What decides a pair.
@@ -555,9 +555,9 @@ class TunedPair:
 
 @dataclass(frozen=True)
 class TunedPairs:
-    """A machine or network for each pair of textures, each with its own features and parameters; most pairs won.
+    """A machine or network for each pair of textures, each with separate features and parameters; most pairs won.
 
-    The inputs of the recipe hold the features of all pairs; each pair is trained on, and sees, those of its own inputs.
+    The inputs of the recipe hold the features of all pairs; each pair is trained on, and sees, those of its inputs.
     A pair that is not listed has all features and the common learner.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
@@ -608,7 +608,7 @@ class TunedPairs:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         if self.pairs and (len(self.names), len(self.labels)) != (X.shape[1], int(y.max()) + 1):
             raise InvalidParameter(
-                'the pairs of the recipe have variables of their own, and the names of the features and textures are '
+                'the pairs of the recipe have separate variables, and the names of the features and textures are '
                 "not known; train with `texture train`, or call the learner's `of_examples` first"
             )
         tuned = {frozenset(pair.labels): pair for pair in self.pairs}

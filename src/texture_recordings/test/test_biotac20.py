@@ -19,7 +19,7 @@ N_FRAMES = 610
 def make_source(
     folder: Path, frame_time: np.ndarray | None = None, epochs: tuple[float, ...] = (1e9, 1e9 + 60)
 ) -> Path:
-    """Write two slides in the data set's format: PAC counts its frames, the slow columns hold their own number."""
+    """Write two slides in the data set's format: PAC counts its frames, slow columns hold their number."""
     frame_time = np.arange(N_FRAMES) * 0.01 if frame_time is None else frame_time
     n_frames = len(frame_time)
     frames = np.tile(np.arange(44), (n_frames, 1)).astype(np.int16)

@@ -29,7 +29,7 @@ def run_of(rng: np.random.Generator, rate_hz: float, first: int) -> np.ndarray:
 
 
 def stamped(rng: np.random.Generator, times: np.ndarray, rate_hz: float, faults: list[str]) -> np.ndarray:
-    """Return times as a buffer stamps them, of one size or read at any time, as a coarse clock does, too."""
+    """Return times as a buffer stamps them, of one size or read at any time, also as a coarse clock does."""
     if 'bursts' in faults:
         size = int(rng.integers(2, 12))
         rows = np.arange(len(times))

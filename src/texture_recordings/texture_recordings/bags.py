@@ -514,7 +514,7 @@ def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
-    # As rosbags finds them: beside the metadata, wherever the entry says that they were.
+    # As rosbags finds them: next to the metadata, whatever folder the entry names.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
 
 
@@ -588,7 +588,7 @@ def _offered(quality: Quality) -> Qos:
     return Qos(keep, quality.depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)
 
 
-# Of topics that the suite does not publish, or not under a name of its own. Who joins late gets all that is latched.
+# Of topics that the suite does not publish, or under a standard name. Late subscribers get all that is latched.
 LATCHED = Quality(100, reliable=True, latched=True)
 COMMON: Mapping[str, Quality] = {
     '/diagnostics': Quality(100, reliable=True, latched=False),

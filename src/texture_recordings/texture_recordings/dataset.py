@@ -307,7 +307,7 @@ class SlideDataset:
 
         The path of each surface is divided into equal lengths: along the longest extent of the reported positions;
         where a slide tells none, by the distance from its start; without speeds, by the time. Slides that run the other
-        way are then counted from the other end. No window spans two parts, as each is a slide of its own.
+        way are then counted from the other end. No window spans two parts, as each is a separate slide.
 
         Slides over one track are one place, however many: only the parts of it show how far a training reaches.
 

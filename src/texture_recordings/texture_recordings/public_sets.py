@@ -392,7 +392,7 @@ def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
 # one `slides.npz` with a key `textureNNN/speedSSS/forceF.F` (mm/s, N over contact) for each slide. Slides are numbered
 # by speed, and by force within a speed. The recorded stamps jitter by half a sample while the samples are evenly spaced
 # (read so, the speeds agree better with each other): each slide is read as evenly spaced from its first stamp to its
-# last, and brought from its own rate (310 to 323 Hz) to 320 Hz by a cubic spline. `force_n` is that beyond contact.
+# last, and resampled from its rate (310 to 323 Hz) to 320 Hz by a cubic spline. `force_n` is that beyond contact.
 
 NTP21_TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out

@@ -71,7 +71,7 @@ class LabelledSlide:
 
     @property
     def whole_name(self) -> str:
-        """Name of the slide of which this is a part; of a whole slide its own."""
+        """Name of the slide of which this is a part; of a whole slide its name."""
         return f'{self.surface}/{self.number}'
 
     @property

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A sensor on its emulated device, whose samples encode their own index, so that every fault is detected."""
+"""A sensor on its emulated device, whose samples encode their index, so that every fault is detected."""
 
 from __future__ import annotations
 

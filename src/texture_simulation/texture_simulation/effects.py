@@ -59,12 +59,12 @@ class ForceGain:
 # --------------------
 # No two fingers of a kind are equally sensitive.
 
-SALT = 41  # so that the gain of a finger is drawn apart from its other traits
+SALT = 41  # so that the gain of a finger is drawn independently of its other traits
 
 
 @dataclass(frozen=True)
 class FingerSpread:
-    """Each individual of the sensor senses textures by a factor of its own more or less strongly."""
+    """Each individual of the sensor has an individual sensitivity to textures."""
 
     relative: float = param(0.1, 'Relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5)
     skin: float = param(
@@ -131,7 +131,7 @@ class Dropouts:
 
 
 # --------------------
-# The electronics' own noise.
+# Noise of the electronics.
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ MIN_SHARE = 0.05  # of what was wanted
 
 @dataclass(frozen=True)
 class SlideError:
-    """Speed and force deviate from slide to slide (offline recordings; a simulated arm has errors of its own)."""
+    """Speed and force deviate from slide to slide (offline recordings; a simulated arm has other errors)."""
 
     speed: float = param(0.01, 'Relative standard deviation of the speed from slide to slide.', low=0.0, high=0.5)
     force: float = param(0.04, 'Relative standard deviation of the force from slide to slide.', low=0.0, high=0.5)
@@ -272,5 +272,5 @@ EFFECTS: Mapping[str, type] = {
     'unevenness': Unevenness,  # no sample is everywhere the same
     'finger_spread': FingerSpread,  # no finger is as sensitive as another
     'noise': Noise,  # of the electronics
-    'dropouts': Dropouts,  # moments in which the signal stands still
+    'dropouts': Dropouts,  # moments in which the signal is frozen
 }

@@ -90,7 +90,7 @@ class StickSlip(Stribeck):
 #     bend' = slip − σ0·|slip|·bend / g(slip)
 #
 # σ1 fades as the Stribeck curve does, which keeps friction passive at all speeds. What comes into contact when the
-# force grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend
+# force grows comes unbent, and what leaves takes its part of the bending with it: bend·N stays when N grows, bend
 # stays when N falls. So a change of force adds no energy, and a new touch begins unbent.
 
 Value = Any  # a float, or an array over scans: the same formulas serve both
@@ -120,7 +120,7 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
     """Return a step with friction and damping at the new speed and the skin's spring at the old stretch.
 
     Friction at the new speed makes the bristles harmless however stiff they are; the spring at the old stretch keeps
-    the skin's own swing from being damped by the numbers. The new slip w = ±W solves a quadratic equation:
+    the natural oscillation of the skin from being damped numerically. The new slip w = ±W solves a quadratic equation:
 
         bend' = (bend + h·w) / (1 + q·W), q = h·σ0/g
         (mass/h + c + N·σ2)·w + N·(σ0·bend' + σ1·(bend' − bend)/h) = mass·slip/h + k·stretch + c·speed
@@ -154,7 +154,7 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
 def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
     """Return the longest semi-implicit step: h²·k = 4·m + 2·h·D + h²·N·σ0, with D all damping and σ0 only if sticking.
 
-    Only the skin's own swing limits it, and not even that while bristles stiffer than the skin hold.
+    Only the natural oscillation of the skin limits it, and not even that while bristles stiffer than the skin hold.
     """
     f = friction
     sticking = slip_m_s == 0.0
@@ -168,7 +168,7 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
 # --------------------
 # Longest step with which an integrator stays stable; longer steps are refused.
 
-MARGIN = 0.5  # share of the border up to which a step is accepted
+MARGIN = 0.5  # fraction of the limit up to which a step is accepted
 
 
 def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
@@ -196,7 +196,7 @@ def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: fl
 # --------------------
 # Drag tips over a surface, step by step: one scan in plain floats, or many at once in arrays.
 
-FEW = 40  # scans; up to so many are faster one after another in floats than together in arrays
+FEW = 40  # scans; up to this number they are faster one after another in floats than together in arrays
 
 
 def drag(

@@ -118,7 +118,7 @@ def simulate_exploration(
     scene, surface
         What is touched; `surface` is the name, and becomes the label in the states.
     speed_m_s, force_n
-        As wanted. The finger's own differ from slide to slide if the scene has a `slide_error`.
+        As wanted. Those of the finger differ from slide to slide if the scene has a `slide_error`.
     slide_s
         Length of the steady part.
     start_ns
@@ -130,7 +130,7 @@ def simulate_exploration(
     radius_m
         Of a circle, travelled anticlockwise; 0 for a straight line.
     finger
-        Which individual of the sensor: each has traits of its own.
+        Which individual of the sensor: each has individual traits.
     exploration_id
         Id of the exploration in its states.
 
@@ -281,7 +281,7 @@ def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng
 def _slide(
     scene: Scene, plan: SlidePlan, start_ns: int, exploration_id: str, rng: np.random.Generator
 ) -> tuple[list[ExplorationState], dict[str, Iterable[TactileSignal]]]:
-    """Return the states of a slide, and the signals of all its fingers by topic, each finger with traits of its own."""
+    """Return the states of a slide, and the signals of all its fingers by topic, each finger with individual traits."""
     surface = exploration_id.rpartition('/')[0]
     signals: dict[str, Iterable[TactileSignal]] = {}
     for finger in reversed(range(plan.fingers)):

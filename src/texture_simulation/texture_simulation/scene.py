@@ -85,7 +85,7 @@ class Scene:
         return [self.effects[name] for name in EFFECTS if name in self.effects and hasattr(EFFECTS[name], stage)]
 
     def of_finger(self, finger: int) -> Scene:
-        """Return the scene as one individual of the sensor senses it: with a skin and a noise of its own."""
+        """Return the scene as one individual of the sensor senses it: with an individual skin and noise."""
         spread = self.effects.get('finger_spread')
         if spread is None:
             return self

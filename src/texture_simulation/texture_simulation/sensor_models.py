@@ -180,7 +180,7 @@ class BioTacModel(SensorModel):
         self._band = self._filter(PAC_BAND)
         step = 1 - np.exp(-layout.frame_s / TOUCH_S)
         self._cool = Filter(np.array([[step, 0.0, 0.0, 1.0, step - 1, 0.0]]))
-        self._cooled: Array | None = None  # share of the fall of temperature, (..., 1)
+        self._cooled: Array | None = None  # fraction of the fall of temperature, (..., 1)
         row, column = np.divmod(np.arange(layout.electrodes)[:, None], COLUMNS)
         self._x_m = (column - (COLUMNS - 1) / 2) * ELECTRODE_PITCH_M
         self._y_m = (row - (layout.electrodes // COLUMNS) / 2) * ELECTRODE_PITCH_M
@@ -331,16 +331,16 @@ DAQ_KIND = SensorKind(
 # --------------------
 # Forces on the elements of a finger with a slow array: normal and tangential, along a path.
 
-FRICTION = 0.5  # share of the normal force that drags the skin while it slides
+FRICTION = 0.5  # fraction of the normal force that drags the skin while it slides
 CREEP_M_S = 1e-3  # speed at which half of that is reached
 CROSSTALK = 0.1  # standard deviation of what an axis of an element senses of another one
-REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of the middle's share
+REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of the load of the middle
 
 
 class PressedElements:
     """Return what each element senses of the force on the skin.
 
-    The force spreads over the elements like a bell; each senses its share, blurred as it lies, and its axes are not
+    The force spreads over the elements like a bell; each senses its part, blurred as it lies, and its axes are not
     quite at right angles. All these numbers are ours.
     """
 
@@ -365,7 +365,7 @@ class PressedElements:
         return np.asarray(self._coupling @ forces_n)
 
     def _drag_directions(self, placed: Trajectory) -> tuple[Array, Array]:
-        """Return the share of the normal force that drags along x and y, (..., n) each."""
+        """Return the fraction of the normal force that drags along x and y, (..., n) each."""
         x_m, y_m = self._before or before_first(placed)
         self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
         x_m_s = self._rate_hz * np.diff(placed.x_m, prepend=x_m)
@@ -449,7 +449,7 @@ ANYSKIN_KIND = SensorKind(
 
 # A point a sample: at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more.
 PVDF_PATH_RATE_HZ = pvdf.FILM_RATE_HZ
-# Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
+# Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant fraction.
 KEPT = math.exp(-1 / (pvdf.LEAK_S * PVDF_PATH_RATE_HZ))
 LEAK_SECTIONS = np.array([[1.0, -1.0, 0.0, 1.0, -KEPT, 0.0]])
 FILM_BAND = np.concatenate([filters.butter(2, 800.0, 'lowpass', fs=PVDF_PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
@@ -588,7 +588,7 @@ class Tsf85Model(SensorModel):
         return math.ceil(point * self._static_rate_hz / TSF85_PATH_RATE_HZ)
 
     def _shares(self, force_n: Array) -> Array:
-        """Return the share of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact, as Hertz'."""
+        """Return the fraction of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact (Hertz)."""
         radius_m = TSF85_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[..., None, :]
         dome = np.maximum(0.0, 1 - (self._taxel_x_m**2 + self._taxel_y_m**2) / radius_m**2)
         return dome / np.maximum(dome.sum(axis=-2, keepdims=True), 1e-9)
@@ -623,7 +623,7 @@ SENSORS: Mapping[str, SensorKind] = {
 
 
 # --------------------
-# Fingers that slide together, each an individual that touches a place of its own.
+# Fingers that slide together, each an individual that touches a separate place.
 
 
 class JoinedContacts:

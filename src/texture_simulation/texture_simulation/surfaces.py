@@ -62,7 +62,7 @@ class PlaceVariation:
     def at(self, surface: str, x_m: Array, y_m: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return factors of level, blur and friction, and shifts of x and y in m, (..., n) each.
 
-        The fields are drawn by the name of the surface: each surface of a scene has its own.
+        The fields are drawn by the name of the surface: each surface of a scene has separate ones.
         """
         if not x_m.shape[-1]:
             return (np.ones_like(x_m), np.ones_like(x_m), np.ones_like(x_m), np.zeros_like(x_m), np.zeros_like(x_m))
@@ -96,7 +96,7 @@ def _field_waves(seed: int, length_m: float) -> tuple[Array, Array]:
 # --------------------
 # The profile across ridges that all have the same pitch, as its Fourier series.
 
-MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this share is left out
+MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this fraction is left out
 SHAPES = ('sine', 'square')
 
 
@@ -233,7 +233,7 @@ class Grid(Cut):
         along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)
         across = profile(y_m * cosine - x_m * sine, blur_m, self.pitch_y_m, self.shape, self.duty)
         sign = 1.0 if self.relief == 'posts' else -1.0
-        # Less its own mean; in place, which costs half as much.
+        # Less its mean; in place, which costs half as much.
         along += mean
         across += mean
         along *= across
@@ -279,7 +279,7 @@ POINTS_PER_WAVE = 4  # of the shortest wave
 # The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(MIN_BLUR_M, MAX_BLUR_M, 10)  # tiles are made for these and interpolated between
-# Points under one blur, from which on a tile of its own is cheaper than mixing point by point.
+# Points under one blur, from which on a separate tile is cheaper than mixing point by point.
 MIN_POINTS_FOR_OWN_TILE = 20_000
 TILE_POINTS = (SIDE + 1) ** 2
 
@@ -485,7 +485,7 @@ class Weave(Seeded):
     """Two sets of yarns: those met when sliding along x have the spacing `pitch_x_m`.
 
     Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
-    in a plain weave (`repeat` 2). Each wave is blurred by its own factor, which is exact. `irregular_m` shifts the
+    in a plain weave (`repeat` 2). Each wave is blurred by a separate factor, which is exact. `irregular_m` shifts the
     yarns by slow waves, as in linen: its lines are broader the finer they are.
     """
 

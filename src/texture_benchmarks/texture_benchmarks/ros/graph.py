@@ -53,7 +53,7 @@ class Graph:
         self._context.try_shutdown()
 
     def publisher(self, topic: str) -> Any:
-        """Return a publisher on a topic of the suite: 'signal', or 'finger1/signal' in a namespace of its own."""
+        """Return a publisher on a topic of the suite: 'signal', or 'finger1/signal' in a separate namespace."""
         kind, qos, name = _in_namespace(topic)
         return self.node.create_publisher(kind, name, qos)
 
@@ -88,7 +88,7 @@ Timed = tuple[int, str, Any]  # when it is due, ns since the start; topic; data 
 
 
 class Streamer:
-    """Publish from a thread of its own."""
+    """Publish from a separate thread."""
 
     def __init__(self, graph: Graph, plan: Sequence[Timed]) -> None:
         publishers = {topic: graph.publisher(topic) for topic in {topic for _, topic, _ in plan}}
@@ -126,7 +126,7 @@ READY_WITHIN_S = 60.0
 DRIVER_S = 10.0
 BATCH_S = 0.01  # as the sensor node delivers
 SPEED_M_S, FORCE_N = 0.1, 2.0
-DOMAIN = 83  # of its own: what else runs on the machine must not listen
+DOMAIN = 83  # separate: other nodes on the machine must not subscribe
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ class LiveLatency:
     # (n_estimates,) From publishing the batch with the last sample of a window to receiving its estimate
     latency_s: Array
     expected: int  # Estimates that should have come
-    cpu: Mapping[str, float]  # Share of one core that each node used, 0 to 1
+    cpu: Mapping[str, float]  # Fraction of one core that each node used, 0 to 1
 
     def numbers(self) -> dict[str, Any]:
         """Return the figures."""
@@ -196,7 +196,7 @@ def _wait_for_nodes(graph: Graph, streamer: Streamer, fingers: Sequence[_Finger]
 def _stream(
     graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], deadline_s: float
 ) -> list[Mapping[str, float]]:
-    """Stream until each finger has its final estimate; return the share of one core that each of its nodes used."""
+    """Stream until each finger has its final estimate; return the load of each of its nodes, 1 for one core."""
     before, began_s = [finger.cpu_s() for finger in fingers], time.monotonic()
     streamer.start()
     graph.wait_until(lambda: all(finger.ended for finger in fingers), deadline_s, 'the final estimates')
@@ -273,7 +273,7 @@ class _Finger:
 
 
 def driver_cpu() -> float:
-    """Return the share of one core that the sensor node uses, reading an emulated TSF-85."""
+    """Return the load of the sensor node, 1 for one core, reading an emulated TSF-85."""
     with tempfile.TemporaryDirectory() as folder:
         device = str(Path(folder) / 'tsf85')
         emulated = {'sensor_link': device, 'finger_pipe': str(Path(folder) / 'finger')}

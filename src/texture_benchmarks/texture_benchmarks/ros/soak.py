@@ -344,7 +344,7 @@ class Rig(Graph):
         return next(pid for pid in pids if GUARD in Path(f'/proc/{pid}/cmdline').read_text(errors='replace'))
 
     def _command(self, end_s: float) -> None:
-        """Command the arm, too, along the surface."""
+        """Also command the arm, along the surface."""
         publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
         twist = TwistStamped()
         twist.header.frame_id, twist.twist.linear.y = 'base', 0.01
@@ -378,7 +378,7 @@ def soak(
         given: Mapping[str, Mapping[str, Any]] = {
             'emulator': {'scene': SCENE, 'seed': seed, 'sensor_link': device, 'finger_pipe': pipe},
             'sensor': {'device': device},
-            # It holds the last velocity for ever.
+            # It keeps executing the last velocity.
             'twist_controller': {'finger_pipe': pipe, 'start_height_m': 0.002, 'command_timeout_s': 0.0},
             'feature_extractor': {'recipe': card},
             'classifier': {'model': card},

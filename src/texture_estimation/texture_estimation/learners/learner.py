@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner is, and the folds, standardisation and log-probabilities that learners share."""
+"""The interface of learners, and their common folds, standardisation and log-probabilities."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def fit_in_folds(
 # --------------------
 # Bring features to zero mean and unit variance, as plain arrays.
 
-# A deviation below this share of the largest value is rounding: the feature is constant.
+# A deviation below this fraction of the largest value is rounding: the feature is constant.
 ROUNDING = 1e-13
 
 
@@ -233,7 +233,7 @@ def standardisation(values: Array) -> tuple[Array, Array]:
 
 
 # --------------------
-# Features that say how a window was made, and not what of.
+# Features that describe how a window was recorded, and not the surface.
 
 FORCE = 'force'  # ends the name of the feature
 NOT_COMPARED = (FORCE,)

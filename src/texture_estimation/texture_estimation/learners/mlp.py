@@ -265,7 +265,7 @@ class Mlp:
     def _fit(
         self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
     ) -> dict[str, Array]:
-        """Return the layers after a share of the steps, with the standardisation worked into them."""
+        """Return the layers after a fraction of the steps, with the standardisation worked into them."""
         mean, scale = X.mean(axis=0), X.std(axis=0)
         scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
         inputs, rng = np.empty(X.shape, np.float32), np.random.default_rng(self.seed)
@@ -373,7 +373,7 @@ class MlpTraining:
         np.add.reduce(error, axis=0, out=self.slopes[3])
 
     def step(self, rate: float) -> None:
-        """Change the weights along the slopes, each at its own pace (Kingma & Ba 2015)."""
+        """Update the weights along the gradients, with adaptive rates (Kingma & Ba 2015)."""
         weights, slopes, means, squares, change, spread = self._vectors
         self._count += 1
         pace = rate * math.sqrt(1 - SQUARE_DECAY**self._count) / (1 - MEAN_DECAY**self._count)

@@ -42,7 +42,7 @@ def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: i
 
 
 def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
-    """Return the densities as their shares of cosines, then of sines, (..., 2 · bins, n_segments).
+    """Return the densities as their parts of cosines, then of sines, (..., 2 · bins, n_segments).
 
     Each half lies in one piece of memory, which makes the sum of both three times as fast as side by side.
     """
@@ -124,7 +124,7 @@ def hann(length: int) -> Array:
 def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
     """Return the matrix (2 · bins, length) that takes a segment to the square roots of its densities.
 
-    Rows are cosines, then sines, tapered. Their own mean is removed, which removes that of the segment: with the
+    Rows are cosines, then sines, tapered. Their mean is removed, which removes that of the segment: with the
     taper w and a wave e, Σ w e (s - mean(s)) = Σ (w e - mean(w e)) s.
     """
     taper = hann(length)
@@ -142,7 +142,7 @@ def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
 # --------------------
 # The spectrum of windows over waves per metre of the surface: frequency over speed, so that no speed moves a line.
 
-PADDING = 4  # lines stand so much closer than the window alone resolves, and bands may be narrower than a line
+PADDING = 4  # lines are closer than the window alone resolves by this factor, and bands may be narrower than a line
 
 
 def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) -> Array:
@@ -232,7 +232,7 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
 
 @lru_cache(maxsize=64)
 def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
-    """Return the frequency of each line, (segment / 2,) Hz, and the share of its density that its integral has."""
+    """Return the frequency of each line, (segment / 2,) Hz, and the fraction of its density that its integral has."""
     hertz: Array = np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment)
     integration: Array = 1.0 / (2.0 * np.pi * hertz) ** 2
     for array in (hertz, integration):
@@ -438,7 +438,7 @@ LEAST_RATIO = 1e-3  # added before the logarithm: a lag without any power gives 
 
 @dataclass(frozen=True)
 class PowerAutocorrelation(Feature):
-    """Log of the mean product of the squared signal and itself some samples later, over its mean squared; of steps too.
+    """Log of the mean product of the squared signal and itself some samples later, over its mean squared, and of steps.
 
     0 where they are independent, above where bursts last so long, below where they keep such a distance.
     The gain of the sensor changes nothing.

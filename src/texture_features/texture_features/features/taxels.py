@@ -24,7 +24,7 @@ from texture_features.windows import FLOOR, Feature, WindowBatch, centred, first
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
 
-FREE_SHARE = 0.01  # of the load, below which a channel counts as free: its noise says nothing
+FREE_SHARE = 0.01  # of the load, below which a channel counts as free: only noise
 
 
 @dataclass(frozen=True)
@@ -279,7 +279,7 @@ class SpatialBandPower(WelchPower):
         """Return log(mean density + floor) of each band."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         speed = windows.moving_m_s[..., None, None, None]
-        # Line n, from 0, covers the stretch from n to n + 1; edges are in lines, too.
+        # Line n, from 0, covers the stretch from n to n + 1; edges are also in lines.
         edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
         high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
@@ -408,7 +408,7 @@ class SpatialVariation(WelchPower):
     >>> wave = np.sin(2 * np.pi * 100.0 * np.arange(1280) / 1280.0)[:, None]  # at 0.1 m/s: waves of 1 mm
     >>> window = WindowBatch(wave, 1280.0, np.array(0.1))
     >>> half, whole = (SpatialVariation(lag_m=lag_m, rate_of_change=False)(window).item() for lag_m in (5e-4, 1e-3))
-    >>> np.exp(half).round(1).item(), whole < half - 3  # (2 · amplitude)² / 2; places a wave apart are alike
+    >>> np.exp(half).round(1).item(), whole < half - 3  # (2 · amplitude)² / 2; places at a distance of a wave are alike
     (2.0, True)
     """
 

@@ -108,7 +108,7 @@ class FeatureExtractor(Node):
         if tare_faults:
             return 'WARN', '; '.join(tare_faults), numbers
         new, self._reported = {name: total - self._reported.get(name, 0) for name, total in numbers.items()}, numbers
-        # Of a restart, which numbers anew, nobody can tell how much it lost.
+        # After a restart, which numbers from 0, the number of lost samples is unknown.
         unknown = 'unknown losses in a restart of a driver or bridge' if new['restarts'] else ''
         lost = f'{new["lost_samples"]} samples lost' if new['lost_samples'] else ''
         if sentence := ', and '.join(filter(None, (lost, unknown))):

@@ -65,13 +65,13 @@ class RecordNode(Node):
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
-        self._seen: set[str] = set()  # topics that are recorded, or of which it was said that they are not
+        self._seen: set[str] = set()  # topics that are recorded, or whose omission was logged
         self._askers: dict[str, AsyncParameterClient] = {}  # of the nodes whose parameters are noted
         self._asked: defaultdict[str, bool] = defaultdict(bool)
         for topic in TOPICS.values():
             self._subscribe(self.resolve_topic_name(topic.name), topic.msgtype, topic.qos)
         self._diagnostics = Diagnostics(self, self._report)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # with use_sim_time the node's own may stand still
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # with use_sim_time the node's clock may stop
         self.create_timer(POLL_S, self._check, clock=steady)
         self.create_timer(DISCOVERY_S, self._find_more, clock=steady)
         self.get_logger().info(f"recording {', '.join(TOPICS)} to '{self._path}'")

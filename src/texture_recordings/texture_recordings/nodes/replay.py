@@ -107,7 +107,7 @@ class ReplayNode(Node):
         self.error: TextureError | None = None  # which ended the player
         self._player = threading.Thread(target=self._play, name='player')
         self._player.start()
-        # With use_sim_time the node's own time would end with the recording.
+        # With use_sim_time the node's time would end with the recording.
         self.create_timer(POLL_S, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def shutdown(self) -> None:
@@ -186,7 +186,7 @@ class ReplayNode(Node):
             self._clock_time.publish(ClockTime(clock=to_stamp(time_ns)))
 
     def _listeners(self) -> dict[str, int]:
-        """Return how many subscriptions there are; those of `features` tell that a classifier is ready, too."""
+        """Return how many subscriptions there are; those of `features` show that a classifier is also ready."""
         counts = {name: output.get_subscription_count() for name, output in self._outputs.items()}
         # Of several fingers the live graph may use one.
         signal = max(count for name, count in counts.items() if short_name(name) != 'exploration')

@@ -71,7 +71,7 @@ def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
 
 
 def framed(kind: int, version: int, sequence: int, time_us: int, *, shape: tuple[int, ...], body: bytes) -> bytes:
-    """Return a frame of a serial line of our own design; its number wraps at 16 bits, its time at 32.
+    """Return a frame of a serial line designed in this project; its number wraps at 16 bits, its time at 32.
 
     `shape` is rows and columns of what it holds.
     """
@@ -212,7 +212,7 @@ def _point_link(link: Path, target: str) -> None:
 class EmulatedDevice:
     """An emulated device on a pseudo-terminal.
 
-    It has no clock of its own: each kind is given the samples, and a caller of another pace than nominal makes it a
+    It has no clock: each kind is given the samples, and a caller of another pace than nominal makes it a
     device whose clock drifts.
     """
 
@@ -469,7 +469,7 @@ class EmulatedPvdf(EmulatedSampler):
 #
 # Packets: `9A 00 58 length payload`; payload items big-endian, item byte = type | finger << 2. Firmware from 1.1.7 on
 # stamps with 64 bits and sends an image when there is a new one; older firmware stamps with 16 bits and repeats the
-# images every millisecond in packets of their own.
+# images every millisecond in separate packets.
 
 Image = NDArray[np.uint16]
 
@@ -545,7 +545,7 @@ class EmulatedTsf85(EmulatedDevice):
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
         self.started = False
-        self.ignored_starts = 0  # so many start commands to come do not help, as after an unclean end
+        self.ignored_starts = 0  # number of next start commands that are ignored, as after an unclean end
         self._encoder = Tsf85Encoder()
         self._received = b''
         self._clock_ms = 0

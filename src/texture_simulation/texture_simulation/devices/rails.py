@@ -39,7 +39,7 @@ LIFT_SPEED_M_S = 0.05
 
 ACCELERATION_M_S2 = 5.0  # of the stepper motors
 XY_COUNTS_M, Z_COUNTS_M = 200_000.0, 1_000_000.0  # encoder counts per metre: the defaults of the arm
-OVERLOAD_N = 14.0  # above this the firmware lifts the finger by itself
+OVERLOAD_N = 14.0  # above this the firmware lifts the finger
 RISE_M = 0.05  # of the pressing motor above the start
 
 
@@ -190,7 +190,7 @@ def _checked(segment: bytes) -> bytes | None:
 
 
 # --------------------
-# What emulated robots share: finger states for the emulator; on a serial line a real-time thread and a plug.
+# Common to emulated robots: finger states for the emulator; on a serial line a real-time thread and a plug.
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ LineT = TypeVar('LineT', bound='EmulatedSerialRobot')
 
 
 class EmulatedSerialRobot:
-    """A robot in real time behind a device path, in a thread of its own; usable as a context."""
+    """A robot in real time behind a device path, in a separate thread; usable as a context."""
 
     def __init__(self, link: Path, finger_pipe: str) -> None:
         self.port = PtyPort(link)

@@ -256,14 +256,14 @@ class EmulatedRobot:
 
 
 # --------------------
-# The emulated controller without its network: registers, program, robot, safety, in steps of its own time.
+# The emulated controller without its network: registers, program, robot, safety, in steps of virtual time.
 
 STARTING_S = 0.05  # between the upload of a program and its start, in which the client clears its registers
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
 ENDED = object()
 MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
-# As it stands in the control script of ur-rtde; the client puts the number behind a comment.
+# As in the control script of ur-rtde; the client puts the number behind a comment.
 FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
 Steps = Iterator[None]
 
@@ -814,7 +814,7 @@ class Server:
 
 
 # --------------------
-# The emulated controller as a process of its own, whose argument is the JSON of its parameters.
+# The emulated controller as a separate process, whose argument is the JSON of its parameters.
 #
 # It cannot run in the process of its client: the constructors of ur-rtde hold Python's global lock until they are
 # answered.

@@ -64,7 +64,7 @@ class TwistControllerNode(Node):
     The force on the finger as it is, in the base frame and without delay, is on `true_wrench`.
     """
 
-    shares_file = True  # of the explorer, which says where the surface is
+    shares_file = True  # of the explorer, which defines where the surface is
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('twist_controller', **kwargs)
