@@ -37,7 +37,7 @@ import numpy as np
 
 from texture_core.types import ExplorationRequest
 
-# All that the golden set knows of the suite: after a move only these lines change.
+# All imports of the golden set from the suite: after a move only these lines change.
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import RoughnessAccumulator, load_roughness_recipe, read_grades, train_grades
 from texture_estimation.training import train

@@ -74,7 +74,7 @@ def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
 
 def test_trials_are_recognised_once_a_motion_distinguishes_the_textures() -> None:
     textures = ('cork', 'felt', 'wood')
-    motions = MOTIONS[:2]  # the second one tells nothing
+    motions = MOTIONS[:2]  # the second one carries no information
     values = np.random.default_rng(0).standard_normal((2, 3, 8, 2))
     values[0, :, :, 0] += 100.0 * np.arange(3)[:, None]
     known = known_from(motions, values, textures)

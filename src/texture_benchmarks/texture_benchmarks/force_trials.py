@@ -281,7 +281,7 @@ class VirtualExplorer:
 
 
 class Second(threading.Thread):
-    """A second explorer, in turn with whoever calls `step`: one of both threads runs at a time."""
+    """A second explorer, alternating with the caller of `step`: one of both threads runs at a time."""
 
     def __init__(self, machine: VirtualMachine) -> None:
         super().__init__(daemon=True)

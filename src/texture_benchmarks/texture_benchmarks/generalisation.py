@@ -140,7 +140,7 @@ def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkR
     options.out.mkdir(parents=True, exist_ok=True)
     found = _finished(path)
     if found:
-        print(f"{len(found)} pieces are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
+        print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
     left = [piece for piece in pieces if ', '.join(piece) not in found]
     left.sort(key=lambda piece: (piece[1] == peers.CNN, piece[1] not in SLOW))
     work = partial(_piece, slides, options.seed)
@@ -176,7 +176,7 @@ def _read(reader: Reader, options: BenchmarkOptions) -> SlideDataset | InvalidDa
 
 
 def _finished(path: Path) -> dict[str, list[Figures]]:
-    """Return the figures of the pieces in a file, by their names."""
+    """Return the figures of the parts in a file, by their names."""
     lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
     return {line['piece']: line['cells'] for line in map(json.loads, lines)}
 
@@ -709,7 +709,7 @@ def figures(answers: Sequence[Answer]) -> dict[str, Any]:
 def result_of(
     found: Mapping[str, Sequence[Figures]], missing: Sequence[str], options: BenchmarkOptions
 ) -> BenchmarkResult:
-    """Return the figures of all cells, their chart, and the pieces that are missing."""
+    """Return the figures of all cells, their chart, and the missing parts."""
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
     for table, row, name, cell in (one for cells in found.values() for one in cells):
         numbers[table].setdefault(row, {})[name] = cell

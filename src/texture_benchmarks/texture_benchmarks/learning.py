@@ -76,7 +76,7 @@ def run_incremental(
     stages: Sequence[int],
     path: Path,
 ) -> IncrementalRun:
-    """Return how a model does that knows all labels but `new` and is trained these slide by slide."""
+    """Return the figures of a model of all labels but `new` to which these are added slide by slide."""
     numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
     is_new = np.isin(examples.labels, list(new))
     test, training = numbers > last_training, numbers <= last_training
@@ -130,7 +130,7 @@ def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> Textu
 
 
 # --------------------
-# Slides needed to recognise a texture: with motions chosen for what they tell, in a fixed order, and at random.
+# Slides needed to recognise a texture: with motions chosen by information gain, in a fixed order, and at random.
 
 SIMULATED, RECORDED = 'simulated', 'recorded'
 SCENE, SLIDE_S = 'oriented', 0.5

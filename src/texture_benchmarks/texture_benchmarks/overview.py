@@ -78,7 +78,7 @@ class _Job(NamedTuple):
     name: str
 
 
-# What comes of a job: its figures, and what tells how long each window takes, in µs.
+# Results of a job: its figures, and a function that returns the time for each window, in µs.
 _Tried = tuple[dict[str, Any], Callable[[], Array]]
 
 

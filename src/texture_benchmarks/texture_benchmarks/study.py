@@ -45,8 +45,8 @@ class BenchmarkOptions:
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
-    workers: int = 0  # Processes of a study that can be cut into pieces; 0: one for each core
-    budget_s: float = math.inf  # After so long such a study ends with the pieces that it has
+    workers: int = 0  # Processes of a study that can be split into parts; 0: one for each core
+    budget_s: float = math.inf  # After this time such a study ends with the parts that it has
 
     def recordings(self, name: str) -> Path:
         """Return the folder of a recorded data set, by its name; InvalidData if it is missing."""

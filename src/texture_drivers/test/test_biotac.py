@@ -118,7 +118,7 @@ def word(value: int | None) -> bytes:
 
 
 def reply(layout: BioTacLayout = BIOTAC, *, fingers: Sequence[int | None] = (0,), step: int = 0) -> bytes:
-    """Each slot holds its number times `step`, plus a number that tells the finger."""
+    """Each slot holds its number times `step`, plus a number of the finger."""
     values = [
         [ABSENT if base is ABSENT else base + step * slot for base in fingers] for slot in range(len(layout.slots))
     ]
@@ -259,7 +259,7 @@ SERIAL = b'BT2P0220B11E0004'
 
 
 class StandIn:
-    """A Cheetah with one BioTac at the first place, at the level of the calls of the vendor's module."""
+    """A Cheetah with one BioTac at the first place, emulated at the level of the vendor's module."""
 
     CH_PORT_NOT_FREE, CH_SPI_BITORDER_MSB, CH_TARGET_POWER_ON = 0x8000, 0, 1
 

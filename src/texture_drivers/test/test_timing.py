@@ -188,7 +188,7 @@ BOUND_S = 0.012
 def follow(seconds, lost, *, drift=0.0, stamped=False, seed=1, late_ms=0.0):
     """Return the finger, and (true time in s, error of the stamp in s) of each sample that came out.
 
-    `lost` tells of each true millisecond whether it is lost; arrivals jitter by up to some ms, as on USB.
+    `lost` holds for each true millisecond whether it is lost; arrivals jitter by up to some ms, as on USB.
     """
     rng = np.random.default_rng(seed)
     finger, errors = FingerStream(), []

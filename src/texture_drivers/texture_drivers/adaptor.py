@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of any type made into signals, by a mapping file. Knows no ROS: any objects with the attributes will do."""
+"""Messages of any type made into signals, by a mapping file. Needs no ROS: any objects with the attributes will do."""
 
 from __future__ import annotations
 
@@ -365,6 +365,6 @@ class SignalAdaptor:
 
 
 def losses(adaptors: Sequence[SignalAdaptor]) -> str:
-    """Return how sure the losses of some signals are."""
+    """Return how exact the losses of some signals are."""
     exact = all(adaptor.mapping.number for adaptor in adaptors)
     return 'by number' if exact else 'estimated by time; shorter ones unknown'

@@ -57,7 +57,7 @@ def field_channels(magnetometers: int) -> tuple[str, ...]:
 
 
 # --------------------
-# The AnySkin's protocol: bytes to frames. Knows no port and no clock.
+# The AnySkin's protocol: bytes to frames. Independent of port and clock.
 
 Values = NDArray[np.float32]
 LOCK_FRAMES = 3  # consecutive frames, with nothing between them, that confirm where frames begin
@@ -82,7 +82,7 @@ class FrameParser:
 
     def __init__(self, magnetometers: int = MAGNETOMETERS) -> None:
         self.frames = 0
-        self.refused = 0  # frames that did not fit while it was certain where they begin
+        self.refused = 0  # frames that did not fit after their beginnings were known
         self.refused_bytes = 0
         self._size = frame_bytes(magnetometers)
         self._values_shape = (magnetometers, QUANTITIES)
@@ -242,7 +242,7 @@ class AnySkinDecoder(Decoder):
         return {SIGNAL: (-RANGE_UT, RANGE_UT)}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index that the host's clock will tell."""
+        """Go on after an interruption, with the index according to the host's clock."""
         self._parser.restart()
         self._meter.restart()
         if self._numbering:

@@ -181,7 +181,7 @@ FINGERS = 5  # most that one board holds
 
 VERSION = 1
 REPLY, SERIALS = 0x42, 0x53  # kinds of frames: 'B' and 'S'
-POLLS = 5  # looks at the port per waiting time: a frame's arrival tells the time
+POLLS = 5  # looks at the port per waiting time: the arrival of a frame gives its time
 LATE_FRAMES = 0.5  # a frame further than this from where its number puts it: the bridge stopped or restarted
 RATE_CHECK_S = 1.0
 RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
@@ -299,7 +299,7 @@ class FrameTracker:
 # --------------------
 # The Total Phase Cheetah SPI adapter, through the vendor's Python module `cheetah_py`.
 #
-# That module and its library are not free and not part of this project; who owns the adapter has them from the vendor.
+# That module and its library are not free and not part of this project; they come with the adapter.
 # The calls and their values are those of kth-ros-pkg/biotac_driver @6fb8e33 `biotac_sensors/src/biotac.c`. This file
 # has never been run on the hardware; its tests run against a mock.
 
@@ -453,7 +453,7 @@ class Cheetah(SpiLink):
 
 
 # --------------------
-# What BioTacs answer to the sampling commands of whole frames: bytes to counts. Knows no link and no clock.
+# What BioTacs answer to the sampling commands of whole frames: bytes to counts. Independent of link and clock.
 
 ODD_PARITY = np.array([byte.bit_count() % 2 == 1 for byte in range(256)])
 
@@ -509,7 +509,7 @@ class BioTac:
 
     The stamp of a PAC batch is the time of its first sample, one slot (227 µs) after the start of the frame; that of
     a static row is the start of its frame, and its channels were sampled up to a frame later
-    (`BioTacLayout.slow_slots`). The device's numbers tell losses exactly, its clock tells the times; over an
+    (`BioTacLayout.slow_slots`). The device's numbers show losses exactly, its clock gives the times; over an
     interruption the host's clock does. See `texture_core.types.Sensor`.
 
     Parameters
@@ -600,7 +600,7 @@ class BioTac:
         return dict.fromkeys(self.expected_rates_hz, (0, FULL_SCALE))
 
     def _process(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
-        """Make batches of consecutive frames, once their times are certain."""
+        """Make batches of consecutive frames, once their times are known."""
         first_frame, last = run[0], run[-1]
         self._check_places(last.fingers)
         self._last_received_ns[-1] = now_ns
@@ -638,7 +638,7 @@ class BioTac:
             )
 
     def _watch_silence(self, now_ns: int) -> None:
-        """Raise DeviceError when the board, or every finger asked for, has not been heard for a while."""
+        """Raise DeviceError when the board, or every requested finger, has been silent for a while."""
         limit_ns = now_ns - SILENCE_S * NANOSECONDS
         if self._last_received_ns[-1] < limit_ns:
             raise DeviceError(

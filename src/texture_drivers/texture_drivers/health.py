@@ -225,7 +225,7 @@ Limits = Mapping[str, tuple[Any, Any]]  # by topic: lowest and highest sample, o
 
 
 class ChannelWatch:
-    """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are asked for in another."""
+    """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are called from another."""
 
     def __init__(self, params: TareParams, topics: Sequence[str], limits: Limits) -> None:
         self.unloaded: bool | None = None  # whether nothing touches the finger; None if unknown

@@ -18,7 +18,7 @@ from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecode
 # Numbers of the PVDF finger and of the line to its microcontroller.
 #
 # Film, force sensor and machine are those of Hu et al. 2014; frames of this project (see `texture_core.framing`). The
-# paper tells neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz that
+# paper gives neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz that
 # are 3 s, or 76 mm of fabric at its 25.5 mm/s.
 
 FILM_TOPIC, FORCE_TOPIC = 'signal', 'signal_static'

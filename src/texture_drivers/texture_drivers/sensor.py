@@ -137,7 +137,7 @@ class SensorReader:
             self._warn(f'{fault}{stop} Trying again every {RETRY_S} s')
 
     def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
-        if batches and self.fault:  # before the first batch is out: who has it may ask for a tare at once
+        if batches and self.fault:  # before the first batch is out: its receiver may request a tare at once
             self.fault = self._warned = ''
             self._inform('the sensor delivers samples')
         for batch in batches:

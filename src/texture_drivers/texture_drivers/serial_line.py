@@ -140,11 +140,11 @@ def reason_of(error: Exception) -> str:
 # --------------------
 # A sensor that streams samples over a serial port, whatever its protocol: a decoder turns the bytes into batches.
 
-SILENCE_S = 1.0  # the device sends without being asked; opening the port again has woken many a one
+SILENCE_S = 1.0  # the device sends unrequested; opening the port again often restarts it
 
 
 class Decoder:
-    """Turns the bytes of one protocol into batches; knows no port and no clock."""
+    """Turns the bytes of one protocol into batches; independent of port and clock."""
 
     @property
     def valid_frames(self) -> int:
@@ -249,7 +249,7 @@ class SerialSensor:
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """What the decoder knows in addition to the samples, such as how much the device's clock is slow."""
+        """What the decoder reports in addition to the samples, such as the drift of the device's clock."""
         return self._decoder.details
 
     @property
@@ -349,12 +349,12 @@ class StreamTracker:
 
 
 # --------------------
-# Streams of samples on a framed serial line: numbered, timed, in physical units. Knows no port.
+# Streams of samples on a framed serial line: numbered, timed, in physical units. Independent of the port.
 #
 # Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
-# endian, row after row; its kind tells the stream, its time is that of the first row.
+# endian, row after row; its kind identifies the stream, its time is that of the first row.
 
-LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
+LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock gives the gap
 
 
 class StreamDecoder(Decoder):
@@ -410,7 +410,7 @@ class StreamDecoder(Decoder):
         return {tracker.stream.topic: tracker.stream.limits for tracker in self.trackers.values()}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index that the host's clock will tell."""
+        """Go on after an interruption, with the index according to the host's clock."""
         self.deframer.restart()
         self._restart_streams()
 
@@ -420,7 +420,7 @@ class StreamDecoder(Decoder):
         if not blocks:
             return {}
         newest_us = max(self.trackers[kind].end_us(found[-1]) for kind, found in blocks.items())
-        if newest_us >= self._newest_us:  # an older block of a slower stream tells nothing new
+        if newest_us >= self._newest_us:  # an older block of a slower stream adds nothing new
             self.clock.observe(newest_us, arrival_ns)
             self._newest_us = newest_us
         if not self.clock.settled:
@@ -514,7 +514,7 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts =
 
 
 def serial_number(device: str, ports: ListPorts = list_ports.comports) -> str:
-    """Return the serial number of the USB device behind a path, '' if it tells none."""
+    """Return the serial number of the USB device behind a path, '' if it has none."""
     path = str(Path(device).resolve())
     return next((port.serial_number or '' for port in ports() if port.device == path), '')
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The host time and the running index of each sample, whatever the device tells of either."""
+"""The host time and the running index of each sample, whatever the device reports of either."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ class StreamClock:
             arrival = Arrival(0.0, 0.0)
         self._last_index = index
         self._store(arrival)
-        # By both clocks: what was kept back arrives in one burst, and tells nothing of when it was taken.
+        # By both clocks: delayed samples arrive in one burst, which does not show when they were taken.
         watched_ns = min(arrival.elapsed_ns, arrival_ns - self._origin[1])
         self.settled = self.settled or watched_ns >= self._settle_ns
 
@@ -550,14 +550,14 @@ class ArrivalNumbering:
 
 
 # --------------------
-# Measure the rate of a stream that does not tell it, by when its samples arrive.
+# Measure the rate of a stream that does not report it, by the arrival of its samples.
 
 MEASURED_S = 2.0  # with arrivals seen each 10 ms, the error of a rate of 100 Hz is some 0.1 Hz
 LEAST_ARRIVALS = 20
 
 
 class RateMeter:
-    """Count samples until their rate is certain.
+    """Count samples until their rate is known.
 
     A sample arrives late by a varying delay but never early, so the period is the slope of the line just below all
     arrivals (see `clock.StreamClock`).
@@ -572,7 +572,7 @@ class RateMeter:
         self._arrivals: list[Arrival] = []  # samples so far, and when the last of them was there
 
     def update(self, samples: int, arrival_ns: int) -> float:
-        """Take note of samples that have just arrived; return the rate, Hz, or 0.0 while it is not certain."""
+        """Add samples that have just arrived; return the rate, Hz, or 0.0 while it is unknown."""
         self._samples += samples
         if not self._arrivals:
             self._start_ns = arrival_ns

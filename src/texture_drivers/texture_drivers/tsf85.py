@@ -97,7 +97,7 @@ USB_IDS = ((0x16D0, 0x14CC), (0x04B4, 0xF232))  # the present one; an older one,
 
 
 # --------------------
-# The TSF-85's protocol: bytes to packets, commands to bytes. Knows no port and no clock.
+# The TSF-85's protocol: bytes to packets, commands to bytes. Independent of port and clock.
 
 
 class Item(NamedTuple):
@@ -428,7 +428,7 @@ SHORTEST_LOSS_S = 0.01  # what is late by less is no loss, where the firmware se
 class FingerStream:
     """Number the sample frames of one finger by the device's stamps, time them by the host's clock, cut batches.
 
-    Where the firmware sends no stamps, the host's clock also tells what was lost, half a second later.
+    Where the firmware sends no stamps, the host's clock also shows what was lost, half a second later.
     """
 
     def __init__(
@@ -530,7 +530,7 @@ class Tsf85Decoder(Decoder):
         return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in LIMITS.items()}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index that the host's clock will tell."""
+        """Go on after an interruption, with the index according to the host's clock."""
         for finger in self._fingers.values():
             finger.interrupt()
 
@@ -613,7 +613,7 @@ class Tsf85(SerialSensor):
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """Serial number of the USB device if it tells one, and how much its clock is slow."""
+        """Serial number of the USB device if it has one, and the drift of its clock."""
         serial = {'serial number': self._serial} if self._serial else {}
         return {**serial, **super().details}
 
@@ -637,7 +637,7 @@ class Tsf85(SerialSensor):
         if self._babbles:
             fingers = ' or '.join(str(finger) for finger in self._published)
             return (
-                f"device '{self._params.device}' sends bytes, and nothing of finger {fingers} in them that this driver "
-                'knows; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'
+                f"device '{self._params.device}' sends bytes, but no known packet of finger "
+                f'{fingers}; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'
             )
         return f"device '{self._params.device}' is open and sends nothing, started {1 + REVIVALS} times; replug it"

@@ -121,7 +121,7 @@ def test_the_load_is_no_part_of_the_discriminant_and_a_load_never_seen_is_outsid
 
 
 def of_forces(rng, slides=8, windows=12):
-    """Return windows whose one feature tells cork from felt by its sign, which turns where the force is above 2 N."""
+    """Return windows whose one feature distinguishes cork from felt by its sign, inverted above 2 N."""
     forces = np.tile(np.where(np.arange(windows) < windows // 2, 1.0, 4.0), 2 * slides)
     forces = forces * np.exp(0.02 * rng.standard_normal(len(forces)))
     codes = np.repeat([0, 1], slides * windows)

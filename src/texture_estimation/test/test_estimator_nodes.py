@@ -142,7 +142,7 @@ def grade_2(roughness_model):
 
 @pytest.fixture(params=NODES)
 def case(request, tmp_path):
-    """Return a node, the path of a model for it, and the vectors of a slide over a surface that the model knows."""
+    """Return a node, the path of a model for it, and the vectors of a slide over a trained surface."""
     kind, model, vectors = NODES[request.param]
     return kind, request.getfixturevalue(model).save(tmp_path / 'm'), request.getfixturevalue(vectors)
 

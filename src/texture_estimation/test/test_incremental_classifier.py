@@ -27,7 +27,7 @@ def measured(slide_of):
 
 @pytest.fixture
 def silk():
-    """Return windows of a texture that the model does not know."""
+    """Return windows of a texture that is not trained."""
     rng = np.random.default_rng(7)
     return 4.0 + rng.normal(size=(12, 6))
 

@@ -23,7 +23,7 @@ from texture_estimation.training import train
 from texture_features.feature_set import SlideConditions
 
 OWN = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
-# Loads the models named first and asks each for an answer, in a Python without these libraries.
+# Loads the models named first and predicts with each, in a Python without these libraries.
 ALONE = """
 import sys
 class Absent:

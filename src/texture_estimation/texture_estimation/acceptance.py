@@ -3,7 +3,7 @@
 """Accepted or rejected and why, decided, and the prediction set: one object, fitted to slides held out of the training.
 
 A label is accepted if its slide scores above a limit. The score is the log-odds, by logistic regression, that the slide
-is one of its label's rather than one of a surface that the model does not know. It has two inputs: the margin by which
+is one of its label's rather than one of an unknown surface. It has two inputs: the margin by which
 the evidence for the label exceeds that for the next one, and the distance of the slide to the training slides of the
 label. As unknown surfaces serve the held-out slides themselves, with their label removed.
 
@@ -36,7 +36,7 @@ from texture_features.feature_set import SlideConditions
 # What a number of held-out slides can show.
 
 SIGNIFICANCE = 0.05  # fraction of all trainings in which the error rate exceeds its upper bound
-LEAST_SLIDES_A_LABEL = 5  # with one held out, four tell how much slides differ
+LEAST_SLIDES_A_LABEL = 5  # with one held out, four show how much slides differ
 TRIALS = 2  # of each held-out slide: with its label in the model, and with that removed
 MAX_SLIDES = 1_000_000
 
@@ -170,7 +170,7 @@ STEPS = 50
 
 
 def _regression(positive: Array, negative: Array) -> tuple[float, float, float]:
-    """Return offset and factors of the log-odds that tell two sets of margins and distances, (n, 2), equally likely."""
+    """Return offset and factors of the log-odds between two equally likely sets of margins and distances, (n, 2)."""
     both = np.concatenate([positive, negative])
     centre, scale = both.mean(axis=0), both.std(axis=0) + 1e-9
     inputs = np.column_stack([np.ones(len(both)), (both - centre) / scale])

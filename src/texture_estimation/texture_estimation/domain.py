@@ -91,7 +91,11 @@ TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside the training'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
-REACH = {'sessions': 'session', 'places': 'place', 'fingers': 'sensor'}  # and what tells them of a slide
+REACH = {
+    'sessions': 'session',
+    'places': 'place',
+    'fingers': 'sensor',
+}  # and functions that return them for a slide
 
 
 @dataclass(frozen=True)
@@ -209,7 +213,7 @@ def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[I
 
 
 def _reach(slides: Sequence[SlideConditions], labels: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Return how many sessions, places and fingers each label has; slides with a session each tell of none."""
+    """Return how many sessions, places and fingers each label has; one session per slide counts as none."""
     found = {}
     for label in dict.fromkeys(labels):
         own = [slide for slide, of in zip(slides, labels, strict=True) if of == label]

@@ -57,7 +57,7 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
-    A new exploration id, or a vector after the `last` one, starts a new slide. Each estimate tells whether the label is
+    A new exploration id, or a vector after the `last` one, starts a new slide. Each estimate shows whether the label is
     rejected, and why; it is decided only while it is not. An exploration under conditions that were not trained is
     rejected, and the message states which condition it is. Equally probable labels give no label: unclassified.
     No confidence is above what the slides held out of the training can show.
@@ -213,7 +213,7 @@ class EvidenceAccumulator:
         return model.slide_gaussians.combined(trained, shares)
 
     def _explanation(self, acceptance: Acceptance, final: bool, rejection: Rejection) -> str:
-        """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
+        """Return the message of an estimate for its reader, in sentences; '' if there is none."""
         missing: tuple[str, ...] = ()
         if final and not self._deviation:
             too_little = rejection is Rejection.TOO_LITTLE_TRAINING

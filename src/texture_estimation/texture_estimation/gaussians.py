@@ -20,7 +20,7 @@ from texture_estimation.learners.learner import Codes, group_means, log_softmax,
 # Chosen on slides 21-30 of recorded materials, five of twenty added to a model of slides 1-20 of the others.
 PRIOR_SAMPLES = 30.0  # the covariance is shrunk towards its diagonal as by this many further samples
 MIN_VARIANCE = 0.01  # within classes, in that of all samples: few samples may agree by chance
-MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides tell it
+MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides determine it
 CONSTANT = 1e-12  # largest deviation of a constant feature, relative to its largest value
 
 
@@ -89,7 +89,7 @@ def _projected(samples: Array, projection: Array) -> Array:
 
 
 # --------------------
-# Gaussians of whole slides: what tells added textures from the trained ones and from each other.
+# Gaussians of whole slides: they distinguish added textures from the trained ones and from each other.
 
 # Lengths of the start of a slide that have separate Gaussians, in windows that do not overlap: the start of a
 # slide is like no other part of it.
@@ -268,7 +268,7 @@ class ClassDistance:
 
         names, codes = np.unique(classes, return_inverse=True)
         scale = means.std(axis=0)
-        scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # what is constant tells nothing
+        scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # constant features carry no information
         scaled = means / scale
         own = np.stack([scaled[codes == code].mean(axis=0) for code in range(len(names))])
         centre = own.mean(axis=0)

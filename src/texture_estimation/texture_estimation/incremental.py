@@ -192,7 +192,7 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     if strange := sorted(set(shot_labels) - set(names)):
         raise InvalidData(f"'{strange[0]}' is not a trained surface; label the slides of today with {', '.join(names)}")
     centre, scale = means.mean(axis=0), means.std(axis=0)
-    scale[scale <= 1e-9 * (1.0 + np.abs(centre))] = np.inf  # a constant feature tells nothing
+    scale[scale <= 1e-9 * (1.0 + np.abs(centre))] = np.inf  # a constant feature carries no information
     standard = (means - centre) / scale
     axes = np.linalg.svd(standard, full_matrices=False)[2][:DIRECTIONS].T
     points, seen = standard @ axes, ((shots - centre) / scale) @ axes

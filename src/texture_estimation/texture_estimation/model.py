@@ -408,7 +408,7 @@ class TextureModel(StoredModel):
     added_slides
         Slides added after the training.
     slide_gaussians
-        Gaussians of whole slides that tell added textures; None until a slide is added.
+        Gaussians of whole slides that distinguish added textures; None until a slide is added.
 
     Examples
     --------
@@ -447,12 +447,12 @@ class TextureModel(StoredModel):
 
     @property
     def learns_online(self) -> bool:
-        """Whether added slides update the learner itself; otherwise Gaussians of whole slides tell them."""
+        """Whether added slides update the learner itself; otherwise Gaussians of whole slides distinguish them."""
         return hasattr(self.recipe.learner, 'partial_fit')
 
     @property
     def n_predicted(self) -> int:
-        """Number of textures that the predictor tells."""
+        """Number of textures that the predictor distinguishes."""
         return len(self.labels) if self.learns_online else self.n_trained
 
     @cached_property

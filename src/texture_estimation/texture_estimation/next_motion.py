@@ -20,8 +20,8 @@ from texture_features.feature_set import fingerprint_difference
 
 SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
 SAME_NATS = 1e-9  # informations that differ by less are the same
-LEAST = 2  # slides of one kind over one texture that tell how much slides differ; kinds among which to choose
-PARTS = 5  # that are held out in turn, to learn how sure a slide makes
+LEAST = 2  # slides of one kind over one texture that show how much slides differ; kinds among which to choose
+PARTS = 5  # that are held out in turn, to calibrate the confidence
 MIN_TEMPER = 1e-3
 
 
@@ -176,7 +176,7 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with a covariance shrunk as Ledoit and Wolf do.
     """
     from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
-    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who classifies does not need it
+    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and is not needed to classify
 
     counts = np.bincount(cells)
     means = group_means(values, cells)

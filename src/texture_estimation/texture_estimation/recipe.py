@@ -142,7 +142,7 @@ class DecisionParams(TrainingParams):
 
     @property
     def rates(self) -> Rates:
-        """How often what may go wrong when a slide is judged."""
+        """Allowed error rates of the decisions about a slide."""
         return Rates(self.max_accepted_wrong, self.false_rejection_rate, self.max_error_rate, self.coverage)
 
     @property

@@ -32,7 +32,7 @@ from texture_features.windows import WindowParams
 # --------------------
 # Whether a window can be graded at all, and if not, why.
 
-# Features that tell whether a window can be used; a regressor does not see them.
+# Features that show whether a window can be used; a regressor does not see them.
 STICK_SLIP, LEVEL = 'peak_to_median_power', 'log_variance'
 
 
@@ -69,7 +69,7 @@ SMOOTH, ROUGH = 1.0, 5.0
 
 
 # From features (..., n_features) to grade and its standard deviation, (...) each, as plain arrays: NaN as the grade
-# where the regressor has no answer, 0 as the deviation if it does not know it.
+# where the regressor has no answer, 0 as the deviation if it is unknown.
 RegressorPredictor = Callable[[Array], tuple[Array, Array]]
 
 
@@ -134,7 +134,7 @@ class GaussianProcess:
         points = np.stack([X[groups == code].mean(axis=0) for code in codes])
         targets = np.array([y[groups == code].mean() for code in codes]) - MIDDLE
         mean, scale = standardisation(points)
-        # One unit is the distance of two typical textures, however many features tell of it.
+        # One unit is the distance of two typical textures, whatever the number of features.
         scale = scale * np.sqrt(points.shape[1])
         places = (points - mean) / scale
         products = places @ places.T
@@ -419,7 +419,7 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
 
 
 # --------------------
-# The grade of a surface, and how sure it is, growing window by window while the finger slides.
+# The grade of a surface and its uncertainty, updated window by window while the finger slides.
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
 SILENT = 'no grade: the surface resembles no training surface'
@@ -538,7 +538,7 @@ SCALES = (0.05, 20.0)
 
 
 def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Grades, name: str = '') -> RoughnessModel:
-    """Return a model that grades as the people did who graded the textures of the examples.
+    """Return a model that predicts the grades by people of the textures of the examples.
 
     The standard deviation is calibrated on textures held out in turn, of the training alone.
     """

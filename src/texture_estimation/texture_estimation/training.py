@@ -58,7 +58,7 @@ def fit_learner(
     counts once, and nothing else is drawn.
     """
     of_load = np.array([name.endswith(LOAD) for name in examples.names])
-    if of_load.any():  # what is constant tells nothing, and weighs nothing
+    if of_load.any():  # constant features carry no information and get no weight
         examples = replace(examples, values=np.where(of_load, 0.0, examples.values))
     if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_CALIBRATION_SLIDES:
         return recipe.learner.fit(examples.values, codes, groups)
@@ -140,7 +140,7 @@ def held_out_parts(examples: LabelledFeatures, *, by_speed: bool = False) -> Cod
     """
     slides, rows = np.unique(examples.groups, return_index=True)
     made = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
-    alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide tells of no session
+    alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide defines no session
     speeds = [f'{one.speed_m_s:.2g}' if by_speed else '' for one in made]
     sessions = np.array(
         [f'{"" if alone else one.session}\n{one.place}\n{one.sensor}\n{v}' for one, v in zip(made, speeds, strict=True)]
@@ -213,7 +213,7 @@ REFERENCE_COPIES = 6
 
 @dataclass(frozen=True, eq=False)
 class _Slide:
-    """A slide or a copy of one, whose windows are rows of examples; in double precision only when asked for."""
+    """A slide or a copy of one, whose windows are rows of examples; in double precision only on request."""
 
     group: int
     truth: int
@@ -348,7 +348,7 @@ def fit_tempering_exponent(
 
 
 def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> TextureModel:
-    """Return a model that knows the labels of the examples.
+    """Return a model of the labels of the examples.
 
     Probabilities, how fast evidence grows within a slide, when a slide may end and which textures are candidates are
     trained on slides held out of the training in turn. With a single slide of a label, windows of that slide are held

@@ -52,7 +52,7 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '', points: 
 
     No display is needed and no global state is touched.
     """
-    # Not pyplot, which would keep every figure and ask for a display.
+    # Not pyplot, which would keep every figure and need a display.
     with mpl.rc_context({**STYLE, 'font.size': points, 'axes.titlesize': points + 1.0}):
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)

@@ -25,7 +25,7 @@ from texture_evaluation.cross_validation import predict_slides
 from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 # --------------------
-# What is asked for.
+# The request.
 
 
 SHORTEST_S = 0.6  # of a slide: one window, and what starts late
@@ -91,7 +91,7 @@ USUAL = {('force_low_n', 'force_high_n'): (1.0, 2.0, 'N'), ('speed_low_m_s', 'sp
 
 
 def fitted_range(params: CollectionParams, names: tuple[str, str], allowed: tuple[float, float]) -> tuple[float, float]:
-    """Return the lowest and highest force or speed; what was not asked for is fitted into what the explorer allows."""
+    """Return the lowest and highest force or speed; omitted ones are fitted into what the explorer allows."""
     usual_low, span, unit = USUAL[names]
     (least, most), (low, high) = allowed, (getattr(params, name) for name in names)
     for name, asked in zip(names, (low, high), strict=True):
@@ -228,7 +228,7 @@ class PlaceAccuracy:
 
     @property
     def sentence(self) -> str:
-        """What is known so far."""
+        """Results so far."""
         if not self.others:
             return f'{self.places} places; no other surface is in the folder yet to distinguish it from'
         mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
@@ -299,7 +299,7 @@ def _distance_m(place: str, other: str) -> float:
 # --------------------
 # The collection itself.
 
-EVERY = 3  # places after which it is judged
+EVERY = 3  # places after which it is evaluated
 FAILURES = 3  # in a row end it
 ASKED_TO_END = {ExplorationError.STOPPED, ExplorationError.CANCELLED, ExplorationError.NOT_ACTIVE}
 
@@ -343,7 +343,7 @@ def collect(
                     return ended(CollectionError.MOTION_FAILED, last)
                 continue
             slides, failures = slides + 1, 0
-            # Each judgement trains once for each place; the first and the last possible end are always judged.
+            # Each evaluation trains once for each place; the first and the last possible end are always evaluated.
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
             accuracy = evaluate_all(slides)

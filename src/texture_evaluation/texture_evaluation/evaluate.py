@@ -58,7 +58,7 @@ class EvaluationReport:
         return sorted({result.surface for result in (*self.known, *self.unknown)})
 
     def as_json(self) -> dict[str, Any]:
-        """Return the figures; null where no slide tells."""
+        """Return the figures; null where there is no slide."""
         nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
         return {

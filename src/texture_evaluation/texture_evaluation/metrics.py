@@ -42,7 +42,7 @@ class SlideResult:
         """Return the estimate after so much sliding; None if the slide has less or the first window is longer."""
         if not self.estimates or self.estimates[-1].evidence_s < seconds - TOLERANCE_S:
             return None
-        # Windows may be longer than the time asked for.
+        # Windows may be longer than the requested time.
         received = [estimate for estimate in self.estimates if estimate.evidence_s <= seconds + TOLERANCE_S]
         return received[-1] if received else None
 

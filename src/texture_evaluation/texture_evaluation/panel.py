@@ -84,7 +84,7 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
 
 
 # --------------------
-# How far people agree who graded the same things.
+# Agreement of people who graded the same things.
 
 
 def krippendorff_alpha(grades: Array) -> float:

@@ -87,7 +87,7 @@ def test_a_corrected_window_has_the_features_of_the_finger_of_the_training():
     )
     wrong, left = (np.abs(one.values - expected.values).max() for one in (without, corrected))
     assert left < 0.35 * wrong
-    # A classifier that does not know of the correction must notice it.
+    # A classifier without the correction must notice it.
     assert corrected.feature_set.startswith(f'{expected.feature_set} corrected=')
 
 

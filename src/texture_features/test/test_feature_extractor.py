@@ -160,7 +160,7 @@ def finger_batches(topic, seconds, late_s, seed):
 def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
     with LocalGraph(69) as graph:
         bench = Bench(graph, recipe='kaboli-svm-two-fingers', topics=FINGERS)
-        # the second finger's numbering begins later: only its stamps tell which samples belong together
+        # the second finger's numbering begins later: only its stamps show which samples belong together
         batches = {topic: finger_batches(topic, 3.0, 0.05 * ('1/' in topic), n) for n, topic in enumerate(FINGERS)}
         bench.states.publish(to_msg(slide(2.5)))
         bench.until(lambda: bench.node._cutter._slides)

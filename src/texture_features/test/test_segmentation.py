@@ -87,7 +87,7 @@ def test_a_wrong_shape_gets_one_sentence():
 
 
 def spans(states):
-    """Return (start, end) of each slide that states tell, s from the beginning."""
+    """Return (start, end) of each slide by its states, s from the beginning."""
     begun, ended = {}, {}
     for state in states:
         at_s = (state.stamp_ns - START_NS) / NANOSECONDS

@@ -26,7 +26,7 @@ BANDS = 48
 SEGMENT_S = 0.25  # of a spectrum: resolves 4 Hz
 MIN_SEGMENTS = 8  # of a slide: fewer leave the spectrum uncertain by more than 1 dB
 SATURATED_SHARE = 0.01  # samples of a channel at its lowest or highest value
-DISTINCT = 100  # a channel with fewer values is too coarse to tell
+DISTINCT = 100  # a channel with fewer values is too coarse
 SIGNAL_TO_REST = 2.0  # least rms of the slide over that at rest
 FLOOR = 1e-12
 
@@ -194,7 +194,7 @@ class Correction:
 
     @property
     def fingerprint(self) -> str:
-        """What tells it from other corrections."""
+        """Identifies it among other corrections."""
         return hashlib.sha256(json.dumps(self.as_mapping(), sort_keys=True).encode()).hexdigest()[:8]
 
     def as_mapping(self) -> dict[str, Any]:

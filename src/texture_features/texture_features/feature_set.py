@@ -419,7 +419,7 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
 
 
 def _prepared(feature: Feature, options: InputOptions) -> Feature:
-    """Return the feature of the input as the options change it; what tells of the motion itself stays as it is."""
+    """Return the feature of the input as the options change it; features of the motion itself stay as they are."""
     if not options.stretch_to_m_s or isinstance(feature, MOTION_FEATURES):
         return feature
     return Stretched(feature, options.stretch_to_m_s)
@@ -488,9 +488,9 @@ def _listed(inputs: dict[str, tuple[str, str]]) -> str:
 # How one exploration was made: motion, sensor, and the speed, force, directions and signal level of its windows.
 
 DIRECTION_DIGITS = 2  # so that a slide has few directions, however long it is
-# In the name of the feature that tells the level of a channel, 'signal/moments/signal_log_power/dynamic'.
+# In the name of the feature that holds the level of a channel, 'signal/moments/signal_log_power/dynamic'.
 LOG_POWER = '/moments/signal_log_power/'
-LOAD = '/load_level'  # ends the name of the feature that tells the level of a whole array
+LOAD = '/load_level'  # ends the name of the feature that holds the level of a whole array
 
 
 # Of a channel, such as 'signal/dynamic', over a slide: geometric mean of the root mean square of its windows, in the

@@ -264,7 +264,7 @@ def test_each_figure_has_its_mean_over_seeds_and_a_finding_is_decided_by_it() ->
 
 
 def test_seeds_are_no_draws_of_textures_so_that_few_textures_decide() -> None:
-    by_texture = {'cork': 0.5, 'felt': -0.1, 'linen': 0.1}  # the same in all seeds: seeds alone would be sure
+    by_texture = {'cork': 0.5, 'felt': -0.1, 'linen': 0.1}  # the same in all seeds: seeds alone would be certain
     runs = [numbers(seed, 0.8, 0.1667, by_texture=by_texture) for seed in range(5)]
     [finding] = with_seeds(runs[0], runs[1:])['findings']
     assert finding['over_seeds'] == pytest.approx([0.1667, 0.1667 - 0.759, 0.1667 + 0.759], abs=2e-3)  # t of 2 degrees

@@ -41,7 +41,7 @@ ALONG_X_AND_Y = (View(), View(turned_rad=math.pi / 2))
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section 5 tells."""
+    """Check the claims of section 5."""
     both, x_only, y_only = (outcomes[TASK, name] for name in (BOTH, X_ONLY, Y_ONLY))
     log, power = (outcomes[TASK, name] for name in (LOG, POWER))
     return [

@@ -67,7 +67,7 @@ SETS = dict(zip(TASKS, SURFACES, strict=True))
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section V tells."""
+    """Check the claims of section V."""
     svm = outcomes[ALL, SVM]
     em = {task: outcomes[task, EM] for task in TASKS}
     first, last, often = (outcomes[ALL, name] for name in (pa(ROUNDS[0]), pa(ROUNDS[-1]), passes(PASSES[-1])))

@@ -51,13 +51,13 @@ class Interval:
     high: float
 
     def positive(self) -> bool | None:
-        """Tell whether the figure is above 0; None if the interval does not tell."""
+        """Return whether the figure is above 0; None if the interval includes 0."""
         if self.low > 0.0:
             return True
         return False if self.high < 0.0 else None
 
     def less(self, border: float) -> Interval:
-        """Return how much the figure is above a border."""
+        """Return how much the figure is above a limit."""
         return Interval(self.value - border, self.low - border, self.high - border)
 
     def as_json(self) -> list[float]:
@@ -596,7 +596,7 @@ def _gathered(
 
 
 def recipe_of(method: Method) -> Recipe:
-    """Return the recipe as the protocol asks for it."""
+    """Return the recipe as the protocol defines it."""
     recipe = load_recipe(method.recipe)
     inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
     learner: Any = recipe.learner

@@ -55,7 +55,7 @@ Grader = Callable[[Array], tuple[Array, Array]]
 
 
 def _without_std(grades: Array) -> tuple[Array, Array]:
-    """Return grades and their standard deviations, which the paper's regressors do not know."""
+    """Return grades and their standard deviations, which the paper's regressors do not give."""
     return grades, np.zeros_like(grades)
 
 

@@ -506,7 +506,7 @@ class AnnPairs:
 
 
 def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
-    """Return which examples tell when to stop: every seventh slide of a label, or example if there are few slides."""
+    """Return which examples decide when to stop: every seventh slide of a label, or example if there are few slides."""
     held = np.zeros(len(y), dtype=bool)
     for code in np.unique(y):
         rows = np.flatnonzero(y == code)

@@ -64,7 +64,7 @@ METHODS = (
 
 
 def linear_findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section IV.B.1 tells."""
+    """Check the claims of section IV.B.1."""
     ann, svm, ann_vote, svm_vote = (outcomes[LINEAR_SLIDES, name] for name in (ANN, SVM, ANN_VOTE, SVM_VOTE))
     lift_ann, lift_svm = ann_vote.right() - ann.right(), svm_vote.right() - svm.right()
     more = mean(lift_svm - lift_ann)
@@ -118,7 +118,7 @@ ALONG = '0 degrees'
 
 
 def circular_findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section IV.B.2 tells."""
+    """Check the claims of section IV.B.2."""
     circle_ann, circle_svm = outcomes[CIRCLES, 'ets-circular-ann'], outcomes[CIRCLES, 'ets-circular-svm']
     line_ann, line_svm = outcomes[LINES, 'ets-linear-ann'], outcomes[LINES, 'ets-linear-svm']
     return [
@@ -198,7 +198,7 @@ FINE_ANN, FINE_SVM = 'ets-fine-ann', 'ets-fine-svm'
 
 
 def fine_findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section V tells."""
+    """Check the claims of section V."""
     ann, svm = outcomes[TEN_TEXTURES, FINE_ANN], outcomes[TEN_TEXTURES, FINE_SVM]
     return [
         at_least('fine textures are recognised, ANN (94.9 %)', ann, 0.949),

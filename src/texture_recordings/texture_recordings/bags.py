@@ -121,7 +121,7 @@ vars(rosbags.rosbag2.reader)['zstd'] = SimpleNamespace(
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
-    """A path from which only regular files are read, whoever opens them; files of text are short."""
+    """A path from which only regular files are read; files of text are short."""
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
@@ -599,7 +599,7 @@ COMMON: Mapping[str, Quality] = {
 
 
 def quality_of(topic: str) -> Quality | None:
-    """Return the quality of service of a topic by its whole name; None if it is none that the suite knows."""
+    """Return the quality of service of a topic by its whole name; None if it is no topic of the suite."""
     if topic.endswith('_baseline'):
         return LATCHED
     return COMMON.get(topic, QUALITIES.get(short_name(topic)))
@@ -612,7 +612,7 @@ class BagWriter:
         self.path = Path(path)
         self._namespace = '/' + namespace.strip('/')
         self._connections: dict[tuple[str, str], Connection] = {}
-        self.qualities: dict[str, Quality] = {}  # of topics that `quality_of` does not know, as they were offered
+        self.qualities: dict[str, Quality] = {}  # of topics unknown to `quality_of`, as they were offered
         if self.path.exists():
             raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
         self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)

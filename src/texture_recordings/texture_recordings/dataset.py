@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 HOPS = 4  # windows of the least distance overlap so often
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
-# Speeds and forces that differ by less are one condition: an arm does not keep to what it was asked for.
+# Speeds and forces that differ by less are one condition: an arm deviates from its request.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
 
 
@@ -233,7 +233,7 @@ class SlideDataset:
         Raises
         ------
         InvalidData
-            If there is no such condition, or a slide does not tell it.
+            If there is no such condition, or a slide does not have it.
         """
         if name not in CONDITIONS:
             raise InvalidData(f"slides have no condition '{name}'; use one of {', '.join(CONDITIONS)}")
@@ -306,7 +306,7 @@ class SlideDataset:
         """Return the slides cut into parts at different places of their surface, which keep their numbers.
 
         The path of each surface is divided into equal lengths: along the longest extent of the reported positions;
-        where a slide tells none, by the distance from its start; without speeds, by the time. Slides that run the other
+        where a slide has none, by the distance from its start; without speeds, by the time. Slides that run the other
         way are then counted from the other end. No window spans two parts, as each is a separate slide.
 
         Slides over one track are one place, however many: only the parts of it show how far a training reaches.
@@ -432,7 +432,7 @@ class SlideDataset:
     def tare_faults(self, feature_set: FeatureSet) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round, as the node warns.
 
-        Streams whose sensor has no name, as arrays from elsewhere, tell nothing.
+        Streams whose sensor has no name, as arrays from elsewhere, are ignored.
         """
         faults: dict[str, None] = {}
         for slide in self.slides:
@@ -478,7 +478,7 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
     """Return the windows of a slide and its end, as the feature extractor on the robot cuts them."""
     missing = [topic for topic in feature_set.topics if not slide.signals.get(topic)]
     if missing:
-        # The bag may hold streams that the recipe did not ask for.
+        # The bag may hold streams that the recipe does not use.
         in_bag = topics_in(slide.bag, slide.namespace) if is_bag(slide.bag) else slide.signals
         there = sorted(topic for topic in in_bag if topic not in missing and short_name(topic) in STREAMS)
         raise ModelMismatch(

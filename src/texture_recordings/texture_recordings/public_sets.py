@@ -26,7 +26,7 @@ from texture_recordings.slides import parse_selection
 # A slide of the BioTac data set, and how the finger moved in it.
 
 FRAME_NS = 10_000_000  # a frame every 10 ms; its recorded times jitter by the host's scheduling
-# Every slide is cut to the length of the shortest material, or its length would tell the label. The finger runs at
+# Every slide is cut to the length of the shortest material, or its length would reveal the label. The finger runs at
 # speed from the first frame on.
 SLIDE_FRAMES = 600
 LONGEST_S = 1000.0  # of one slide; frames that are missing are counted, however many
@@ -120,7 +120,7 @@ def import_biotac20(source: str | Path, out: str | Path, slides: str = '', mater
 def _import_material(file: Path, out: Path, wanted: frozenset[int] | None) -> Path:
     recordings = list(_recordings(file, wanted))
     if not recordings:
-        raise InvalidData(f"'{file}' has none of the slides asked for; it has 1 to 40")
+        raise InvalidData(f"'{file}' has none of the requested slides; it has 1 to 40")
     ready_ns, next_frame = 0, 0
     with BagWriter(out) as bag:
         for recording in recordings:
@@ -274,7 +274,7 @@ class SlideSet:
             numbered = enumerate(sorted(found[surface]), 1)
             chosen = [slide for number, slide in numbered if wanted is None or number in wanted]
             if not chosen:
-                raise InvalidData(f"'{surface}' has none of the slides asked for; it has 1 to {len(found[surface])}")
+                raise InvalidData(f"'{surface}' has none of the requested slides; it has 1 to {len(found[surface])}")
             for order, key in chosen:
                 bags[self.session(surface, order)].append((key, surface, order))
         ordered = sorted(bags.items(), key=lambda item: item[0][1])
@@ -397,7 +397,7 @@ def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
 NTP21_TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
 RATE_HZ = 320.0
-SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would ask for any number of samples
+SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would need any number of samples
 
 
 def _ntp21_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
@@ -445,7 +445,7 @@ def _fingersense_session(_surface: str, order: Sequence[Any]) -> tuple[str, int]
 
 
 # --------------------
-# Data sets that `texture import` knows, each called as `import_biotac20` is.
+# Data sets of `texture import`, each called as `import_biotac20` is.
 
 Importer = Callable[..., list[Path]]
 IMPORTS: Mapping[str, Importer] = {

@@ -116,9 +116,9 @@ def _mean(values: Iterable[float]) -> float:
 
 
 # --------------------
-# How a slide was made, as the states of its exploration tell.
+# How a slide was made, according to the states of its exploration.
 
-STRAIGHT = 'linear_slide'  # of other motions, states do not tell all that is needed to make them again
+STRAIGHT = 'linear_slide'  # of other motions, states do not hold all that is needed to repeat them
 
 
 def motion_made(states: Sequence[ExplorationState]) -> SlideMotion | None:

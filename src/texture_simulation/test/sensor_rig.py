@@ -242,7 +242,7 @@ class Rig:
         raise TimeoutError(f'{self._name}: no error came')
 
     def offsets(self, batches: Sequence[TactileSignal]) -> AnyArray:
-        """Return what each finite sample holds less what its index asks for: constant if each is in its place."""
+        """Return the difference of each finite sample and the value of its index: constant if each is in its place."""
         values = np.concatenate([batch.samples[:, 0] for batch in batches])
         indices = np.concatenate([np.arange(batch.first_sample, batch.next_sample) for batch in batches])
         offsets: AnyArray = (values - self.case.slope * indices) % self.case.modulus

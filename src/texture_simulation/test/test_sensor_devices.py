@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Drivers on their emulated devices: what the contract of all sensors does not ask."""
+"""Drivers on their emulated devices: what the contract of all sensors does not cover."""
 
 from __future__ import annotations
 

@@ -182,7 +182,7 @@ def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> 
 
 
 def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
-    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all."""
+    """Raise InvalidParameter if a step is longer than `MARGIN` of the limit, or not positive."""
     if not step_s > 0:
         raise InvalidParameter(f'a step of {step_s} s; it must be above 0')
     allowed_s = MARGIN * max_stable_step_s(friction, speed_m_s, force_n)
@@ -390,7 +390,7 @@ class SlidingDrag:
 
 
 # --------------------
-# The kinds of friction by name, each off unless a surface asks for it, and what follows a finger with them.
+# The kinds of friction by name, each off unless a surface names it, and what follows a finger with them.
 
 FRICTIONS: Mapping[str, type] = {
     'sliding_friction': SlidingFriction,  # a Stribeck curve, without memory

@@ -137,7 +137,7 @@ class FingerTrack:
     def advance(self, until_ns: int, n_points: int, rate_hz: float) -> Trajectory:
         """Return the next `n_points` of the path, the last one at `until_ns`.
 
-        Between two calls speed and change of force are constant; an arm that was put elsewhere leaves no trace of the
+        Between two calls speed and change of force are constant; an arm that was repositioned leaves no trace of the
         way there.
         """
         end = self._expected(until_ns)

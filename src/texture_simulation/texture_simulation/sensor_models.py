@@ -97,7 +97,7 @@ class SensorModel:
         raise NotImplementedError
 
     def advance(self, path: Trajectory) -> Any:
-        """Return what the emulated device takes along the next piece of path: whole numbers, or values in units."""
+        """Return what the emulated device takes along the next section of path: whole numbers, or values in units."""
         raise NotImplementedError
 
     def _pressed_n(self, path: Trajectory) -> tuple[Trajectory, Array]:
@@ -197,7 +197,7 @@ class BioTacModel(SensorModel):
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
 
     def advance(self, path: Trajectory) -> NDArray[np.uint16]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         streams = self.streams(path)
         frames = streams['signal_static']
         counts = np.empty((*frames.shape[:-1], len(self._layout.slots)), dtype=np.uint16)
@@ -263,7 +263,7 @@ def biotac_kind(layout: BioTacLayout) -> SensorKind:
 #
 # Four PVDF films and four strain gauges lie at random places in two layers of silicone. Each senses the pressure over
 # its place, the blunter the deeper it lies: a film its changes (the charge leaks), a gauge the pressure itself. All
-# pass a low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper tells none.
+# pass a low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper gives none.
 
 DAQ_RATE_HZ = daq.RATE_HZ
 # A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
@@ -301,7 +301,7 @@ class DaqModel(SensorModel):
         return {daq.TOPIC: VOLT_PER_COUNT * self._counts.exact(self._exact(path))}
 
     def advance(self, path: Trajectory) -> NDArray[np.int16]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         return self._counts.counts(self._exact(path), np.int16)
 
     def _exact(self, path: Trajectory) -> Samples:
@@ -419,7 +419,7 @@ class AnySkinModel(SensorModel):
         return {anyskin.SIGNAL: self.advance(path)}
 
     def advance(self, path: Trajectory) -> Array:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         forces_n = self._band(self._elements.forces_n(self.touch, path))
         by_channel = as_samples(forces_n[..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING])
         return UT_PER_COUNT * self._counts.exact((self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT)
@@ -445,7 +445,7 @@ ANYSKIN_KIND = SensorKind(
 # What the PVDF finger of Hu et al. 2014 measures while it goes along a path.
 #
 # The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses the
-# slow part. The gains are ours: the paper tells none.
+# slow part. The gains are ours: the paper gives none.
 
 # A point a sample: at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more.
 PVDF_PATH_RATE_HZ = pvdf.FILM_RATE_HZ
@@ -479,7 +479,7 @@ class PvdfModel(SensorModel):
         return {**fast, pvdf.FORCE_TOPIC: pvdf.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         _, force_n = self._pressed_n(path)
         film = self._fast.counts(self._charge(force_n), np.int16)
         return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
@@ -556,7 +556,7 @@ class Tsf85Model(SensorModel):
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         placed, force_n = self._pressed_n(path)
         dynamic = self._fast.counts(self._dynamic(force_n), np.int16)
         return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
@@ -657,7 +657,7 @@ class JoinedFingers:
         self.touch = JoinedContacts([model.touch for model in models])
 
     def advance(self, path: Trajectory) -> Any:
-        """Return what all measure along the next piece of path."""
+        """Return what all measure along the next section of path."""
         return self._join([model.advance(path) for model in self._models])
 
 

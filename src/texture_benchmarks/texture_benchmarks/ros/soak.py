@@ -190,7 +190,7 @@ def figures(trials: Sequence[FaultTrial]) -> dict[str, Any]:
 
 
 class Rig(Graph):
-    """All nodes as processes, an operator who explores with them, and what befalls them; use it in a `with` block."""
+    """All nodes as processes, an operator who explores with them, and injected faults; use it in a `with` block."""
 
     def __init__(self, domain_id: int, given: Mapping[str, Mapping[str, Any]]) -> None:
         super().__init__(domain_id, 'watcher')

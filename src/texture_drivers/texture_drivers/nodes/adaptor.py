@@ -27,7 +27,7 @@ def import_message(message_type: str) -> Any:
         return getattr(importlib.import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError) as error:
         raise InvalidParameter(
-            f"the mapping asks for '{message_type}', which cannot be imported ({error}); build the package with these "
+            f"the mapping needs '{message_type}', which cannot be imported ({error}); build the package with these "
             'messages and source it, or correct the type in the mapping'
         ) from error
 

@@ -202,7 +202,7 @@ class ForceDiscriminant(Discriminant):
     """A shrunk discriminant for each range of forces, and less weight for windows outside the trained forces.
 
     Amplitude and spectrum of a vibration change with the force, and on a surface that is not level the force changes
-    from place to place. A window is therefore judged by what was trained near its force, and one that was made far from
+    from place to place. A window is therefore classified by what was trained near its force, and one recorded far from
     any trained force carries little information. Differences between places along a slide count more than what
     varies at one place. Needs the feature `force`; without it there is one discriminant for all.
 
@@ -265,7 +265,7 @@ class ForceDiscriminant(Discriminant):
         middles = np.quantile(forces, (np.arange(self.ranges) + 0.5) / self.ranges)
         blind = X.copy()
         if self.column != UNBOUND:
-            blind[:, self.column] = 0.0  # what is constant tells nothing
+            blind[:, self.column] = 0.0  # constant features carry no information
         stretches = stretches_of(groups, STRETCHES)
         layers = [
             linear_discriminant(

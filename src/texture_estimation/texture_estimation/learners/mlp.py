@@ -267,7 +267,7 @@ class Mlp:
     ) -> dict[str, Array]:
         """Return the layers after a fraction of the steps, with the standardisation worked into them."""
         mean, scale = X.mean(axis=0), X.std(axis=0)
-        scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
+        scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # constant features carry no information
         inputs, rng = np.empty(X.shape, np.float32), np.random.default_rng(self.seed)
         for rows in chunks(*X.shape):
             inputs[rows] = (X[rows] - mean) / scale

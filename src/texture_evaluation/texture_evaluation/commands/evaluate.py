@@ -35,7 +35,7 @@ def _configure_evaluate(parser: argparse.ArgumentParser) -> None:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    """Evaluate, print the figures, and write them if asked to."""
+    """Evaluate, print the figures, and write them with --json."""
     refuse_inputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
     report = evaluate(model, options.bags, options.slides)
@@ -72,7 +72,7 @@ def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
 
 
 def _cross_validate(options: argparse.Namespace) -> int:
-    """Cross-validate one recipe or several, print tables and comparisons, and write and draw them if asked to."""
+    """Cross-validate one recipe or several, print tables and comparisons, and write and draw them on request."""
     split = parse_split(options.split, options.seed)
     names, bags = recipes_and_bags([options.recipe, *options.bags])
     # Files that cannot be written or would be lost are refused before hours of training, not after them.

@@ -55,7 +55,7 @@ def _check_place(out: Path, *, replace: bool) -> None:
 
 
 def summary(model: TextureModel, out: Path) -> list[str]:
-    """Return what a model knows and how well it did on what was held out, in lines."""
+    """Return the labels of a model and its held-out accuracy, in lines."""
     training = model.training
     accuracy = training['held_out_window_accuracy']
     held_out = (

@@ -44,7 +44,7 @@ def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: i
 def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
     """Return the densities as their parts of cosines, then of sines, (..., 2 · bins, n_segments).
 
-    Each half lies in one piece of memory, which makes the sum of both three times as fast as side by side.
+    Each half lies in one block of memory, which makes the sum of both three times as fast as side by side.
     """
     cut = segments(rows, segment, step)
     parts: Array = _transform(cut.shape[-1], segment, bins, rate_hz) @ cut.swapaxes(-1, -2)
@@ -74,7 +74,7 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
 
 
 def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
-    """Return the densities of the segments of windows; features that ask for the same share them."""
+    """Return the densities of the segments of windows; features with equal parameters share them."""
     return windows.shared(
         ('densities', segment, step, bins),
         lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
@@ -396,7 +396,7 @@ class PeakToMedianPower(Feature):
     """Logarithm of the power of the strongest segment over that of the median or of the weakest one.
 
     A finger that sticks and slips is still and then jumps; over an even texture all events are alike. The weakest event
-    tells a single skid: being still for a tenth of the window does not move the middle.
+    responds to a single skid: being still for a tenth of the window does not move the middle.
 
     Examples
     --------

@@ -146,7 +146,7 @@ MOST_CORRELATION = 0.98  # beyond, the transform of a correlation would grow wit
 class DifferenceCorrelation(Feature):
     """Correlations between the channels' differences over some lags, Fisher-transformed; one for each pair of channels.
 
-    Levels and their shares tell how a finger is mounted and how it was tared that day. Which channels change together
+    Levels and their shares depend on how a finger is mounted and was tared that day. Which channels change together
     while a surface passes, over a short and over a longer lag, changes less from day to day. The mean difference, which
     is drift, is left out. n channels give n (n - 1) / 2 pairs: meant for arrays of some twenty taxels.
 
@@ -212,8 +212,8 @@ class DifferenceCorrelation(Feature):
 class LoadLevel(Feature):
     """Logarithm of the mean square over all channels and samples: the load of a tared array, squared.
 
-    For the domain of a model and for its novelty detector: a load that no session of the training showed is told from
-    those that it showed. Networks and discriminants are trained without it, as it tells the day and not the surface.
+    For the domain of a model and for its novelty detector, which reject a load outside those of the training
+    sessions. Networks and discriminants are trained without it, as it depends on the day.
 
     Examples
     --------
@@ -318,7 +318,7 @@ class SpatialBands(Feature):
 
     Bands are equally wide in octaves, over the whole window: a grating of pitch λ is in the band of 1/λ whatever
     the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
-    measures what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is
+    may depend on how a surface was mounted; `mean_spatial_bands` does not. NaN if the speed is
     unknown or 0.
 
     Examples

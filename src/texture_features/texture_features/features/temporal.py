@@ -316,7 +316,7 @@ class TemporalVariation(Feature):
 # --------------------
 # Time stretch: what a signal would have been at another speed.
 
-# A finger that hardly moves tells nothing of another speed, and must not ask for endless samples.
+# A finger that hardly moves gives no information on another speed, and must not need endless samples.
 LARGEST_FACTOR = 10.0
 
 

@@ -31,8 +31,8 @@ POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
 NOTHING = RawMessage('', '', 0, b'')
 EVENTS, EVENT = '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'
-HEADER = 4  # bytes that tell the encoding of a message
-DISCOVERY_S = 0.5  # how often it is asked what else is published
+HEADER = 4  # bytes of the encoding of a message
+DISCOVERY_S = 0.5  # period of the search for other topics
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class RecordNode(Node):
                     self._subscribe(name, types[0], offered[0] if offered else QoSProfile(depth=100))
                 else:
                     self._seen.add(name)
-                    self.get_logger().warning(f"'{name}' is not recorded: bags know no {types[0]}")
+                    self.get_logger().warning(f"'{name}' is not recorded: bags cannot hold {types[0]}")
         for name, namespace in self.get_node_names_and_namespaces():
             node = f'{namespace.rstrip("/")}/{name}'
             if node.startswith(f'{self._namespace}/') and node != self.get_fully_qualified_name():
@@ -121,7 +121,7 @@ class RecordNode(Node):
             self.get_logger().info(f"recording '{name}'")
 
     def _note_parameters(self, node: str) -> None:
-        """Ask a node once for all its parameters, and write them as if it had just been given them."""
+        """Get all parameters of a node once, and write them as a parameter event."""
         client = self._askers.get(node)
         if client is None:
             client = self._askers[node] = AsyncParameterClient(self, node)

@@ -48,7 +48,7 @@ class Schedule:
 
     @property
     def played_s(self) -> float:
-        """Seconds of the recording up to the last message asked for, with shortened pauses."""
+        """Seconds of the recording up to the last requested message, with shortened pauses."""
         return self._played_ns / NANOSECONDS
 
 
@@ -61,7 +61,7 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=5)
 
 @dataclass(frozen=True)
 class ReplayParams:
-    """What is published, how fast, and who must be listening."""
+    """What is published, how fast, and the required subscribers."""
 
     bag: str = param('', 'Bag, or the folder of bags, that is published.')
     rate: float = param(1.0, 'Playback rate relative to the recording; 2 is twice as fast.', low=0.01, high=1000.0)

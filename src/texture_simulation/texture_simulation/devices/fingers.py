@@ -164,7 +164,7 @@ class PtyPort:
             ) from error
 
     def unplug(self) -> None:
-        """Make the device vanish, link and all; whoever has it open gets an error."""
+        """Remove the device and its link; readers that have it open get an error."""
         if self._ends is None:
             return
         name = os.ttyname(self._ends[1])
@@ -221,7 +221,7 @@ class EmulatedDevice:
         self.frame_faults = FrameFaults()  # frames left out or sent twice
         self.silent = False  # open but silent
         self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
-        self.wrong_firmware = False  # sends what no driver knows
+        self.wrong_firmware = False  # sends unknown data
         self._port = PtyPort(link)
         self._rng = rng
         self._held_back = b''

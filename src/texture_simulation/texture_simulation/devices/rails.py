@@ -195,7 +195,7 @@ def _checked(segment: bytes) -> bytes | None:
 
 @dataclass(frozen=True)
 class FingerPipeParams:
-    """Whom an emulated robot tells where its finger is."""
+    """Receiver of the finger state of an emulated robot."""
 
     finger_pipe: str = param('', "Path of the named pipe on which the finger state is sent to the emulator; '': none.")
 

@@ -278,7 +278,7 @@ class Registers(NamedTuple):
 
 
 class EmulatedController:
-    """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
+    """A controller without a clock: each `tick` is one cycle of `step_s`."""
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
         self.version = VERSIONS[params.version]
@@ -324,7 +324,7 @@ class EmulatedController:
             self.protective_stop()
 
     def catch_up(self) -> None:
-        """Do a cycle that should have been done before; it is not the client who was silent in it.
+        """Do a cycle that should have been done before; it is not the client that was silent in it.
 
         A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
         """
@@ -534,7 +534,7 @@ END = b'\nend\n'
 
 
 class ScriptSession(Session):
-    """The conversation with one client, who sends programs in URScript and gets no answer."""
+    """The conversation with one client, which sends programs in URScript and gets no answer."""
 
     def __init__(self, controller: EmulatedController) -> None:
         self._controller = controller
@@ -599,7 +599,7 @@ INPUTS: Mapping[str, tuple[str, str, int]] = {
     'external_force_torque': ('VECTOR6D', '', 0),
 }
 
-# RTDE, protocol version 2: one session per connection, `package` is what it gets each cycle once it has asked for it.
+# RTDE, protocol version 2: one session per connection, `package` is what it gets each cycle once requested.
 
 HEADER = struct.Struct('>HB')
 PROTOCOL_VERSION = 2

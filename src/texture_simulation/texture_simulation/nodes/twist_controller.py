@@ -22,7 +22,7 @@ from texture_core.types import FingerSender
 from texture_simulation.devices.rails import FingerPipeParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
-COMMANDED_S = 0.3  # who commands an arm that moves does so more often
+COMMANDED_S = 0.3  # commands to a moving arm come more often
 LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
 
 
