@@ -300,13 +300,13 @@ def _recognised(name: str, bags: Sequence[Path]) -> dict[str, Any]:
     crossed = any('@' in topic for topic in recipe.as_mapping()['inputs'])
     topics = recipe.feature_set.topics
     model = train(recipe, training_examples(recipe, _dataset(bags, TRAINED, topics, crossed)), name)
-    said = {}
+    results = {}
     for slide, events in _dataset(bags, TESTED, topics, crossed).windows(recipe.feature_set):
         vectors, estimates, _ = run_model(model, events)
         windows = [vector for vector in vectors if not vector.last]
         logs = model.predict_log_proba(np.stack([vector.values for vector in windows]))
         final = estimates[-1]
-        said[slide.surface] = {
+        results[slide.surface] = {
             'windows': len(windows),
             'features': [digest(vector.values) for vector in windows[:SHOWN_WINDOWS]],
             # Logarithms: the probabilities of a certain window are all 1 or 0 but for the last digits.
@@ -326,7 +326,7 @@ def _recognised(name: str, bags: Sequence[Path]) -> dict[str, Any]:
         'feature_set': model.feature_set,
         'features': len(model.names),
         'exponent': rounded(float(model.tempering_exponent)),
-        'slides': said,
+        'slides': results,
     }
 
 
@@ -336,19 +336,19 @@ def _graded(name: str, bags: Sequence[Path]) -> dict[str, Any]:
     cut = replace(recipe.feature_set, windows=recipe.training_windows)
     examples = SlideDataset.from_bags(bags, TRAINED, None, cut.topics).features(cut)
     model = train_grades(recipe, examples, read_grades('ets_roughness'), name)
-    said = {}
+    results = {}
     for slide, vectors in SlideDataset.from_bags(bags, TESTED, None, cut.topics).vectors(recipe.feature_set):
         accumulator, estimate = RoughnessAccumulator(model), None
         for vector in vectors:
             estimate = accumulator.update(vector) or estimate
         windows = np.stack([vector.values for vector in vectors if not vector.last][:SHOWN_WINDOWS])
-        said[slide.surface] = {
+        results[slide.surface] = {
             'features': [digest(values) for values in windows],
             'grades': rounded([np.asarray(part) for part in model.grade(windows)]),
             'final': estimate
             and rounded({'grade': estimate.grade, 'std': estimate.grade_std, 'valid': estimate.valid}),
         }
-    return {'feature_set': model.feature_set, 'features': len(model.names), 'slides': said}
+    return {'feature_set': model.feature_set, 'features': len(model.names), 'slides': results}
 
 
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=2.0, distance_m=0.03)

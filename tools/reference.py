@@ -227,8 +227,8 @@ def experiment(name: str, root: Path) -> str:
             ]
             rows.append(f'| {task} | {method} | {" | ".join(cells)} |')
             for condition, part in {**figures.get('conditions', {}), **figures.get('sets', {})}.items():
-                shares = f'{percent(part["test"])} | – | {percent(part.get("over_seeds"))}'
-                rows.append(f'| {task} | {method}: {condition} | – | – | {shares} |')
+                fractions = f'{percent(part["test"])} | – | {percent(part.get("over_seeds"))}'
+                rows.append(f'| {task} | {method}: {condition} | – | – | {fractions} |')
     table = '\n'.join(rows) if numbers.get('tasks') else ''
     anchor = difficulty(numbers.get('difficulty') or {})
     unit = 100.0 if numbers.get('tasks') else 1.0  # percentage points, or grades
@@ -283,18 +283,18 @@ def grades(root: Path) -> str:
         for regressor, figures in found.items():
             published = numbers['paper'].get(regressor, {})
             for kind in ('seen', 'unseen'):
-                own = figures[kind]
-                means = own.get('means', {})
+                figures_of_kind = figures[kind]
+                means = figures_of_kind.get('means', {})
                 cells = [
                     f'{regressor}{label}',
                     kind,
                     f'{published[kind]:.2f}' if published else '–',
-                    plain(own.get('over_seeds', [own['error']])),
-                    plain(own.get('over_textures', []), middle=False),
-                    plain(means.get('error_none_as_0', [own['error_none_as_0']])),
-                    f'{100 * own["without_grade"]:.0f} %',
+                    plain(figures_of_kind.get('over_seeds', [figures_of_kind['error']])),
+                    plain(figures_of_kind.get('over_textures', []), middle=False),
+                    plain(means.get('error_none_as_0', [figures_of_kind['error_none_as_0']])),
+                    f'{100 * figures_of_kind["without_grade"]:.0f} %',
                     f'{published[f"std_{kind}"]:.2f}' if published else '–',
-                    plain(means.get('std', [own['std']])),
+                    plain(means.get('std', [figures_of_kind['std']])),
                 ]
                 rows.append(f'| {" | ".join(cells)} |')
     about = f'Mean absolute error in grades from 1 to 5. Data: {content["data"]}. Split: {content["split"]}.'
@@ -321,8 +321,8 @@ def later(root: Path) -> str:
     ]
     for name, cell in sorted(cells.items(), key=lambda item: -item[1]['window_accuracy']):
         after = cell['accuracy_at_s']['5.0']
-        shares = (cell['window_accuracy'], after, cell['unclassified_windows'])
-        rows.append(f'| {name} | {" | ".join(map(percent, shares))} | {_definition(name, cell)} |')
+        fractions = (cell['window_accuracy'], after, cell['unclassified_windows'])
+        rows.append(f'| {name} | {" | ".join(map(percent, fractions))} | {_definition(name, cell)} |')
     return '\n'.join(rows) + '\n'
 
 
@@ -332,14 +332,14 @@ def _definition(recipe: str, cell: dict[str, Any]) -> str:
     return measured if measured and measured == digest_of(recipe) else 'an earlier one'
 
 
-def percent(share: float | list[float] | None) -> str:
+def percent(fraction: float | list[float] | None) -> str:
     """Return a fraction in percent, with its interval if it has one."""
-    if share is None:
+    if fraction is None:
         return '–'
-    if isinstance(share, list):
-        middle, low, high = (100 * value for value in share)
+    if isinstance(fraction, list):
+        middle, low, high = (100 * value for value in fraction)
         return f'{middle:.1f} % ({low:.1f} to {high:.1f})'
-    return f'{100 * share:.1f} %'
+    return f'{100 * fraction:.1f} %'
 
 
 def recipes(root: Path) -> str:

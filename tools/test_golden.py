@@ -62,10 +62,10 @@ def test_a_word_that_no_row_has_is_refused_in_one_sentence(
     monkeypatch.setattr(sys, 'argv', ['golden.py', use, '--only', 'defualt'])
     before = golden.STORED.read_bytes()
     assert golden.main() == 2
-    said = capsys.readouterr()
-    assert said.out == ''
-    assert said.err.startswith("golden: no row that can be computed here has 'defualt' in its name")
-    assert said.err.count('\n') == 1
+    output = capsys.readouterr()
+    assert output.out == ''
+    assert output.err.startswith("golden: no row that can be computed here has 'defualt' in its name")
+    assert output.err.count('\n') == 1
     assert golden.STORED.read_bytes() == before
 
 

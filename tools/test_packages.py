@@ -170,8 +170,8 @@ def top(modules: Iterable[str]) -> set[str]:
 def imports(package: Path, folder: str) -> set[str]:
     """Return what the modules in a folder of a package import from outside Python and the package."""
     files = list((package / folder).rglob('*.py'))
-    beside = {path.stem for path in (*files, *ROOT.glob('examples/*.py'))} if folder == 'test' else set()
-    return set().union(*(top(at_once | late) for at_once, late in map(imported, files))) - {package.name} - beside
+    importable = {path.stem for path in (*files, *ROOT.glob('examples/*.py'))} if folder == 'test' else set()
+    return set().union(*(top(at_once | late) for at_once, late in map(imported, files))) - {package.name} - importable
 
 
 def depends(package: Path, *tags: str) -> set[str]:
@@ -223,8 +223,8 @@ def test_what_is_deployed_runs_without_extras_or_says_in_one_sentence_which_it_n
     command = [sys.executable, '-c', WITHOUT_EXTRAS, ' '.join([*EXTRAS, 'h5py']), *modules]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    said = set(done.stdout.splitlines())
-    assert said == ({str(MissingLibrary('rosbags', 'bags', 'bags'))} if package.name in NEED_BAGS else set())
+    printed = set(done.stdout.splitlines())
+    assert printed == ({str(MissingLibrary('rosbags', 'bags', 'bags'))} if package.name in NEED_BAGS else set())
 
 
 @each

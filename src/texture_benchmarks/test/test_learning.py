@@ -64,7 +64,7 @@ def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
     assert all(chart.is_file() for chart in result.charts)
     chosen = result.numbers['chosen_motions']
     assert chosen[SIMULATED]['informed'][-1] >= 0.6
-    assert all(0.25 < shares[-1] <= 1.0 for shares in chosen[RECORDED].values())  # chance is a quarter
+    assert all(0.25 < fractions[-1] <= 1.0 for fractions in chosen[RECORDED].values())  # chance is a quarter
 
 
 def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: Ben
     cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
     # The last of each slide is its end, which is no window; the first pass warms up.
     passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
-    alone_us = np.concatenate([own for timed in passes[1:] for own in timed])
+    alone_us = np.concatenate([of_slide for timed in passes[1:] for of_slide in timed])
     median, p99 = np.percentile(alone_us, (50, 99)).tolist()
     slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
     [live] = measure(folder / f'{recipe}.npz', slide).values()

@@ -159,7 +159,7 @@ def right_after_slides(
         'fixed order': lambda _, slide: Counter(chosen[slide::n_slides]).most_common(1)[0][0],
         'random': lambda *_: motions[int(rng.integers(len(motions)))],
     }
-    shares = {}
+    fractions = {}
     for name, choose in ways.items():
         right = []
         for truth, first in itertools.product(range(values.shape[1]), range(0, values.shape[2], n_slides)):
@@ -169,8 +169,8 @@ def right_after_slides(
                 chosen += [motion] * (name == 'informed')
                 posterior = known.update(posterior, motion, values[motions.index(motion), truth, first + slide])
                 right.append(int(posterior.argmax()) == truth)
-        shares[name] = np.reshape(right, (-1, n_slides)).mean(axis=0)
-    return shares
+        fractions[name] = np.reshape(right, (-1, n_slides)).mean(axis=0)
+    return fractions
 
 
 def known_from(motions: Sequence[SlideMotion], values: Array, textures: Sequence[str]) -> NextTouchModel:
@@ -193,7 +193,7 @@ def simulated_slides(motions: Sequence[SlideMotion], count: int, rng: np.random.
         samples = simulate_slides(
             scene, surface, count, SimulatedSlide(speed, force, SLIDE_S, motion.direction_rad), rng
         )
-        windows = [Window(own.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force) for own in samples]
+        windows = [Window(raw.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force) for raw in samples]
         events = [CutWindow(0, '', SLIDE_S, SLIDE_S, {'signal': window}, speed, force, '') for window in windows]
         cells.append(np.stack([vector.values for vector in TOUCH_FEATURES.extract_many(events)]))
     return np.stack(cells).reshape(len(motions), len(scene.surfaces), count, -1)
@@ -204,8 +204,8 @@ def recorded_touches(slide: SlideSamples) -> Array:
     length = round(TOUCH_M / slide.speed_m_s * slide.rate_hz)
     count = len(slide.samples) // length
     batch = WindowBatch(slide.samples[: count * length].reshape(count, length, -1), slide.rate_hz)
-    [signal] = TOUCH_FEATURES.inputs
-    values: Array = np.concatenate([feature(batch) for _, feature in signal.features], axis=-1).mean(axis=1)
+    [raw] = TOUCH_FEATURES.inputs
+    values: Array = np.concatenate([feature(batch) for _, feature in raw.features], axis=-1).mean(axis=1)
     return values
 
 
@@ -233,11 +233,11 @@ def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str,
     recorded, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
     for trained in (0, 1):
         rng = np.random.default_rng([options.seed, trained])
-        own = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
+        tests = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
         known = NextTouchModel.fit(
-            np.concatenate([values for *_, values in own]),
-            [name for _, name, values in own for _ in values],
-            [motion for motion, _, values in own for _ in values],
+            np.concatenate([values for *_, values in tests]),
+            [name for _, name, values in tests for _ in values],
+            [motion for motion, _, values in tests for _ in values],
         )
 
         def drawn(values: Array, rng: np.random.Generator = rng) -> Array:

@@ -83,16 +83,16 @@ def stability_chart(
     }
 
 
-def border_chart(border: Mapping[str, Array], path: Path) -> Path:
+def limit_chart(limit: Mapping[str, Array], path: Path) -> Path:
     """Draw the gain from which the loop is unstable over its delay, predicted and simulated, and the chosen gains."""
     with chart(path, (8.0, 5.0)) as figure:
         axes = figure.subplots()
-        delay_ms = 1000 * border['delay_s']
-        rows = zip(border['stiffness_n_m'], border['predicted'], border['simulated'], COLOURS, strict=False)
+        delay_ms = 1000 * limit['delay_s']
+        rows = zip(limit['stiffness_n_m'], limit['predicted'], limit['simulated'], COLOURS, strict=False)
         for stiffness, predicted, simulated, colour in rows:
             chosen = [
                 ForceLoopParams(loop_delay_s=delay, max_stiffness_n_m=stiffness).gain_m_s_n(1 / ARM_RATE_HZ)
-                for delay in border['delay_s']
+                for delay in limit['delay_s']
             ]
             axes.semilogy(delay_ms, predicted, color=colour, label=f'{stiffness / 1000:g} kN/m')
             axes.semilogy(delay_ms, simulated, '.', color=colour)
@@ -125,8 +125,8 @@ def force_chart(rows: Mapping[str, Trials], path: Path) -> Path:
 
 
 ARM_RATE_HZ = 250.0
-BORDER_STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
-BORDER_DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
+STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
+DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
 QUICK_DELAYS_S = (0.0, 0.008, 0.02)
 
 
@@ -146,7 +146,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         planned = list(sweep(seeds, options.quick))
         result = Sweep(seeds, len(planned), ran(planned))
     rows = by_name(result.trials)
-    border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else BORDER_DELAYS_S)
+    limit = stability_chart(STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S)
     return BenchmarkResult(
         name='motion',
         measured=run.__doc__,
@@ -156,10 +156,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'seeds': result.seeds,
             'planned': result.planned,
             'rows': {name: row(trials) for name, trials in rows.items()},
-            'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
+            'border_error': float(np.abs(limit['simulated'] / limit['predicted'] - 1).max()),
         },
         charts=(
             force_chart(rows, options.out / 'motion_forces.png'),
-            border_chart(border, options.out / 'motion_stability.png'),
+            limit_chart(limit, options.out / 'motion_stability.png'),
         ),
     )

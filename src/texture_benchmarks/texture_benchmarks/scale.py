@@ -160,11 +160,11 @@ def scale_chart(rows: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
         },
     }
     with chart(path, (9.0, 5.6), f'More textures ({RECIPE}): drawn features, simulated', points=11.0) as figure:
-        for axes, (what, own) in zip(figure.subplots(2, 2, sharex=True).flat, lines.items(), strict=True):
-            for (label, values), colour in zip(own.items(), COLOURS, strict=False):
+        for axes, (what, curves) in zip(figure.subplots(2, 2, sharex=True).flat, lines.items(), strict=True):
+            for (label, values), colour in zip(curves.items(), COLOURS, strict=False):
                 axes.plot([row['labels'] for row in rows], values, marker='.', color=colour, label=label)
             axes.set(title=what, xscale='log', ylim=(0, None))
-            if len(own) > 1:
+            if len(curves) > 1:
                 axes.legend()
         for axes in figure.axes[2:]:
             axes.set_xlabel('textures')

@@ -32,7 +32,7 @@ DATA = {
     'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
 }
 QUICK_MATERIALS, QUICK_SLIDES = ('material01', 'material02', 'material03'), '1-6'
-APART_S = 0.5
+SPACING_S = 0.5
 ROUNDING = 1e-9  # of a quotient of two times
 
 
@@ -142,7 +142,7 @@ def _do(job: Any) -> Any:
         return _work[0](job)
 
 
-def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
+def accuracy_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
     """Return the 95 % interval of a fraction of slides: by bootstrap over surfaces, or exact over slides where wider.
 
     Slides over one surface are no independent draws. Where all surfaces are alike, resampling them shows nothing.
@@ -165,8 +165,8 @@ def imported(
         yield IMPORTS[name](source, Path(folder), slides, materials)
 
 
-def trained_apart(recipe: Recipe) -> Recipe:
-    """Return a recipe whose training windows begin APART_S apart or more: the papers' machines take hours otherwise."""
+def with_spaced_windows(recipe: Recipe) -> Recipe:
+    """Return a recipe whose training windows begin every SPACING_S or more: the papers' SVMs take hours otherwise."""
     hop_s = recipe.feature_set.windows.hop_s
-    apart_s = hop_s * math.ceil(APART_S / hop_s - ROUNDING)
-    return replace(recipe, training=replace(recipe.training, hop_s=apart_s))
+    spacing_s = hop_s * math.ceil(SPACING_S / hop_s - ROUNDING)
+    return replace(recipe, training=replace(recipe.training, hop_s=spacing_s))

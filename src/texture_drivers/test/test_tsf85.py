@@ -119,13 +119,13 @@ class Feeder:
         self, milliseconds: int, missing: tuple[int, ...] = (), image: list[int] | None = None, more: bytes = b''
     ) -> None:
         for first in range(0, milliseconds, 10):
-            said = 0
+            sent = 0
             for ms in range(first, min(first + 10, milliseconds)):
                 if ms not in missing:
-                    said += self.wire.say(self.stamp_ms * self.ticks, ms % 1000, image, more)
+                    sent += self.wire.say(self.stamp_ms * self.ticks, ms % 1000, image, more)
                 self.stamp_ms += 1
                 self.clock.now_ns += NANOSECONDS // 1000
-            self.wire.wait_until_there(said)
+            self.wire.wait_until_there(sent)
             self.read()
 
     def read(self) -> None:

@@ -246,8 +246,8 @@ class SignalAdaptor:
         self.invalid += int(np.count_nonzero(~np.isfinite(rows)))
         rows[~np.isfinite(rows)] = np.nan
         end_ns = sent_ns if self._stamp is None else read_time_ns(self._stamp(message)[0])
-        own = self._number is not None and not self.mapping.number_topic
-        number = self._read_number(message) if own else None
+        included = self._number is not None and not self.mapping.number_topic
+        number = self._read_number(message) if included else None
         return Sample(
             rows * self.mapping.gain, end_ns - round(self.mapping.stamp_after_s * NANOSECONDS), sent_ns, number
         )

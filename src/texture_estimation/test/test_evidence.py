@@ -79,8 +79,8 @@ def test_overlapping_windows_count_the_sliding_time_once(model, examples):
     estimates = predict(model, vectors(examples, hop_s=0.1))
     assert [round(estimate.evidence_s, 3) for estimate in estimates[:4]] == [0.5, 0.6, 0.7, 0.8]
     assert estimates[0].stamp_ns == 1_500_000_000
-    apart = predict(model, vectors(examples, hop_s=1.0))
-    assert apart[2].evidence_s == pytest.approx(1.5)
+    separate = predict(model, vectors(examples, hop_s=1.0))
+    assert separate[2].evidence_s == pytest.approx(1.5)
 
 
 def under(stream, **conditions):

@@ -92,9 +92,9 @@ def test_more_sliding_never_makes_surer_than_people_agree(model) -> None:
 def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(model) -> None:
     evidence = RoughnessAccumulator(model)
     received = [evidence.update(vector(sequence=5 * k)) for k in range(50)] + [evidence.update(last())]
-    said = [estimate for estimate in received if estimate]
-    assert 3 <= len(said) < 50
-    assert [estimate.final for estimate in said] == [False] * (len(said) - 1) + [True]
+    estimates = [estimate for estimate in received if estimate]
+    assert 3 <= len(estimates) < 50
+    assert [estimate.final for estimate in estimates] == [False] * (len(estimates) - 1) + [True]
     assert evidence.update(vector(identity='e2')).windows == 1
 
 

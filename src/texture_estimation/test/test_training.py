@@ -112,8 +112,8 @@ def test_a_classifier_trained_with_gains_recognises_what_is_amplified(make_examp
     plain = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
     params = Augmentation(copies=2, gain_range=5.0, slide_jitter=0.0)
     trained = {
-        name: train(dataclasses.replace(plain, augmentation=own), augmented(examples, response))
-        for name, own in {'plain': Augmentation(), 'augmented': params}.items()
+        name: train(dataclasses.replace(plain, augmentation=params_of_model), augmented(examples, response))
+        for name, params_of_model in {'plain': Augmentation(), 'augmented': params}.items()
     }
     louder = make_examples(slides=6, features=6, seed=9)
     values = louder.values + np.log(4.0) * response

@@ -200,9 +200,9 @@ def _least_score(fitted: tuple[float, float, float], wrong: Array, unknown: Arra
 
     `unknown` are the slides without their label, one for each, and `wrong` those that are wrong with it.
     """
-    own, every = _score(fitted, wrong), np.concatenate([_score(fitted, wrong), _score(fitted, unknown)])
+    scores_of_wrong, every = _score(fitted, wrong), np.concatenate([_score(fitted, wrong), _score(fitted, unknown)])
     limits = [-NEVER]
-    for scores, most in ((own, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
+    for scores, most in ((scores_of_wrong, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
         kept = int(most + ROUNDING)
         if kept < len(scores):
             limits.append(math.nextafter(float(np.sort(scores)[::-1][kept]), math.inf))
@@ -337,8 +337,8 @@ class Acceptance:
     def reason(self) -> str:
         """Why every label is rejected, in one sentence: how many slides there are and how many are needed; else ''."""
         if self.added:
-            asked = f"to accept '{self.added}' {LEAST_SLIDES_A_LABEL} are needed"
-            return '' if self.slides >= LEAST_SLIDES_A_LABEL else f'too little training: {self.slides} added; {asked}'
+            needs = f"to accept '{self.added}' {LEAST_SLIDES_A_LABEL} are needed"
+            return '' if self.slides >= LEAST_SLIDES_A_LABEL else f'too little training: {self.slides} added; {needs}'
         short = {label: count for label, count in self.domain.slides.items() if count < LEAST_SLIDES_A_LABEL}
         needed = math.ceil(slides_needed(self.rates.max_accepted_wrong) / TRIALS)
         if not short and self.slides >= needed:
@@ -386,9 +386,9 @@ class Acceptance:
         if after == 0 or after == len(LEVELS):
             return self._rows[max(after - 1, 0)]
         low, high = LEVELS[after - 1], LEVELS[after]
-        share = (effective_windows - low) / (high - low)
+        weight = (effective_windows - low) / (high - low)
         pairs = zip(self._rows[after - 1], self._rows[after], strict=True)
-        return Limits(*(one if one == other else one + share * (other - one) for one, other in pairs))
+        return Limits(*(one if one == other else one + weight * (other - one) for one, other in pairs))
 
     def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
         """Return the decision about a slide from the margin of its label and the distance to the slides of it."""

@@ -209,8 +209,8 @@ class EvidenceAccumulator:
         """Return the probabilities of all labels from those of the trained textures among themselves."""
         if self._moments is None or model.slide_gaussians is None:
             return trained
-        shares = model.slide_gaussians.shares(self._moments.mean, self._moments.variance, effective_windows)
-        return model.slide_gaussians.combined(trained, shares)
+        log_proba = model.slide_gaussians.log_proba(self._moments.mean, self._moments.variance, effective_windows)
+        return model.slide_gaussians.combined(trained, log_proba)
 
     def _explanation(self, acceptance: Acceptance, final: bool, rejection: Rejection) -> str:
         """Return the message of an estimate for its reader, in sentences; '' if there is none."""

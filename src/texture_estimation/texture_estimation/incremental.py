@@ -199,11 +199,11 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     within, between, classes = _covariances(points, labels, sessions, names)
     moved, uncertain = np.full_like(classes, np.nan), np.zeros_like(within)
     for number, name in enumerate(names):
-        own = seen[shot_labels == name]
-        if len(own):
-            gain = between @ np.linalg.inv(between + within / len(own))
-            moved[number] = classes[number] + gain @ (own.mean(axis=0) - classes[number])
-            uncertain += (between - gain @ between) * len(own) / len(seen)
+        shots_of_class = seen[shot_labels == name]
+        if len(shots_of_class):
+            gain = between @ np.linalg.inv(between + within / len(shots_of_class))
+            moved[number] = classes[number] + gain @ (shots_of_class.mean(axis=0) - classes[number])
+            uncertain += (between - gain @ between) * len(shots_of_class) / len(seen)
     shift = np.nanmean(moved - classes, axis=0)
     moved = np.where(np.isnan(moved), classes + shift, moved)
     weights = np.linalg.solve(within + uncertain, moved.T)
@@ -237,10 +237,10 @@ def _covariances(
     """Return the covariances within a session and between sessions of a label, and the mean of each label."""
     classes, inside, across, groups = [], [], [], 0
     for name in names:
-        own = labels == name
+        of_class = labels == name
         centres = []
-        for session in np.unique(sessions[own]):
-            group = points[own & (sessions == session)]
+        for session in np.unique(sessions[of_class]):
+            group = points[of_class & (sessions == session)]
             centres.append(group.mean(axis=0))
             inside.append(group - centres[-1])
             groups += 1

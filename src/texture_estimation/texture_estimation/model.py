@@ -59,7 +59,7 @@ def part_of(kind: Any, value: Any, where: str) -> Any:
         return None if value is None else part_of(given[0], value, where)
     elif origin is tuple and isinstance(value, list) and (given[-1] is ... or len(given) == len(value)):
         kinds = given[:1] * len(value) if given[-1] is ... else given
-        found = tuple(part_of(own, item, where) for own, item in zip(kinds, value, strict=True))
+        found = tuple(part_of(part_kind, item, where) for part_kind, item in zip(kinds, value, strict=True))
     elif origin is Mapping and isinstance(value, Mapping):
         found = {name: part_of(given[1], item, f'{where}, {name}') for name, item in value.items()}
     elif origin is np.ndarray and isinstance(value, np.ndarray) and value.dtype == get_args(given[1])[0]:
@@ -80,7 +80,7 @@ def _dataclass_of(kind: Any, value: Any, where: str) -> Any:
     different = set(types) ^ set(value)
     if different:
         raise InvalidData(f'{where} has the entries {", ".join(value)}; {", ".join(types)} are needed')
-    return kind(**{name: part_of(own, value[name], f'{where}, {name}') for name, own in types.items()})
+    return kind(**{name: part_of(part_kind, value[name], f'{where}, {name}') for name, part_kind in types.items()})
 
 
 # --------------------
@@ -247,12 +247,12 @@ def _numbers(array: AnyArray, name: str) -> AnyArray:
 
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file whole or not at all."""
-    beside = path.with_name(f'.{path.name}.{os.getpid()}')
+    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
-        beside.write_bytes(content)
-        beside.replace(path)
+        temporary.write_bytes(content)
+        temporary.replace(path)
     finally:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
@@ -289,8 +289,8 @@ class AddedSlide:
 
 def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
     """Write an added slide of a model by its number, from 1, atomically."""
-    told = {**tree_of(added_slide), 'values': added_slide.values.tolist()}
-    content = {'format': FORMAT, 'feature_set': feature_set, **told}
+    content_of_slide = {**tree_of(added_slide), 'values': added_slide.values.tolist()}
+    content = {'format': FORMAT, 'feature_set': feature_set, **content_of_slide}
     path = _folder(model) / f'{number:05d}.json'
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, (json.dumps(content) + '\n').encode())
@@ -365,8 +365,8 @@ class TrainingExamples:
     @classmethod
     def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
         """Return what contributes keeping: of each label at most as many as are useful."""
-        own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
-        kept = np.concatenate([rows[spread(len(rows))] for rows in own])
+        of_label = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
+        kept = np.concatenate([rows[spread(len(rows))] for rows in of_label])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
     def check(self, n_features: int, n_labels: int) -> None:
@@ -521,7 +521,7 @@ class TextureModel(StoredModel):
         trained = log_softmax(self.predictor(X))
         if self.slide_gaussians is None or not self.added_slides:
             return trained
-        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_shares(X))
+        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_log_proba(X))
         return np.log(np.maximum(combined, LEAST_PROBABILITY))
 
     def decide(self, X: Array) -> list[str]:
@@ -577,8 +577,8 @@ class TextureModel(StoredModel):
             raise ModelMismatch(f"model '{self.name}' holds no training examples, so none can be added; train it again")
         known, windows = self.examples, self.recipe.training_windows
         kept = len(known.codes) / max(int(self.training.get('windows', 0)), len(known.codes))
-        hop_share = min(windows.hop_s / windows.length_s / kept, 1.0)
-        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_share, self._compared)
+        hop_ratio = min(windows.hop_s / windows.length_s / kept, 1.0)
+        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_ratio, self._compared)
 
     def validate(self) -> None:
         """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.

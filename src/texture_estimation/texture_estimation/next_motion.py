@@ -185,17 +185,17 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     # The shrinkage takes the number of slides for that of free deviations; means have used up some of them.
     covariance = ledoit_wolf(off / scale, assume_centered=True)[0] * len(values) / freedom
     by_motion = means.reshape(-1, n_textures, values.shape[1])
-    apart = (by_motion - by_motion.mean(axis=1, keepdims=True)).reshape(means.shape) / scale
-    between = apart.T @ apart / (len(by_motion) * max(n_textures - 1, 1))
+    deviations = (by_motion - by_motion.mean(axis=1, keepdims=True)).reshape(means.shape) / scale
+    between = deviations.T @ deviations / (len(by_motion) * max(n_textures - 1, 1))
     spread, axes = eigh(between, covariance + np.diag(1.0 * (np.diag(covariance) <= 0.0)))
     chance = float((1.0 / counts).mean())
     spread -= chance
     axes, spread = axes[:, spread > 0.0], spread[spread > 0.0]
     drawn = spread / (spread + chance)
     projection = axes / scale[:, None] / np.sqrt(1.0 + chance * drawn)
-    own = by_motion @ projection
-    middle = own.mean(axis=1, keepdims=True)
-    return projection, middle + drawn * (own - middle)
+    projected = by_motion @ projection
+    middle = projected.mean(axis=1, keepdims=True)
+    return projection, middle + drawn * (projected - middle)
 
 
 def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
@@ -209,11 +209,11 @@ def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     parts = np.where(counts[numbers] >= LEAST, (ranks + numbers) % PARTS, -1)
     found = []
     for part in range(PARTS):
-        own = parts == part
-        if own.any() and np.count_nonzero(~own) > len(counts):
-            projection, means = _fit(values[~own], cells[~own], n_textures)
-            likelihoods = log_likelihoods(values[own] @ projection, means[cells[own] // n_textures])
-            found.append((likelihoods, cells[own] % n_textures))
+        held_out = parts == part
+        if held_out.any() and np.count_nonzero(~held_out) > len(counts):
+            projection, means = _fit(values[~held_out], cells[~held_out], n_textures)
+            likelihoods = log_likelihoods(values[held_out] @ projection, means[cells[held_out] // n_textures])
+            found.append((likelihoods, cells[held_out] % n_textures))
     if not found:
         return 1.0
     untempered, truth = (np.concatenate(each) for each in zip(*found, strict=True))

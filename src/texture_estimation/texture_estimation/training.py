@@ -81,9 +81,9 @@ def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows:
     if examples.resized is None:
         return taken
     names, first = np.unique(examples.groups, return_index=True)
-    own = np.isin(examples.resized.groups, names)
-    slides = np.searchsorted(names, examples.resized.groups[own])
-    further = examples.resized.values[own], codes[first][slides], slides
+    members = np.isin(examples.resized.groups, names)
+    slides = np.searchsorted(names, examples.resized.groups[members])
+    further = examples.resized.values[members], codes[first][slides], slides
     return (
         np.concatenate([taken[0], further[0]]),
         np.concatenate([taken[1], further[1]]),
@@ -112,14 +112,14 @@ def _augmented_examples(
         return None
     copies = examples.augmented.copies
     names, first = np.unique(examples.groups, return_index=True)
-    own = np.isin(copies.groups, names)
-    copied = np.searchsorted(names, copies.groups[own])
-    runs = copied * (int(copies.copies.max(initial=0)) + 1) + copies.copies[own]
+    members = np.isin(copies.groups, names)
+    copied = np.searchsorted(names, copies.groups[members])
+    runs = copied * (int(copies.copies.max(initial=0)) + 1) + copies.copies[members]
     means = group_means(examples.values, groups)
     classes = codes[first]
     centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
     return AugmentedExamples(
-        values=copies.values if own.all() else copies.values[own],  # a copy of all takes as much memory again
+        values=copies.values if members.all() else copies.values[members],  # a copy of all takes as much memory again
         codes=classes[copied],
         groups=copied,
         rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
@@ -146,13 +146,13 @@ def held_out_parts(examples: LabelledFeatures, *, by_speed: bool = False) -> Cod
         [f'{"" if alone else one.session}\n{one.place}\n{one.sensor}\n{v}' for one, v in zip(made, speeds, strict=True)]
     )
     labels = examples.labels[rows]
-    own = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    of_labels = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     order = _ranks(sessions, rows)
     count = min(FOLDS, int(order.max()) + 1)
-    if max(len(set(sessions[of])) for of in own) < 2 or min(map(len, own)) < 2:
+    if max(len(set(sessions[of])) for of in of_labels) < 2 or min(map(len, of_labels)) < 2:
         return None
     parts: Codes = order * count // (order.max() + 1)
-    for of in own:
+    for of in of_labels:
         if len(set(parts[of].tolist())) < 2:
             rank = _ranks(sessions[of] if len(set(sessions[of])) > 1 else slides[of], rows[of])
             parts[of] = rank * count // (rank.max() + 1)
@@ -180,10 +180,10 @@ def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
         parts = np.arange(len(rows)) * count // len(rows)
         for number in range(count):
             name = f'{slide} part {number + 1}/{count}'
-            own = rows[parts == number]
-            groups[own] = name
-            gap = max(spanned, round(GAP * len(own)))
-            kept[own[len(own) - gap :] if number < count - 1 else []] = False
+            members = rows[parts == number]
+            groups[members] = name
+            gap = max(spanned, round(GAP * len(members)))
+            kept[members[len(members) - gap :] if number < count - 1 else []] = False
             made = examples.conditions.get(slide, SlideConditions())
             conditions[name] = replace(made, place=f'{number + 1}/{count}')
     return replace(examples, groups=groups.astype(np.str_), conditions=conditions).take(kept)
@@ -235,7 +235,7 @@ class Followed:
 
     def __init__(self, recipe: Recipe, examples: LabelledFeatures) -> None:
         self._recipe = recipe
-        self._hop_share = min(examples.hop_s / examples.window_s, 1.0)
+        self._hop_ratio = min(examples.hop_s / examples.window_s, 1.0)
         self._classes = np.unique(examples.labels, return_inverse=True)[1]
         names, first, self._groups = np.unique(examples.groups, return_index=True, return_inverse=True)
         truths = self._classes[first]
@@ -263,8 +263,8 @@ class Followed:
                 else:
                     continue
                 evidence = rule.window_evidence(log_softmax(scores) * scale)
-                counts: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * self._hop_share
-                means, _ = followed(rule, evidence, self._hop_share, trusted)
+                counts: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * self._hop_ratio
+                means, _ = followed(rule, evidence, self._hop_ratio, trusted)
                 yield HeldOutSlide.follow(
                     slide.truth, means, counts, self._values(values, predictor), distance, disturbance=slide.disturbance
                 )
@@ -275,7 +275,7 @@ class Followed:
         for those in (self._slides, self._copies):
             kept = [slide for slide in those if slide.group not in held_out]
             codes.append(np.array([slide.truth for slide in kept], dtype=np.intp))
-            means.append([compared_start(self._values(one.values, predictor), self._hop_share) for one in kept])
+            means.append([compared_start(self._values(one.values, predictor), self._hop_ratio) for one in kept])
         found = ClassDistance.fit(np.stack(means[0]), codes[0])
         return found.with_slides(np.stack(means[1]), codes[1]) if means[1] else found
 
@@ -322,7 +322,7 @@ DEFAULT_TEMPERING_EXPONENT = 0.5
 
 
 def fit_tempering_exponent(
-    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_share: float, *, temperature: float
+    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_ratio: float, *, temperature: float
 ) -> float:
     """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
     if fitted.held_out is None:
@@ -332,7 +332,7 @@ def fit_tempering_exponent(
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
         means, counts = followed(
-            rule, evidence[rows], hop_share, 1.0 if fitted.trusted is None else fitted.trusted[rows]
+            rule, evidence[rows], hop_ratio, 1.0 if fitted.trusted is None else fitted.trusted[rows]
         )
         slides.append((means, counts, codes[rows]))
     means, counts, truth = (np.concatenate(parts) for parts in zip(*slides, strict=True))
@@ -377,12 +377,12 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     _check(examples)
     labels, codes = np.unique(examples.labels, return_inverse=True)
     groups = np.unique(examples.groups, return_inverse=True)[1]
-    hop_share = min(examples.hop_s / examples.window_s, 1.0)
+    hop_ratio = min(examples.hop_s / examples.window_s, 1.0)
     # Fit to all slides, and without some of them in turn.
     bound = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
     fitted = fit_learner(bound, examples, codes, groups)
     tempering_exponent = fit_tempering_exponent(
-        fitted, codes, groups, recipe.evidence, hop_share, temperature=fitted.temperature
+        fitted, codes, groups, recipe.evidence, hop_ratio, temperature=fitted.temperature
     )
     held_out = 0 if fitted.held_out is None else len(np.unique(groups))
     calibrated, truth = fitted, codes
@@ -400,7 +400,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             calibrated, truth = without, kinds
             far = [*Followed(bound, placed).held_out(without, fitted.temperature, parts)]
             tempering_exponent = fit_tempering_exponent(
-                without, kinds, slides_of, recipe.evidence, hop_share, temperature=fitted.temperature
+                without, kinds, slides_of, recipe.evidence, hop_ratio, temperature=fitted.temperature
             )
         distance = slides.distance(bound.learner.predictor(fitted.parameters))
         acceptance = acceptance.fitted(near, far, recipe.evidence, tempering_exponent, distance)

@@ -71,10 +71,10 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
 
 def test_the_reference_tells_how_its_slide_was_made(trained):
     model, slides = trained
-    asked = ExplorationRequest(
+    request = ExplorationRequest(
         'linear_slide', speed_m_s=0.03, force_n=5.0, distance_m=0.08, direction_rad=0.5, surface='plate'
     )
-    store_reference(model, TOPICS, slides[:2], asked)
+    store_reference(model, TOPICS, slides[:2], request)
     assert read_reference(model)[1] == {
         'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': 0.5
     }  # fmt: skip

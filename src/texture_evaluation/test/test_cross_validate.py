@@ -80,9 +80,9 @@ def tones(slides: int = 6, *, seed: int = 0, shuffled: bool = False) -> SlideDat
         np.sin(2 * np.pi * (TONES_HZ[label] * time_s + rng.random()))[:, None] + 0.1 * rng.normal(size=(1000, 1))
         for label in labels
     ]
-    told = rng.permutation(labels).tolist() if shuffled else labels
+    given = rng.permutation(labels).tolist() if shuffled else labels
     speeds = [SPEEDS_M_S[(number // len(TONES_HZ)) % len(SPEEDS_M_S)] for number in range(len(labels))]
-    return SlideDataset.from_arrays({'signal': samples}, told, {'signal': 1000.0}, speed_m_s=speeds, force_n=1.0)
+    return SlideDataset.from_arrays({'signal': samples}, given, {'signal': 1000.0}, speed_m_s=speeds, force_n=1.0)
 
 
 def test_tones_are_told_apart_in_every_fold() -> None:
@@ -394,9 +394,9 @@ def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
             '--json', str(tmp_path / 'figures.json'), '--chart', str(tmp_path / 'figures.png'),
         ])
     )  # fmt: skip
-    said = capsys.readouterr().out
-    assert "recipe 'bands', split leave-one-out:session: 3 surfaces" in said
-    assert "'level' against 'bands' on 18 slides" in said
+    output = capsys.readouterr().out
+    assert "recipe 'bands', split leave-one-out:session: 3 surfaces" in output
+    assert "'level' against 'bands' on 18 slides" in output
     figures = json.loads((tmp_path / 'figures.json').read_text())
     assert (figures['split'], figures['seed']) == ('leave-one-out:session', 0)
     assert (figures['bags'], figures['slides']) == ([str(tmp_path / 'bags')], 'all')

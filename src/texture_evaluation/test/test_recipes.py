@@ -99,8 +99,8 @@ def test_what_changes_together_is_recognised_on_a_day_with_other_levels(name: st
     assert np.mean([final.accepted for final in finals]) > 0.7
     # On log shares, which the day gives, the same slides are guessed.
     features = {'signal_static': {'features': ['log_shares']}}
-    shares = Recipe.from_mapping({'inputs': features, 'learner': 'discriminant'}, 'shares')
-    guessed = evaluate_dataset(train(shares, training_examples(shares, trained)), tested)
+    log_fractions = Recipe.from_mapping({'inputs': features, 'learner': 'discriminant'}, 'shares')
+    guessed = evaluate_dataset(train(log_fractions, training_examples(log_fractions, trained)), tested)
     assert window_accuracy(guessed.known) < 0.8
 
 

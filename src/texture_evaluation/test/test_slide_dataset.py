@@ -249,8 +249,8 @@ def test_parts_of_equal_time_hold_every_sample_once_and_windows_never_span_two()
         assert [start // NANOSECONDS % 5 for start in starts[:2]] == [first] * 2
         for event in events:
             if isinstance(event, CutWindow):
-                own = event.windows['signal'].samples[:, 0]
-                assert first - 1e-3 <= own[0] < own[-1] < first + 1.0
+                times = event.windows['signal'].samples[:, 0]
+                assert first - 1e-3 <= times[0] < times[-1] < first + 1.0
 
 
 def test_parts_are_of_equal_distance_where_slides_tell_their_speed() -> None:

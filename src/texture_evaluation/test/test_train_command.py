@@ -51,14 +51,14 @@ def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: Text
 
 
 @pytest.mark.parametrize(
-    ('slides', 'said'),
+    ('slides', 'expected'),
     [({'cork': 4, 'felt': 1}, 'few slides of felt: 1, of others up to 4'), ({'cork': 4, 'felt': 3}, '')],
 )
-def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, said: str) -> None:
+def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, expected: str) -> None:
     domain = replace(model.acceptance.domain, slides=slides)
     uneven = replace(model, acceptance=replace(model.acceptance, domain=domain))
     found = [line for line in summary(uneven, Path('model.npz')) if line.startswith('few slides')]
-    assert [line.partition(';')[0] for line in found] == ([said] if said else [])
+    assert [line.partition(';')[0] for line in found] == ([expected] if expected else [])
 
 
 def test_a_training_with_one_slide_of_a_label_is_said_to_be_too_confident(simulated: Path) -> None:

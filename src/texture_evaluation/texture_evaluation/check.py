@@ -23,7 +23,7 @@ from texture_features.correction import (
     InputComparison,
     InputStatistics,
     compare,
-    file_beside,
+    file_next_to,
     write_reference,
 )
 from texture_recordings.dataset import SlideDataset
@@ -90,7 +90,7 @@ def check_finger(
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
     found = {topic: compare(reference[topic], one) for topic, one in today.items()}
     faults = _faults(found)
-    correction = file_beside(model, CORRECTION)
+    correction = file_next_to(model, CORRECTION)
     if not faults:
         # Of a finger that is as trained a correction would make another one.
         removed = correct and correction.exists()

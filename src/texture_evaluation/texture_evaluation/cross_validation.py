@@ -128,16 +128,16 @@ def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = Non
         reached = [row for row, end in enumerate(ends) if end is not None]
         right = _counted([end.label == one.surface for one, end in zip(results, ends, strict=True) if end is not None])
         key = f'{seconds:.1f}'
-        at_s[key], intervals_at_s[key] = _share_of(right, of_clusters[reached])
+        at_s[key], intervals_at_s[key] = _accuracy_of(right, of_clusters[reached])
         n_at_s[key] = len(reached)
-    shares = {name: _share_of(own, of_clusters) for name, own in counts.items()}
+    accuracies = {name: _accuracy_of(pair, of_clusters) for name, pair in counts.items()}
     return {
         'rejections': metrics.rejections(results),
         'n_slides': len(results),
         'n_windows': sum(len(result.window_labels) for result in results),
         'n_clusters': len(set(of_clusters.tolist())),
-        **{name: share for name, (share, _) in shares.items()},
-        **{f'{name}_interval': own for name, (_, own) in shares.items()},
+        **{name: value for name, (value, _) in accuracies.items()},
+        **{f'{name}_interval': pair for name, (_, pair) in accuracies.items()},
         'accuracy_at_s': at_s,
         'accuracy_at_s_interval': intervals_at_s,
         'n_slides_at_s': n_at_s,
@@ -149,7 +149,7 @@ def _counted(which: Sequence[bool]) -> Array:
     return np.array([(one, 1) for one in which], dtype=np.float64).reshape(-1, 2)
 
 
-def _share_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[float] | None]:
+def _accuracy_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[float] | None]:
     """Return an accuracy and its interval; None for both without an answer."""
     right, answers = counts.sum(axis=0)
     return (float(right / answers), interval(counts, clusters)) if answers else (None, None)
@@ -370,8 +370,8 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     recognised = right[..., 0] > 0.5 * right[..., 1]
     only_first, only_second = (int((recognised[a] & ~recognised[b]).sum()) for a, b in ((0, 1), (1, 0)))
     clusters = [first.clusters.get(name, name) for name in slides]
-    right, windows = (np.stack([clustered(own, clusters) for own in both]) for both in (right, windows))
-    alike = np.stack([clustered(_counted(own), clusters)[:, 0] for own in recognised])  # slides of each cluster
+    right, windows = (np.stack([clustered(results, clusters) for results in both]) for both in (right, windows))
+    alike = np.stack([clustered(_counted(results), clusters)[:, 0] for results in recognised])  # slides of each cluster
     p_value = mcnemar(int((alike[0] > alike[1]).sum()), int((alike[1] > alike[0]).sum()))
     slide_difference, slide_interval = _difference(right)
     window_difference, window_interval = _difference(windows)
@@ -413,8 +413,8 @@ def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool)
     for fold in result.folds:
         kept = {name: one for name, one in fold.results.items() if name in place}
         if kept:
-            own = (window_counts if of_windows else slide_counts)(list(kept.values()))
-            counts[[place[name] for name in kept]] += own
+            counted = (window_counts if of_windows else slide_counts)(list(kept.values()))
+            counts[[place[name] for name in kept]] += counted
     return counts
 
 
@@ -450,8 +450,8 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     Path
     """
     with chart(path, (10.0, 2.4 + 0.5 * len(results)), title) as figure:
-        shares, times = figure.subplots(1, 2)
-        _draw_shares(shares, results)
+        accuracies, times = figure.subplots(1, 2)
+        _draw_accuracies(accuracies, results)
         for result, style in zip(results, line_styles(), strict=False):
             seconds, accuracy = curve(result.pooled)
             times.plot(seconds, 100 * accuracy, label=result.recipe, marker='.', **style)
@@ -461,15 +461,15 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     return Path(path)
 
 
-def _draw_shares(axes: Any, results: Sequence[CrossValidation]) -> None:
+def _draw_accuracies(axes: Any, results: Sequence[CrossValidation]) -> None:
     figures = [result.as_json() for result in results]
     rows = np.arange(len(results))
     for (kind, name, marker), colour, offset in zip(KINDS, COLOURS, (-0.12, 0.12), strict=False):
-        shares = 100 * np.array([one[f'{kind}_accuracy'] for one in figures])
+        accuracies = 100 * np.array([one[f'{kind}_accuracy'] for one in figures])
         edges = 100 * np.array([one[f'{kind}_accuracy_interval'] for one in figures]).T
-        errors = np.maximum([shares - edges[0], edges[1] - shares], 0.0)
+        errors = np.maximum([accuracies - edges[0], edges[1] - accuracies], 0.0)
         axes.errorbar(
-            shares, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
+            accuracies, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
         )
     axes.set_yticks(rows, [result.recipe for result in results])
     axes.set(xlabel='right (%)', xlim=(None, 101), ylim=(len(results) - 0.5, -0.5))
@@ -532,7 +532,7 @@ SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
         name, StratifiedGroupKFold(int(folds or 5), shuffle=True, random_state=seed)
     ),
     'leave-one-out': lambda name, condition, _seed: _leave_one_out(name, condition),
-    'chronological': lambda name, share, _seed: Split(name, ChronologicalSplit(float(share or 0.75))),
+    'chronological': lambda name, value, _seed: Split(name, ChronologicalSplit(float(value or 0.75))),
     'random': lambda name, splits, seed: Split(
         name, GroupShuffleSplit(int(splits or 20), test_size=TEST_SIZE, random_state=seed)
     ),
@@ -568,7 +568,7 @@ def split_slides(
         splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:
         raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
-    return [apart for train, test in splits for apart in _of_other_slides(dataset, train, test)]
+    return [part for train, test in splits for part in _of_other_slides(dataset, train, test)]
 
 
 def _of_other_slides(
@@ -681,9 +681,9 @@ def cross_validate(
     """
     columns = slide_groups(dataset, groups)
     splits = split_slides(dataset, splitter, columns)
-    asked = {row for _, test in splits for row in test.tolist()}
+    requested = {row for _, test in splits for row in test.tolist()}
     splits = of_trained_surfaces(dataset.labels, splits)
-    untested = asked - {row for _, test in splits for row in test.tolist()}
+    untested = requested - {row for _, test in splits for row in test.tolist()}
     names = dataset.names
     named = [
         (names[train_rows], names[test_rows], _fold_name(number, columns, test_rows))

@@ -258,9 +258,9 @@ def summary(report: EvaluationReport) -> list[str]:
     """Return the figures in lines for people."""
     figures = report.as_json()
     at = [
-        f'{percent(share)} after {seconds} s ({figures["n_slides_at_s"][seconds]} slides)'
-        for seconds, share in figures['accuracy_at_s'].items()
-        if share is not None
+        f'{percent(fraction)} after {seconds} s ({figures["n_slides_at_s"][seconds]} slides)'
+        for seconds, fraction in figures['accuracy_at_s'].items()
+        if fraction is not None
     ]
     early, latency = figures['early'], figures['latency_us']
     lines = [
@@ -301,6 +301,6 @@ def summary(report: EvaluationReport) -> list[str]:
     return [*lines, *report.tare_faults]
 
 
-def percent(share: float | None) -> str:
+def percent(fraction: float | None) -> str:
     """Return a fraction in per cent, or a dash if there is none."""
-    return '–' if share is None else f'{100 * share:.1f} %'
+    return '–' if fraction is None else f'{100 * fraction:.1f} %'

@@ -60,7 +60,7 @@ def window_accuracy(results: Sequence[SlideResult]) -> float:
 def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
     """Return the accuracy of slides after a time of sliding; None if no slide is long enough."""
     decided = [(result.surface, result.after(seconds)) for result in results]
-    return _share([estimate.label == surface for surface, estimate in decided if estimate is not None])
+    return _fraction([estimate.label == surface for surface, estimate in decided if estimate is not None])
 
 
 def unclassified_windows(results: Sequence[SlideResult]) -> float:
@@ -71,7 +71,7 @@ def unclassified_windows(results: Sequence[SlideResult]) -> float:
 def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
     ends = {f'{seconds:.1f}': [result.after(seconds) for result in results] for seconds in TIMES_S}
-    return {key: _share([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
+    return {key: _fraction([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
 
 
 def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
@@ -112,19 +112,19 @@ def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
 
 def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over trained surfaces that were rejected at the end; None without any."""
-    return _share([not result.end.accepted for result in results])
+    return _fraction([not result.end.accepted for result in results])
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over surfaces without training that were accepted; None without any."""
-    return _share([result.end.accepted for result in results])
+    return _fraction([result.end.accepted for result in results])
 
 
 def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides that were accepted but wrong, over any surfaces; None without slides."""
     early = [e.accepted and e.decided and e.label != surface for surface, e in _early_ends(results)]
     final = [result.end.accepted and result.end.label != result.surface for result in results]
-    return {'early': _share(early), 'final': _share(final)}
+    return {'early': _fraction(early), 'final': _fraction(final)}
 
 
 def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
@@ -133,7 +133,7 @@ def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     A slide that is never decided goes on to its end: there its last estimate also counts as early.
     """
     early = [not estimate.accepted for _, estimate in _early_ends(results)]
-    return {'early': _share(early), 'final': _share([not result.end.accepted for result in results])}
+    return {'early': _fraction(early), 'final': _fraction([not result.end.accepted for result in results])}
 
 
 def rejections(results: Sequence[SlideResult]) -> Mapping[str, int]:
@@ -151,7 +151,7 @@ def _early_ends(results: Sequence[SlideResult]) -> list[tuple[str, TextureEstima
     ]
 
 
-def _share(which: Sequence[bool]) -> float | None:
+def _fraction(which: Sequence[bool]) -> float | None:
     return float(np.mean(which)) if which else None
 
 

@@ -173,8 +173,8 @@ def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
         alone = {topic.rpartition('/')[2]: signals for topic, signals in batches.items() if topic.startswith(finger)}
         events = cut_recording(alone, [slide(2.5), lift(2.5)], one_finger.windows)
         expected = next(one_finger.extract(event) for event in events if event.start_ns == received.start_ns)
-        own = [value for name, value in zip(received.names, received.values, strict=True) if name.startswith(finger)]
-        np.testing.assert_allclose(own, expected.values)
+        found = [value for name, value in zip(received.names, received.values, strict=True) if name.startswith(finger)]
+        np.testing.assert_allclose(found, expected.values)
 
 
 def test_a_recipe_that_sees_the_level_warns_of_a_sensor_that_is_not_tared_and_stops_when_it_is():

@@ -330,9 +330,9 @@ def test_shape_has_its_closed_forms():
 
 
 def test_shares_keep_the_sign_and_leave_the_noise_of_free_taxels_out():
-    shares = FEATURES['log_shares']()
+    fractions = FEATURES['log_shares']()
     calm, noisy = (
-        shares(WindowBatch(np.tile([60.0, -40.0, free], (20, 1)), SPATIAL_RATE_HZ))[:, 0] for free in (0.1, -0.1)
+        fractions(WindowBatch(np.tile([60.0, -40.0, free], (20, 1)), SPATIAL_RATE_HZ))[:, 0] for free in (0.1, -0.1)
     )
     np.testing.assert_allclose(calm - calm[2], [np.log(60 / 1.001), -np.log(40 / 1.001), 0.0], rtol=0.01)
     np.testing.assert_allclose(calm, noisy, atol=0.01)

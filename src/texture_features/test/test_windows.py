@@ -153,12 +153,12 @@ def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
 @pytest.mark.parametrize(('begin_s', 'windows'), [(3599.0, 6), (0.0, 6), (7200.0, 0)])
 def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, monkeypatch):
     """Whoever promises an hour for each of thousands of slides shall not make anybody count to 36 000 for each."""
-    asked = []
+    calls = []
     window = SlideCoverage.window
-    monkeypatch.setattr(SlideCoverage, 'window', lambda slide: asked.append(1) or window(slide))
+    monkeypatch.setattr(SlideCoverage, 'window', lambda slide: calls.append(1) or window(slide))
     *cut, end = run({'signal': stream(1.0, begin_s=begin_s)}, [state(0.0, steady_s=3600.0)])
     assert (len(cut), end.skipped) == (windows, 35_996 - windows)
-    assert len(asked) < 50
+    assert len(calls) < 50
 
 
 def test_speed_and_force_are_means_over_the_window():

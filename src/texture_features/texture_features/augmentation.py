@@ -339,8 +339,8 @@ class Augmenter:
 
     def _gain_response(self, window: CutWindow) -> Array:
         topic = self._features.window_names[0]
-        own = window.windows[topic]
-        louder = {**window.windows, topic: dataclasses.replace(own, samples=GAIN_STEP * own.samples)}
+        stretch = window.windows[topic]
+        louder = {**window.windows, topic: dataclasses.replace(stretch, samples=GAIN_STEP * stretch.samples)}
         both = self._features.extract_many([window, dataclasses.replace(window, windows=louder)])
         return (both[1].values - both[0].values) / math.log(GAIN_STEP)
 

@@ -25,7 +25,7 @@ from texture_papers.protocol import (
     MethodResult,
     PaperProtocol,
     RecognitionTask,
-    apart,
+    difference,
     digest_of,
     digest_of_row,
     drawn,
@@ -37,8 +37,8 @@ from texture_papers.protocol import (
     over_seeds,
     recipe_of,
     reduced,
-    share,
     training_in,
+    wilson,
     with_seeds,
 )
 from texture_papers.report import at_least, higher, lower_in, most_errors, seldom
@@ -88,10 +88,10 @@ def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(
 def few_show_the_direction_of_what_is_large(name: str, findings: list[dict[str, Any]]) -> int:
     """Assert that what is large in the stored experiment has its sign in these findings; return how many are large."""
     stored = {one['claim']: one.get('over_seeds', one['interval']) for one in STORED[name]['findings']}
-    large, border = 0, LARGE_GRADES if name == 'roughness' else LARGE
+    large, limit = 0, LARGE_GRADES if name == 'roughness' else LARGE
     for finding in findings:
         value, low, high = stored[finding['claim']]
-        if min(abs(low), abs(high)) > border and low * high > 0:
+        if min(abs(low), abs(high)) > limit and low * high > 0:
             assert finding['interval'][0] * value > 0, finding['claim']
             large += 1
     return large
@@ -142,15 +142,15 @@ def test_two_directions_are_joined_into_one_vector_with_components_of_their_own(
     halves_of = [slides.extract(recipe.feature_set, task.methods[place].views)[0] for place, recipe in
                  ((1, x_only), (2, y_only))]  # fmt: skip
     np.testing.assert_array_equal(values, np.concatenate(halves_of, axis=1))
-    kept = [recipe.learner.fit(own, slides.codes, owner).parameters['components'].shape[1]
-            for recipe, own in ((both, values), (x_only, halves_of[0]), (y_only, halves_of[1]))]  # fmt: skip
+    kept = [recipe.learner.fit(columns, slides.codes, owner).parameters['components'].shape[1]
+            for recipe, columns in ((both, values), (x_only, halves_of[0]), (y_only, halves_of[1]))]  # fmt: skip
     assert kept[0] == kept[1] + kept[2]  # the paper: 39 and 39 make 78
 
 
 def test_every_paper_figure_is_a_share() -> None:
     methods = [method for paper in PROTOCOLS.values() for task in paper.tasks for method in task.methods]
-    shares = [value for one in methods for value in (one.paper.learning, one.paper.test, one.paper.unclassified)]
-    assert all(0 <= value <= 1 for value in shares if value is not None)
+    fractions = [value for one in methods for value in (one.paper.learning, one.paper.test, one.paper.unclassified)]
+    assert all(0 <= value <= 1 for value in fractions if value is not None)
 
 
 def test_divisions_keep_to_the_papers_split() -> None:
@@ -191,11 +191,11 @@ def test_a_claim_holds_only_if_the_interval_says_so() -> None:
 
 
 def test_intervals_are_those_of_the_textbook() -> None:
-    wilson = share(np.r_[np.ones(8), np.zeros(2)])  # 8 of 10: 0.490 to 0.943
-    assert (wilson.low, wilson.high) == (pytest.approx(0.490, abs=1e-3), pytest.approx(0.943, abs=1e-3))
+    eight = wilson(np.r_[np.ones(8), np.zeros(2)])  # 8 of 10: 0.490 to 0.943
+    assert (eight.low, eight.high) == (pytest.approx(0.490, abs=1e-3), pytest.approx(0.943, abs=1e-3))
     values = np.array([1.0, 2.0, 3.0, 4.0])
     assert mean(values).high - 2.5 == pytest.approx(1.96 * values.std(ddof=1) / 2, rel=1e-3)
-    assert apart(values, values).value == 0
+    assert difference(values, values).value == 0
 
 
 @pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=PROTOCOLS)
@@ -350,15 +350,15 @@ ANCHORED = {name: one for name, one in PROTOCOLS.items() if one.anchor}
 
 @pytest.mark.parametrize('protocol', ANCHORED.values(), ids=ANCHORED)
 def test_the_figure_that_set_a_scene_is_no_finding(protocol: PaperProtocol, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[MethodResult, float]] = []
+    calls: list[tuple[MethodResult, float]] = []
 
-    def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
-        asked.append((outcome, border))
-        return report.at_least(claim, outcome, border)
+    def at_least(claim: str, outcome: MethodResult, limit: float) -> Finding:
+        calls.append((outcome, limit))
+        return report.at_least(claim, outcome, limit)
 
     module = importlib.import_module(protocol.findings.__module__)
     monkeypatch.setattr(module, 'at_least', at_least, raising=False)
     results, anchor = guessed(protocol), protocol.anchor
     assert protocol.findings(results)
     anchored = results.get((anchor.task, anchor.method))
-    assert not [border for outcome, border in asked if outcome is anchored and border == anchor.test]
+    assert not [limit for outcome, limit in calls if outcome is anchored and limit == anchor.test]

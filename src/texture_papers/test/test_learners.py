@@ -282,8 +282,8 @@ def test_components_of_examples_less_their_own_means_are_those_of_eq_7():
     parameters = SvmMaxWins(variance=0.9).fit(values, codes, np.arange(40)).parameters
     centred = values - values.mean(axis=1, keepdims=True)  # eq. 7: the mean over k of x_i(k)
     variances, vectors = np.linalg.eigh(centred.T @ centred / 40)  # eq. 8
-    shares = np.cumsum(variances[::-1]) / variances.sum()  # eq. 10
-    count = int((shares < 0.9).sum()) + 1
+    fractions = np.cumsum(variances[::-1]) / variances.sum()  # eq. 10
+    count = int((fractions < 0.9).sum()) + 1
     assert parameters['components'].shape == (6, count)
     projected = values @ parameters['components']
     np.testing.assert_allclose(np.abs(projected), np.abs(centred @ vectors[:, ::-1][:, :count]), atol=1e-9)

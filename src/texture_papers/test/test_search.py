@@ -107,12 +107,12 @@ def test_the_same_seed_finds_the_same_and_its_scores_are_those_of_training() -> 
     assert first == second
     recipe = varied(base, first.individual)
     values, codes = scans.values(recipe), np.unique(scans.labels, return_inverse=True)[1]
-    shares = []
+    fractions = []
     for half in random_halves(scans.labels, SMALL.halves, SMALL.seed):
         fitted = recipe.learner.fit(values[half], codes[half], np.arange(half.sum()))
         right = recipe.learner.predictor(fitted.parameters)(values).argmax(axis=1) == codes
-        shares.append((right[half].mean(), right[~half].mean()))
-    assert (first.learning, first.test) == pytest.approx(tuple(np.mean(shares, axis=0)), abs=1e-4)
+        fractions.append((right[half].mean(), right[~half].mean()))
+    assert (first.learning, first.test) == pytest.approx(tuple(np.mean(fractions, axis=0)), abs=1e-4)
 
 
 @pytest.mark.parametrize(('box', 'scale'), [(1.0, 3.0), (10.0, 0.5), (0.01, 100.0)])

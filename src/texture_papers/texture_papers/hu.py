@@ -162,7 +162,7 @@ class SvmMaxWins:
         return np.concatenate(found, axis=1)
 
 
-def principal_components(centred: Array, share: float, wanted: int = 0) -> Array:
+def principal_components(centred: Array, fraction: float, wanted: int = 0) -> Array:
     """Return the fewest components, (n_features, n_components), that explain a fraction of the variance, or `wanted`.
 
     Source: Hu et al. 2014, eq. 7 to 12.
@@ -176,6 +176,6 @@ def principal_components(centred: Array, share: float, wanted: int = 0) -> Array
     if total <= 0.0:
         return np.eye(n_features, 1)
     explained = np.cumsum(variances) / total
-    count = wanted or int(np.searchsorted(explained, share - TINY)) + 1
+    count = wanted or int(np.searchsorted(explained, fraction - TINY)) + 1
     kept = vectors[:, : min(count, int((variances > TINY * variances[0]).sum()))]
     return np.asarray(centred.T @ kept / np.sqrt(variances[: kept.shape[1]]) if wide else kept)

@@ -352,7 +352,7 @@ class EmMixture:
         clusters, names = unpacked(parameters['packed']), parameters['names']
 
         def predict(X: Array) -> Array:
-            shares = clusters.predict_proba(X.reshape(-1, X.shape[-1]))
-            return log_softmax(np.log(shares @ names + LEAST)).reshape(*X.shape[:-1], -1)
+            proba = clusters.predict_proba(X.reshape(-1, X.shape[-1]))
+            return log_softmax(np.log(proba @ names + LEAST)).reshape(*X.shape[:-1], -1)
 
         return predict

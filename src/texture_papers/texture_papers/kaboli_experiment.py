@@ -27,8 +27,8 @@ from texture_papers.protocol import (
     mean,
     recipe_of,
     reduced,
-    share,
     training_in,
+    wilson,
 )
 from texture_papers.report import at_least, built_in, digests, higher, kept_in, most_errors, right_of
 from texture_papers.slides import Mask, View, Visits, gather
@@ -85,11 +85,11 @@ def findings(outcomes: MethodResults) -> list[Finding]:
 
 def _on_average(claim: str, outcome: MethodResult) -> Finding:
     """Check that the mean of the three sets reaches the paper's."""
-    shares = [mean(right_of(outcome, surfaces)) for surfaces in SURFACES]
-    centre = sum(one.value for one in shares) / len(shares)
-    reach = max(one.high - one.value for one in shares)  # the sets share their slides
+    accuracies = [mean(right_of(outcome, surfaces)) for surfaces in SURFACES]
+    centre = sum(one.value for one in accuracies) / len(accuracies)
+    reach = max(one.high - one.value for one in accuracies)  # the sets share their slides
     over = Interval(centre, centre - reach, centre + reach).less(PAPER_PA)
-    named = ', '.join(f'{task} {100 * one.value:.1f}' for task, one in zip(TASKS, shares, strict=True))
+    named = ', '.join(f'{task} {100 * one.value:.1f}' for task, one in zip(TASKS, accuracies, strict=True))
     return Finding(claim, f'{100 * centre:.1f} % ({named})', over)
 
 
@@ -216,7 +216,7 @@ def run_online(experiment: Experiment) -> ExperimentResult:
     rows = [np.flatnonzero(trained & (y == code)) for code in range(OLD, OLD + NEW)]
     figures, taken_s = {'none': _right(learner, parameters, X, y, ~trained)}, []
     for given in range(min(map(len, rows))):
-        for row in (own[given] for own in rows):
+        for row in (of_kind[given] for of_kind in rows):
             began = time.perf_counter()
             parameters = learner.partial_fit(parameters, X[[row]], int(y[row]))
             taken_s.append(time.perf_counter() - began)
@@ -248,7 +248,7 @@ def _right(learner: Any, parameters: Mapping[str, Any], X: Array, y: Codes, test
     right = (learner.predictor(parameters)(X).argmax(axis=1) == y).astype(np.float64)
     known = len(parameters['planes'])
     kinds = {'old objects': tested & (y < OLD), 'new objects': tested & (y >= OLD)}
-    return {kind: share(right[rows]) for kind, rows in kinds.items() if known > OLD or kind == 'old objects'}
+    return {kind: wilson(right[rows]) for kind, rows in kinds.items() if known > OLD or kind == 'old objects'}
 
 
 def online_digests() -> dict[str, str]:

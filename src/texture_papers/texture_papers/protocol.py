@@ -56,16 +56,16 @@ class Interval:
             return True
         return False if self.high < 0.0 else None
 
-    def less(self, border: float) -> Interval:
+    def less(self, limit: float) -> Interval:
         """Return how much the figure is above a limit."""
-        return Interval(self.value - border, self.low - border, self.high - border)
+        return Interval(self.value - limit, self.low - limit, self.high - limit)
 
     def as_json(self) -> list[float]:
         """Return value, low and high, rounded."""
         return [round(self.value, 4), round(self.low, 4), round(self.high, 4)]
 
 
-def share(right: Array) -> Interval:
+def wilson(right: Array) -> Interval:
     """Return the accuracy of slides (Wilson's interval)."""
     n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
@@ -81,7 +81,7 @@ def mean(values: Array) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
-def apart(first: Array, second: Array) -> Interval:
+def difference(first: Array, second: Array) -> Interval:
     """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,)."""
     centre = float(np.mean(first) - np.mean(second))
     reach = NORMAL_95 * math.sqrt(_uncertainty(first) + _uncertainty(second))
@@ -117,7 +117,7 @@ class MethodResult:
     @property
     def test(self) -> Interval:
         """Accuracy on the held-out slides."""
-        return share(self.right())
+        return wilson(self.right())
 
     @property
     def unclassified(self) -> float:
@@ -129,8 +129,8 @@ class MethodResult:
         """Fraction of the test slides of each surface (row) with each label, or unclassified (last)."""
         n = len(self.surfaces)
         table = np.zeros((n, n + 1))
-        true, said = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
-        np.add.at(table, (true, np.where(said == UNDECIDED, n, said)), 1.0)
+        true, got = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
+        np.add.at(table, (true, np.where(got == UNDECIDED, n, got)), 1.0)
         return table / np.maximum(table.sum(axis=1, keepdims=True), 1.0)
 
     def right(self, of: NDArray[np.bool_] | None = None) -> Array:
@@ -289,9 +289,9 @@ def folds(count: int, repeats: int) -> Splitter:
     return _of(splitter)
 
 
-def drawn(share: float, count: int) -> Splitter:
+def drawn(fraction: float, count: int) -> Splitter:
     """Return what draws this fraction of all slides for training, whatever their surface."""
-    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=share, random_state=seed))
+    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=fraction, random_state=seed))
 
 
 def training_in(condition: str) -> Splitter:
@@ -375,7 +375,7 @@ Run = Callable[[Experiment], ExperimentResult]
 DECISIVE_OF_TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
 # Values with which a parameter of evidence rule or learner changes nothing: stored digests are older than it.
 NEUTRAL = {'late_weight': 1.0, 'passes': 1}
-OWN_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
+SUITE_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
 
 
 def digest_of(recipe: str) -> str:
@@ -387,7 +387,7 @@ def digest_of(recipe: str) -> str:
         definition = load_recipe(recipe).as_mapping()
     except UnknownName:
         definition = load_roughness_recipe(recipe).as_mapping()
-    text = OWN_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
+    text = SUITE_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
     return hash_of(json.loads(text))
 
 
@@ -578,10 +578,10 @@ def searched(protocol: PaperProtocol, experiment: Experiment) -> TunedRecipes:
     wanted = list(pair_searches(protocol, experiment))
     tuned = {}
     for key, recipe in recipes.items():
-        own = [one for one in wanted if (one.task, one.method) == key]
+        group = [one for one in wanted if (one.task, one.method) == key]
         task = next(one for one in protocol.tasks if one.name == key[0])
         scans = len(_training_scans(protocol, task, experiment.seed, quick=experiment.quick).labels)
-        tuned[key] = tuned_pairs(recipe, own[0].params, {one.pair: experiment.found[one] for one in own}, scans)
+        tuned[key] = tuned_pairs(recipe, group[0].params, {one.pair: experiment.found[one] for one in group}, scans)
     return tuned
 
 
@@ -624,9 +624,9 @@ def evaluate_method(
     """Learn from the slides of each split and evaluate all; `more` are features of each slide, (n_slides, n)."""
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     trained, owner = slides.extract(to_learn, views)
-    asked, slide = slides.extract(recipe.feature_set, views)
+    tested_values, slide = slides.extract(recipe.feature_set, views)
     if more is not None:
-        trained, asked = np.hstack((trained, more[owner])), np.hstack((asked, more[slide]))
+        trained, tested_values = np.hstack((trained, more[owner])), np.hstack((tested_values, more[slide]))
     learner = of_examples(recipe.learner, slides.names(to_learn, views), slides.surfaces)
     windows = recipe.feature_set.windows
     rows_of = trained_on[:, owner] if training == BY_SPLIT else np.ones((1, len(owner)), dtype=bool)
@@ -635,7 +635,7 @@ def evaluate_method(
     for number, rows in enumerate(rows_of):
         predictor = fitted_predictor(learner, trained[rows], slides.codes[owner[rows]], owner[rows])
         decided[number] = decided_by_slide(
-            predictor(asked), len(slides.codes), recipe.evidence, windows.hop_s / windows.length_s
+            predictor(tested_values), len(slides.codes), recipe.evidence, windows.hop_s / windows.length_s
         )
     taken_s = (time.perf_counter() - began) / len(rows_of)
     known = trained_on if training == BY_SPLIT else np.zeros(decided.shape, dtype=bool)
@@ -692,7 +692,7 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
     for task, methods in numbers.get('tasks', {}).items():
         for method, figures in methods.items():
             same = [run['tasks'][task][method] for run in runs]
-            _add(figures, [one['test'][0] for one in same], share=True)
+            _add(figures, [one['test'][0] for one in same], fraction=True)
             figures['means'] = {
                 key: mean_over_seeds([one[key] for one in same]).as_json()
                 for key in ('learning', 'unclassified')
@@ -700,7 +700,7 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
             }
             for kind in ('conditions', 'sets'):
                 for name, part in figures.get(kind, {}).items():
-                    _add(part, [one[kind][name]['test'][0] for one in same], share=True)
+                    _add(part, [one[kind][name]['test'][0] for one in same], fraction=True)
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
             of_seeds = [run['regressors'][regressor] for run in runs]
@@ -740,9 +740,9 @@ def mean_over_seeds(values: Sequence[float]) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
-def _add(figures: dict[str, Any], found: Sequence[float], *, share: bool = False) -> None:
+def _add(figures: dict[str, Any], found: Sequence[float], *, fraction: bool = False) -> None:
     """Add values and interval of the seeds, which is cut to the range of fractions."""
     if len(found) > 1:
         figures['by_seed'] = list(found)
         interval = mean_over_seeds(found).as_json()
-        figures['over_seeds'] = [min(max(value, 0.0), 1.0) for value in interval] if share else interval
+        figures['over_seeds'] = [min(max(value, 0.0), 1.0) for value in interval] if fraction else interval

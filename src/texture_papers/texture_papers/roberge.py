@@ -308,9 +308,9 @@ def _step(network: Network, values: Array, targets: Array, damping: float) -> tu
     error = float(residual @ residual) / len(residual)
     slope = slope_of(residual)
     diagonal = np.diag_indices_from(curvature)
-    own = curvature[diagonal]
+    undamped = curvature[diagonal]
     while damping <= MAX_DAMPING:
-        curvature[diagonal] = own + damping
+        curvature[diagonal] = undamped + damping
         solved: Array = np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64)
         stepped = network.moved(step_of(solved))
         if _error(stepped, values, targets) < error:
@@ -393,11 +393,11 @@ def fitted_predictor(learner: Any, X: Array, y: Codes, groups: Codes) -> Predict
     return cast(Predictor, learner.predictor(learner.fit(X, y, groups).parameters))
 
 
-def decided_by_slide(scores: Array, n_slides: int, rule: EvidenceRule, hop_share: float) -> Codes:
+def decided_by_slide(scores: Array, n_slides: int, rule: EvidenceRule, hop_ratio: float) -> Codes:
     """Return the label of each slide by all its windows, (n_slides,) of (n_slides · n_windows, n_labels)."""
     n_labels = scores.shape[1]
     evidence = rule.window_evidence(log_softmax(scores)).reshape(n_slides, -1, n_labels).swapaxes(0, 1)
-    means, counts = followed(rule, evidence.reshape(len(evidence), -1), min(hop_share, 1.0))
+    means, counts = followed(rule, evidence.reshape(len(evidence), -1), min(hop_ratio, 1.0))
     posterior = rule.log_posterior(means[-1].reshape(n_slides, n_labels), counts[-1], 1.0)
     decided: Codes = posterior.argmax(axis=1)
     decided[(posterior == posterior.max(axis=1, keepdims=True)).sum(axis=1) > 1] = UNDECIDED
@@ -647,9 +647,9 @@ class TunedPairs:
 
     def _columns(self, pair: TunedPair) -> Codes:
         """Return the numbers of the features that a pair sees."""
-        own = tuple(f'{topic}/' for topic in pair.inputs)
-        columns = np.flatnonzero([name.startswith(own) for name in self.names]) if own else np.arange(len(self.names))
-        for topic in own:
+        prefixes = tuple(f'{topic}/' for topic in pair.inputs)
+        columns = np.flatnonzero([not prefixes or name.startswith(prefixes) for name in self.names])
+        for topic in prefixes:
             if not any(name.startswith(topic) for name in self.names):
                 known = ', '.join(dict.fromkeys(name.split('/')[0] for name in self.names))
                 raise InvalidParameter(

@@ -20,7 +20,7 @@ from texture_papers.protocol import (
     MethodResults,
     PaperProtocol,
     RecognitionTask,
-    apart,
+    difference,
     evaluate_method,
     halves,
     hash_of,
@@ -136,7 +136,7 @@ def circular_findings(outcomes: MethodResults) -> list[Finding]:
         Finding(
             'fewer slides of a circle are unclassified, SVM (5.2 to 13.4 %)',
             f'{100 * circle_svm.unclassified:.1f} against {100 * line_svm.unclassified:.1f} %',
-            apart(line_svm.nothing(), circle_svm.nothing()),
+            difference(line_svm.nothing(), circle_svm.nothing()),
         ),
         *built_in(
             'which textures are alike was chosen',

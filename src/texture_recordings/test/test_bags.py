@@ -206,9 +206,9 @@ os.kill(os.getpid(), signal.SIGKILL)
 @pytest.mark.parametrize('most_bytes', [10**9, 40_000], ids=['killed', 'disk full'])
 def test_a_recording_that_was_cut_off_is_read_up_to_its_last_chunk(tmp_path: Path, most_bytes: int) -> None:
     command = [sys.executable, '-c', WRITER, str(tmp_path / 'bag'), str(most_bytes)]
-    said = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False).stdout.split()
+    printed = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False).stdout.split()
     read = [value.first_sample for _, _, value in read_bag(tmp_path / 'bag')]
-    assert read == [100 * number for number in range(int(said[-1]))]
+    assert read == [100 * number for number in range(int(printed[-1]))]
     assert (len(read) == 100) == (most_bytes > 40_000)
     assert find_bags([tmp_path]) == [tmp_path / 'bag']
 

@@ -96,8 +96,8 @@ def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_o
     with recording(tmp_path) as (graph, reports, record, sensor):
         graph.until(lambda: recorded(reports) > 300 or record.poll() is not None or sensor.poll() is not None)
         assert not ended(reports)
-    said = '\n'.join(log.read_text() for log in tmp_path.glob('*.log'))
-    assert (record.returncode, sensor.returncode) == (0, 0), said
+    logs = '\n'.join(log.read_text() for log in tmp_path.glob('*.log'))
+    assert (record.returncode, sensor.returncode) == (0, 0), logs
     assert samples_in_order(tmp_path / 'bag') > 300
 
 

@@ -261,11 +261,11 @@ def message_types(connection: Connection | None = None) -> Typestore:
     """Return message types by the definition that a bag stores for a connection, else those of ROS 2 and of sound."""
     definition = connection.msgdef if connection else None
     if connection and definition and definition.format is MessageDefinitionFormat.MSG:
-        own = get_typestore(Stores.EMPTY)
+        typestore = get_typestore(Stores.EMPTY)
         parsed = get_types_from_msg(definition.data, connection.msgtype)
         # Constants and defaults are left out: of a file nothing but names, as the grammar allows them, becomes code.
-        own.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
-        return own
+        typestore.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
+        return typestore
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, text in AUDIO.items():
         store.register(get_types_from_msg(text, name))
@@ -491,9 +491,9 @@ def _read(
         for file in files:
             open_regular(file, None).close()
         with Reader(checked) as reader:
-            own = reader.connections if foreign else connections_below(path, reader.connections, namespace)
+            candidates = reader.connections if foreign else connections_below(path, reader.connections, namespace)
             names = topic_names(c.topic for c in reader.connections if c.msgtype in MESSAGES)
-            connections = [c for c in own if chosen(c, names.get(c.topic, c.topic))]
+            connections = [c for c in candidates if chosen(c, names.get(c.topic, c.topic))]
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)

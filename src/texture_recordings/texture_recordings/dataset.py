@@ -339,8 +339,8 @@ class SlideDataset:
             raise InvalidData(f"slide '{cut.name}' in '{cut.bag}' {why}; cut whole slides with their states")
         runs: dict[str, list[Stretch]] = {}
         for surface in dict.fromkeys(slide.surface for slide in self.slides):
-            own = [slide for slide in self.slides if slide.surface == surface]
-            runs |= {slide.name: found for slide, found in zip(own, stretches(own, count), strict=True)}
+            of_surface = [slide for slide in self.slides if slide.surface == surface]
+            runs |= {slide.name: found for slide, found in zip(of_surface, stretches(of_surface, count), strict=True)}
         return SlideDataset(
             tuple(
                 part_of(slide, begin_ns, end_ns, f'{cell + 1}/{count}')
@@ -545,8 +545,8 @@ def _grouped(values: Array, *, circular: bool) -> Array:
     """Return the rounded mean of the group of each value, (n,): groups end where neighbours in order differ."""
     order = np.argsort(values, kind='stable')
     ordered = values[order]
-    apart = np.diff(ordered) > (SAME_RAD if circular else (SAME_RATIO - 1.0) * np.abs(ordered[:-1]))
-    group = np.concatenate(([0], np.cumsum(apart)))
+    starts_group = np.diff(ordered) > (SAME_RAD if circular else (SAME_RATIO - 1.0) * np.abs(ordered[:-1]))
+    group = np.concatenate(([0], np.cumsum(starts_group)))
     if circular and group[-1] and ordered[0] + math.tau - ordered[-1] <= SAME_RAD:  # -π is π
         ordered = np.where(group == group[-1], ordered - math.tau, ordered)
         group[group == group[-1]] = 0

@@ -412,9 +412,9 @@ def evenly(samples: Array, duration_s: float) -> Array:
 
     if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
         raise ValueError(f'{len(samples)} samples lasted {duration_s:g} s, at {RATE_HZ:g} Hz')
-    own = np.linspace(0.0, duration_s, len(samples))
+    sample_times = np.linspace(0.0, duration_s, len(samples))
     grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
-    values: Array = CubicSpline(own, samples, axis=0)(grid)
+    values: Array = CubicSpline(sample_times, samples, axis=0)(grid)
     return values
 
 
@@ -428,13 +428,13 @@ def evenly(samples: Array, duration_s: float) -> Array:
 # speed in m/s; at 50 Hz that is a way of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
 
 NOMINAL_HZ = 50.0
-FREE_SHARE = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact
+FREE_FRACTION = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact
 
 
 def _fingersense_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
     _, force_n, speed_mm_s, _ = order
     load = recorded.mean(axis=1)
-    touching = np.flatnonzero(load > FREE_SHARE * np.quantile(load, 0.9))
+    touching = np.flatnonzero(load > FREE_FRACTION * np.quantile(load, 0.9))
     steady = range(int(touching[0]), int(touching[-1]) + 1) if len(touching) else None
     return SteadySlide(recorded, abs(speed_mm_s) / 1000.0, force_n, math.copysign(math.pi / 2, speed_mm_s), steady)
 

@@ -270,10 +270,10 @@ def find_slides(
     paths = find_bags(bags)
     labelled = []
     for path in progress(paths, 'read bags', len(paths)):
-        own = _slides_of(path, namespace, topics)
-        if not own and len(paths) > 1:
+        slides_of_bag = _slides_of(path, namespace, topics)
+        if not slides_of_bag and len(paths) > 1:
             logging.getLogger(__name__).warning("the bag '%s' has no labelled slide, so nothing is taken from it", path)
-        labelled += own
+        labelled += slides_of_bag
     if not labelled:
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
@@ -398,18 +398,18 @@ def _ways(slides: Sequence[LabelledSlide], grids: Sequence[AnyArray]) -> tuple[l
     """Return how far along the path of their surface slides were at the times of grids, and where the path lies."""
     stamps = [np.array([state.stamp_ns for state in slide.sliding]) for slide in slides]
     points = [np.array([(state.x_m, state.y_m) for state in slide.sliding]) for slide in slides]
-    if all(np.isfinite(own).all() for own in points) and len({s.frame_id for x in slides for s in x.sliding}) == 1:
+    if all(np.isfinite(xyz).all() for xyz in points) and len({s.frame_id for x in slides for s in x.sliding}) == 1:
         together = np.concatenate(points)
         axis = np.linalg.svd(together - together.mean(axis=0), full_matrices=False)[2][0]
-        ways = [np.interp(grid, at, own @ axis) for grid, at, own in zip(grids, stamps, points, strict=True)]
+        ways = [np.interp(grid, at, xyz @ axis) for grid, at, xyz in zip(grids, stamps, points, strict=True)]
         return ways, min(map(np.min, ways)), max(map(np.max, ways))
     # Without positions all slides of a surface are taken to run over one track, from one end of it or the other.
     speeds = [np.array([state.speed_m_s for state in slide.sliding]) for slide in slides]
-    if not all(np.isfinite(own).all() for own in speeds):
-        speeds = [np.ones(len(own)) for own in speeds]
+    if not all(np.isfinite(speed).all() for speed in speeds):
+        speeds = [np.ones(len(speed)) for speed in speeds]
     ways = [
-        np.cumsum(np.r_[0.0, np.interp(grid, at, own)[:-1]]) * (STEP_NS / NANOSECONDS)
-        for grid, at, own in zip(grids, stamps, speeds, strict=True)
+        np.cumsum(np.r_[0.0, np.interp(grid, at, speed)[:-1]]) * (STEP_NS / NANOSECONDS)
+        for grid, at, speed in zip(grids, stamps, speeds, strict=True)
     ]
     length = float(np.median([way[-1] for way in ways]))
     turned = [math.cos(slide.direction_rad - slides[0].direction_rad) < 0.0 for slide in slides]  # NaN is not turned

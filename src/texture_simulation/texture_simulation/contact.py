@@ -82,11 +82,11 @@ class SkinContact:
         return placed
 
     def variation_n(
-        self, placed: Trajectory, own_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
+        self, placed: Trajectory, skin_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
     ) -> Array:
         """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air."""
         if not len(placed):
-            return np.empty((*placed.x_m.shape[:-1], *np.shape(own_blur_m)[:-1], 0))
+            return np.empty((*placed.x_m.shape[:-1], *np.shape(skin_blur_m)[:-1], 0))
         force_n = constant(placed.force_n)
         blur_m, gain = self._blur_and_stiffness(force_n)
         blur_m = np.maximum(blur_m, MIN_BLUR_PER_STEP * self._steps_m(placed))
@@ -95,7 +95,7 @@ class SkinContact:
         x_m, y_m = placed.x_m, placed.y_m
         if offset_m is not None:
             x_m, y_m = x_m[..., None, :] + offset_m[0], y_m[..., None, :] + offset_m[1]
-            blur_m, gain = np.hypot(blur_m[..., None, :], own_blur_m), gain[..., None, :]
+            blur_m, gain = np.hypot(blur_m[..., None, :], skin_blur_m), gain[..., None, :]
         variation_n = gain * self._surface.height_m(x_m, y_m, blur_m)
         drag = self._drag  # may be replaced from another thread, where a sample is swapped
         if drag:
@@ -133,7 +133,7 @@ class SkinContact:
         return x_m, y_m
 
     @property
-    def patch_share(self) -> float:
+    def patch_ratio(self) -> float:
         """How much smaller than on a plane the contact is, at most 1."""
         return self._contact.on(self._surface.shape.radius_m)
 
@@ -144,9 +144,9 @@ class SkinContact:
 
     def _blur_and_stiffness(self, force_n: Array) -> tuple[Array, Array]:
         """Return blur and stiffness at forces."""
-        share = self.patch_share
-        blur_m: Array = share * self._contact.blur_m * np.ones_like(force_n)
-        stiffness: Array = share * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
+        ratio = self.patch_ratio
+        blur_m: Array = ratio * self._contact.blur_m * np.ones_like(force_n)
+        stiffness: Array = ratio * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
         for growth in self._blur_growths:
             blur_m = blur_m * growth(force_n)
         for growth in self._gain_growths:

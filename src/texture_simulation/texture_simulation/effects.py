@@ -217,7 +217,7 @@ def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array
 # --------------------
 # A robot is not quite as fast and does not press quite as hard as it should.
 
-MIN_SHARE = 0.05  # of what was wanted
+MIN_FRACTION = 0.05  # of what was wanted
 
 
 @dataclass(frozen=True)
@@ -230,8 +230,8 @@ class SlideError:
     def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return speed and force as they become, of the same shape."""
         return (
-            speed_m_s * np.maximum(MIN_SHARE, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
-            force_n * np.maximum(MIN_SHARE, 1 + self.force * rng.standard_normal(force_n.shape)),
+            speed_m_s * np.maximum(MIN_FRACTION, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
+            force_n * np.maximum(MIN_FRACTION, 1 + self.force * rng.standard_normal(force_n.shape)),
         )
 
 

@@ -241,8 +241,8 @@ def _one(
     stretch, slip, bend = start
     states: list[State] = []
     note = states.append
-    for speed, force, share in zip(speed_m_s, force_n, kept, strict=True):
-        stretch, slip, bend = state = step(stretch, slip, bend * share, speed, force)
+    for speed, force, fraction in zip(speed_m_s, force_n, kept, strict=True):
+        stretch, slip, bend = state = step(stretch, slip, bend * fraction, speed, force)
         note(state)
     return states
 
@@ -253,8 +253,8 @@ def _many(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array)
     stretch, slip, bend = (np.array(np.broadcast_to(value, shape), dtype=np.float64) for value in start)
     states = np.empty((3, speed_m_s.shape[-1], *shape))
     drives = (np.ascontiguousarray(np.moveaxis(values, -1, 0)) for values in (speed_m_s, force_n, kept))
-    for i, (speed, force, share) in enumerate(zip(*drives, strict=True)):
-        stretch, slip, bend = states[:, i] = step(stretch, slip, bend * share, speed, force)
+    for i, (speed, force, fraction) in enumerate(zip(*drives, strict=True)):
+        stretch, slip, bend = states[:, i] = step(stretch, slip, bend * fraction, speed, force)
     return Tip(*np.moveaxis(states, 1, -1))
 
 
@@ -268,8 +268,8 @@ def coefficient(friction: Stribeck, speed_m_s: Array) -> Array:
     kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
     Source: Bo & Pavelescu 1982; Armstrong-Hélouvry et al. 1994.
     """
-    share: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
-    return friction.kinetic + (friction.static - friction.kinetic) * share
+    fraction: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
+    return friction.kinetic + (friction.static - friction.kinetic) * fraction
 
 
 def steady_force_n(friction: Stribeck, speed_m_s: Array, force_n: float) -> Array:
@@ -350,8 +350,8 @@ class TipDrag:
         if self._substeps == 1:
             return values
         known = np.concatenate([before, values[..., :-1]], axis=-1)[..., None]
-        shares = np.arange(1, self._substeps + 1) / self._substeps
-        steps: Array = known + (values[..., None] - known) * shares
+        fractions = np.arange(1, self._substeps + 1) / self._substeps
+        steps: Array = known + (values[..., None] - known) * fractions
         return steps.reshape(*values.shape[:-1], -1)
 
 

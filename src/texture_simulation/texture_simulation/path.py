@@ -69,9 +69,9 @@ def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_
     values = field(x_m.take(knots, axis=-1), y_m.take(knots, axis=-1))
     points = np.arange(n_points)
     left = np.minimum(points // every, len(knots) - 2)
-    share = (points - knots[left]) / (knots[left + 1] - knots[left])
+    fraction = (points - knots[left]) / (knots[left + 1] - knots[left])
     rise = np.diff(values)
-    return np.asarray(values.take(left, axis=-1) + rise.take(left, axis=-1) * share)
+    return np.asarray(values.take(left, axis=-1) + rise.take(left, axis=-1) * fraction)
 
 
 # --------------------
@@ -100,8 +100,8 @@ class Trajectory:
 
 def straight(start: tuple[float, float, float], end: tuple[float, float, float], n_points: int) -> Trajectory:
     """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included."""
-    shares = np.arange(1, n_points + 1) / n_points
-    return Trajectory(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
+    fractions = np.arange(1, n_points + 1) / n_points
+    return Trajectory(*(first + (last - first) * fractions for first, last in zip(start, end, strict=True)))
 
 
 def before_first(path: Trajectory) -> tuple[Array, Array]:

@@ -232,7 +232,7 @@ class BioTacModel(SensorModel):
     def _electrodes(self, at: Trajectory) -> Array:
         """Return the electrodes at each frame, (..., n_electrodes, n_frames) counts: low where the load is."""
         force_n = at.force_n[..., None, :]
-        radius_m = self.touch.patch_share * BIOTAC_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
+        radius_m = self.touch.patch_ratio * BIOTAC_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
         x_m, y_m = (
             np.asarray(centre)[..., None, :] if np.ndim(centre) else centre for centre in self.touch.centre_m(at)
         )
@@ -350,8 +350,8 @@ class PressedElements:
         self._offset_m = x_m[:, None], y_m[:, None]
         self._blur_m = np.full((len(x_m), 1), blur_m)
         self._rate_hz = rate_hz
-        share = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
-        self._share = (share / share.sum())[:, None]
+        fraction = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
+        self._fraction = (fraction / fraction.sum())[:, None]
         self._coupling: Array = np.eye(3) + CROSSTALK * made.standard_normal((len(x_m), 3, 3))
         self._before: tuple[Array, Array] | None = None
 
@@ -359,7 +359,7 @@ class PressedElements:
         """Return the force that each element senses along the next points of a path."""
         placed = touch.placed(path)
         pressed_n = placed.force_n[..., None, :] + touch.variation_n(placed, self._blur_m, self._offset_m)
-        normal_n = self._share * pressed_n
+        normal_n = self._fraction * pressed_n
         x, y = self._drag_directions(placed)
         forces_n = np.stack([x[..., None, :] * normal_n, y[..., None, :] * normal_n, normal_n], axis=-2)
         return np.asarray(self._coupling @ forces_n)
@@ -570,7 +570,7 @@ class Tsf85Model(SensorModel):
     def _images(self, placed: Trajectory) -> Samples:
         at = placed.at(self._image_points(len(placed)))
         texture_n = self.touch.static_variation_n(at, TAXEL_BLUR_M, (self._taxel_x_m, self._taxel_y_m))
-        pressed_n = self._shares(at.force_n) * (at.force_n[..., None, :] + texture_n)
+        pressed_n = self._fractions(at.force_n) * (at.force_n[..., None, :] + texture_n)
         return self._baseline + STATIC_COUNTS_PER_N * np.swapaxes(pressed_n, -1, -2)
 
     def _image_points(self, n_points: int) -> NDArray[np.intp]:
@@ -587,7 +587,7 @@ class Tsf85Model(SensorModel):
         """Return the first tick of the static channel at or after a point of the path."""
         return math.ceil(point * self._static_rate_hz / TSF85_PATH_RATE_HZ)
 
-    def _shares(self, force_n: Array) -> Array:
+    def _fractions(self, force_n: Array) -> Array:
         """Return the fraction of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact (Hertz)."""
         radius_m = TSF85_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[..., None, :]
         dome = np.maximum(0.0, 1 - (self._taxel_x_m**2 + self._taxel_y_m**2) / radius_m**2)

@@ -106,18 +106,18 @@ def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: fl
     Harmonic n is weakened by exp(−(2π·n·blur/pitch)²/2), the transfer function of the Gaussian.
     """
     cosine = np.cos(2 * np.pi / pitch_m * across_m)
-    first_share = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
+    first_fraction = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
     amplitudes = _amplitudes(pitch_m, shape, duty, float(blur_m.min(initial=pitch_m)))
-    height = amplitudes[0] * first_share * cosine
+    height = amplitudes[0] * first_fraction * cosine
     if len(amplitudes) == 1:
         return np.asarray(height)
     twice, wave, before = 2 * cosine, cosine, np.ones_like(cosine)
-    share, ratio, square = first_share, first_share**3, first_share**2
+    fraction, ratio, square = first_fraction, first_fraction**3, first_fraction**2
     for amplitude in amplitudes[1:]:
         # cos((n+1)φ) = 2·cos φ·cos nφ − cos((n−1)φ) and q^((n+1)²) = q^(n²)·q^(2n+1): far cheaper than cos and exp.
         wave, before = twice * wave - before, wave
-        share, ratio = share * ratio, ratio * square
-        height += amplitude * share * wave
+        fraction, ratio = fraction * ratio, ratio * square
+        height += amplitude * fraction * wave
     return np.asarray(height)
 
 
@@ -280,7 +280,7 @@ POINTS_PER_WAVE = 4  # of the shortest wave
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(MIN_BLUR_M, MAX_BLUR_M, 10)  # tiles are made for these and interpolated between
 # Points under one blur, from which on a separate tile is cheaper than mixing point by point.
-MIN_POINTS_FOR_OWN_TILE = 20_000
+MIN_POINTS_FOR_TILE = 20_000
 TILE_POINTS = (SIDE + 1) ** 2
 
 
@@ -308,8 +308,8 @@ class RandomRelief(Seeded):
         cosine, sine = math.cos(TURN_RAD) / self.spacing_m, math.sin(TURN_RAD) / self.spacing_m
         rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
         level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
-        many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_OWN_TILE
-        if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_OWN_TILE <= rows.size:
+        many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_TILE
+        if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_TILE <= rows.size:
             height = _bilinear(_mixed(self, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
             return np.asarray(height, dtype=np.float64)
         low = level.astype(np.intp)
@@ -341,11 +341,11 @@ def _bilinear(tiles: AnyArray, number: NDArray[np.intp], rows: Array, columns: A
     return upper
 
 
-def _between(tiles: AnyArray, at: NDArray[np.intp], share: NDArray[np.float32]) -> AnyArray:
+def _between(tiles: AnyArray, at: NDArray[np.intp], fraction: NDArray[np.float32]) -> AnyArray:
     """Return values between points and those after them."""
     value, after = tiles.take(at), tiles[1:].take(at)
     after -= value
-    after *= share
+    after *= fraction
     value += after
     return value
 
@@ -356,9 +356,9 @@ def _mixed(random: RandomRelief, levels: tuple[float, ...]) -> AnyArray:
     tiles = []
     for level in levels:
         low = int(level)
-        share = level - low
+        fraction = level - low
         pair = _pairs(random)[low * TILE_POINTS : (low + 1) * TILE_POINTS].view(np.float32).reshape(-1, 2)
-        tiles.append(pair @ np.array([1.0 - share, share], dtype=np.float32))
+        tiles.append(pair @ np.array([1.0 - fraction, fraction], dtype=np.float32))
     return np.concatenate(tiles)
 
 
@@ -370,7 +370,7 @@ def _pairs(random: RandomRelief) -> AnyArray:
     """
     spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
     weak = [np.exp(-0.5 * (2 * np.pi * wave_1_m * blur_m) ** 2) for blur_m in BLURS_M]
-    blurred = [np.fft.irfft2(spectrum * share, s=(SIDE, SIDE)) for share in weak]
+    blurred = [np.fft.irfft2(spectrum * fraction, s=(SIDE, SIDE)) for fraction in weak]
     both = [sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]
     # One after the other, each with its first row and column again at its end.
     flat = [np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in both]
@@ -420,8 +420,8 @@ class Sandpaper(RandomRelief):
         tops = np.zeros((SIDE, SIDE))
         count = round(self.cover * SIDE**2 / grain_points)
         np.add.at(tops, tuple(rng.integers(0, SIDE, (2, count))), rng.uniform(*SIZES, count))
-        away = np.minimum(np.arange(SIDE), SIDE - np.arange(SIDE))
-        dome = np.maximum(0.0, 1 - (away[:, None] ** 2 + away**2) / (POINTS_PER_GRAIN / 2) ** 2)
+        distance = np.minimum(np.arange(SIDE), SIDE - np.arange(SIDE))
+        dome = np.maximum(0.0, 1 - (distance[:, None] ** 2 + distance**2) / (POINTS_PER_GRAIN / 2) ** 2)
         height = self.grain_height_m * np.fft.irfft2(np.fft.rfft2(tops) * np.fft.rfft2(dome), s=(SIDE, SIDE))
         return np.asarray(height - height.mean())
 

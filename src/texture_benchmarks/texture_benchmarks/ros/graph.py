@@ -147,7 +147,7 @@ class LiveLatency:
             'median_ms': float(median),
             'p99_ms': float(p99),
             'longest_ms': float(1000 * self.latency_s.max()),
-            'cpu_percent': {name: round(100 * share, 1) for name, share in self.cpu.items()},
+            'cpu_percent': {name: round(100 * load, 1) for name, load in self.cpu.items()},
         }
 
 
@@ -172,12 +172,12 @@ def measure(model_path: Path, slide: LiveSlide, namespaces: Sequence[str] = ('',
             finger.start(graph, stack, model_path)
         streamer = Streamer(graph, sorted((timed for f in fingers for timed in f.plan()), key=lambda timed: timed[0]))
         _wait_for_nodes(graph, streamer, fingers, topics)
-        shares = _stream(graph, streamer, fingers, slide.slide_s + READY_WITHIN_S)
+        loads = _stream(graph, streamer, fingers, slide.slide_s + READY_WITHIN_S)
     windows = model.recipe.feature_set.windows
     expected = math.floor((slide.slide_s - windows.length_s) / windows.hop_s + 1e-6) + 1
     return {
-        finger.namespace: LiveLatency(np.array(finger.latency_s(streamer, topics, windows.length_s)), expected, share)
-        for finger, share in zip(fingers, shares, strict=True)
+        finger.namespace: LiveLatency(np.array(finger.latency_s(streamer, topics, windows.length_s)), expected, load)
+        for finger, load in zip(fingers, loads, strict=True)
     }
 
 

@@ -169,7 +169,7 @@ def check(trials: Sequence[FaultTrial], counts: Mapping[str, int], memory: Seque
         'every vector is answered or counted': (f'{silent} not, {lost_vectors} counted', silent <= lost_vectors),
         'memory grows less than 1 %': (f'{grown:+.2%}, {len(old)} processes lived long enough', grown < GROWTH),
     }
-    return {asked: {'seen': seen, 'holds': holds} for asked, (seen, holds) in found.items()}
+    return {requirement: {'seen': seen, 'holds': holds} for requirement, (seen, holds) in found.items()}
 
 
 def figures(trials: Sequence[FaultTrial]) -> dict[str, Any]:

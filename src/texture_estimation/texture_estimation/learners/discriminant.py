@@ -53,13 +53,13 @@ def linear_discriminant(
     means = _sums(X, y, counted, n_labels)
     centre = means.mean(axis=0)
     rest = X - means[y]
-    shares = counted / n_labels
-    covariance = (rest.T * shares) @ rest
+    place_weights = counted / n_labels
+    covariance = (rest.T * place_weights) @ rest
     if stretches is not None and stretch_weight:
         places = np.unique(np.stack([y, stretches]), axis=1, return_inverse=True)[1].reshape(-1)
-        own = np.bincount(places, shares)
-        between = _sums(rest, places, shares, len(own)) / own[:, None]
-        covariance += stretch_weight * (between.T * own) @ between
+        totals = np.bincount(places, place_weights)
+        between = _sums(rest, places, place_weights, len(totals)) / totals[:, None]
+        covariance += stretch_weight * (between.T * totals) @ between
     scale = np.sqrt(np.diag(covariance))
     scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
     correlations = shrunk_covariance(covariance / np.outer(scale, scale), shrinkage)

@@ -156,7 +156,7 @@ RATE = 2e-3
 MEAN_DECAY, SQUARE_DECAY = 0.9, 0.999  # Kingma & Ba's
 TINY = 1e-8
 NOISE_TABLE = 1 << 20
-CALIBRATION_SHARE = 0.5  # of the passes, that a network for the calibration makes
+CALIBRATION_FRACTION = 0.5  # of the passes, that a network for the calibration makes
 HIDDEN_LAYER, OUTPUT_LAYER = 0, 2  # of the weights; their offsets follow them
 # Of one network, steps times features and labels: larger trainings make fewer passes, so that they end within minutes.
 # The shipped recipes come to 3 to 5 millions with 20 textures of 40 slides.
@@ -252,8 +252,8 @@ class Mlp:
 
         def fit(held: NDArray[np.bool_]) -> dict[str, Array]:
             rest = augmented.without(np.unique(groups[held])) if augmented else None
-            share = CALIBRATION_SHARE if augmented and held.any() else 1.0
-            return self._fit(X[~held], y[~held], n_labels, rest, share)
+            fraction = CALIBRATION_FRACTION if augmented and held.any() else 1.0
+            return self._fit(X[~held], y[~held], n_labels, rest, fraction)
 
         return fit_in_folds(fit, self.predictor, X, y, groups, folds=self.folds, parts=parts, tempered=TEMPERED)
 
@@ -263,7 +263,7 @@ class Mlp:
         return MlpPredictor(parameters)
 
     def _fit(
-        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
+        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, fraction: float = 1.0
     ) -> dict[str, Array]:
         """Return the layers after a fraction of the steps, with the standardisation worked into them."""
         mean, scale = X.mean(axis=0), X.std(axis=0)
@@ -276,7 +276,7 @@ class Mlp:
             if augmented
             else _Batches(inputs, y, rng)
         )
-        weights = self._descend(drawn, inputs.shape, n_labels, rng, share)
+        weights = self._descend(drawn, inputs.shape, n_labels, rng, fraction)
         hidden, hidden_offset, output, output_offset = (part.astype(np.float64) for part in weights)
         hidden /= scale[:, None]
         return {
@@ -286,21 +286,21 @@ class Mlp:
             'output_offset': output_offset,
         }
 
-    def _steps(self, n_examples: int, work: int, share: float) -> int:
+    def _steps(self, n_examples: int, work: int, fraction: float) -> int:
         """Return the number of batches, fewer where each costs much: with this many features and labels."""
-        passes, most = math.ceil(share * self.epochs), round(share * MAX_WORK / work)
+        passes, most = math.ceil(fraction * self.epochs), round(fraction * MAX_WORK / work)
         return min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
 
     def _descend(
         self, drawn: AugmentedBatches | _Batches, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator,
-        share: float,
+        fraction: float,
     ) -> Weights:  # fmt: skip
         """Return the weights after this fraction of all passes over the examples, (n, n_features)."""
         n_examples, n_features = shape
         network = MlpTraining(n_features, self.hidden, n_labels, rng)
         # Noise is cut from a table at random places: a new number for each input took a fifth of the training.
         table = np.float32(self.noise) * rng.standard_normal(max(NOISE_TABLE, 4 * BATCH * n_features), dtype=np.float32)
-        steps = self._steps(n_examples, n_features + n_labels, share)
+        steps = self._steps(n_examples, n_features + n_labels, fraction)
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))
             start = rng.integers(len(table) - inputs.size + 1)

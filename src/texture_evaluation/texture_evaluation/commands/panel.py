@@ -55,7 +55,7 @@ def summary(report: Mapping[str, Any]) -> list[str]:
         f'votes {" ".join(f"{count:3d}" for count in one["votes"])}'
         for name, one in textures.items()
     ]
-    lines += [f'{told}: {_number(report[name])}' for name, told in NAMED.items()]
+    lines += [f'{title}: {_number(report[name])}' for name, title in NAMED.items()]
     lines.append(f'protocol: {"kept" if not violations else f"not kept in {len(violations)} points"}')
     lines += [f'  {sentence}' for sentence in violations[:SHOWN_VIOLATIONS]]
     more = len(violations) - SHOWN_VIOLATIONS

@@ -24,7 +24,7 @@ from texture_features.windows import FLOOR, Feature, WindowBatch, centred, first
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
 
-FREE_SHARE = 0.01  # of the load, below which a channel counts as free: only noise
+FREE_FRACTION = 0.01  # of the load, below which a channel counts as free: only noise
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class LogShares(Feature):
         levels = np.add.reduce(rows, axis=-1) / rows.shape[-1]
         sizes = np.abs(levels)
         total = np.add.reduce(sizes, axis=-1, keepdims=True)
-        shares = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
-        logs = np.sign(levels) * np.log(np.maximum(shares, FREE_SHARE) / FREE_SHARE)
+        fractions = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
+        logs = np.sign(levels) * np.log(np.maximum(fractions, FREE_FRACTION) / FREE_FRACTION)
         centred: Array = logs - np.add.reduce(logs, axis=-1, keepdims=True) / logs.shape[-1]
         return centred[..., None]
 
@@ -285,8 +285,8 @@ class SpatialBandPower(WelchPower):
         high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
         line = _numbers(len(hertz) + 1)
         inside = np.minimum(np.maximum(line, low), high)
-        share = inside[..., 1:] - inside[..., :-1]
-        mean = np.add.reduce(share * densities[..., None, :], axis=-1) / (high - low)[..., 0]
+        fraction = inside[..., 1:] - inside[..., :-1]
+        mean = np.add.reduce(fraction * densities[..., None, :], axis=-1) / (high - low)[..., 0]
         # Density per wave per metre: the same power on a stretch that is speed times narrower.
         return np.log(mean * speed[..., 0] + FLOOR)
 

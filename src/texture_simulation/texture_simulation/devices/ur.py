@@ -188,7 +188,7 @@ class EmulatedRobot:
     """Physics of the robot, step by step.
 
     `pose`, `velocity` and `force`, (6,), are of the fingertip in the base frame; the force is that of the surroundings
-    on the robot, as the sensor shows it. `motion` and `force_mode` move it. `speed_share` is the speed slider on the
+    on the robot, as the sensor shows it. `motion` and `force_mode` move it. `speed_fraction` is the speed slider on the
     pendant, 0 to 1, which the force mode does not obey.
     """
 
@@ -201,7 +201,7 @@ class EmulatedRobot:
         self.force: Array = np.zeros(6)
         self.motion = stop_move(HALT)
         self.force_mode: ForceMode | None = None
-        self.speed_share = 1.0
+        self.speed_fraction = 1.0
         self._params = params
         self._rng = rng
         self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
@@ -221,7 +221,7 @@ class EmulatedRobot:
         if self.force_mode is not None:
             led, velocity = self._comply(velocity, self.force_mode, step_s)
         self._unslowed = velocity
-        self.velocity = velocity = velocity - (1.0 - self.speed_share) * led
+        self.velocity = velocity = velocity - (1.0 - self.speed_fraction) * led
         self.pose = self.pose + velocity * step_s
         # The contact, and what the sensor makes of it.
         from_origin = self.pose[:3] - self.origin
@@ -496,7 +496,7 @@ class DashboardSession(Session):
             'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
             'emulate silence': partial(_set, go_silent, 'seconds'),
             'emulate slow': partial(_set, partial(setattr, controller, 'acknowledge_s'), 'seconds'),
-            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_share'), 'shares'),
+            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_fraction'), 'shares'),
             'emulate friction': partial(_set, partial(setattr, controller.robot, 'friction'), 'newtons per N'),
         }
 
