@@ -197,7 +197,7 @@ def _checked(segment: bytes) -> bytes | None:
 class FingerPipeParams:
     """Receiver of the finger state of an emulated robot."""
 
-    finger_pipe: str = param('', "Path of the named pipe on which the finger state is sent to the emulator; '': none.")
+    finger_pipe: str = param('', "Path of the named pipe for the finger position that the emulator reads; '' for none.")
 
 
 LineT = TypeVar('LineT', bound='EmulatedSerialRobot')
