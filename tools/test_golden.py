@@ -25,7 +25,7 @@ def test_every_recipe_and_arm_is_in_the_golden_set() -> None:
         for name, source in golden.SOURCES.items()
     ],
 )
-def test_the_recipes_say_what_they_said(source: str) -> None:
+def test_the_recipes_give_the_stored_results(source: str) -> None:
     if not golden.available(golden.SOURCES[source]):
         pytest.skip(f'no recorded data in {golden.DATA}; set TEXTURE_DATA to its folder')
     assert golden.check(f' on {source}') == []

@@ -217,7 +217,7 @@ def test_a_manifest_names_the_extras_that_its_package_imports(package: Path) -> 
 
 
 @pytest.mark.parametrize('package', DEPLOYED, ids=lambda package: package.name)
-def test_what_is_deployed_runs_without_extras_or_says_in_one_sentence_which_it_needs(package: Path) -> None:
+def test_what_is_deployed_runs_without_extras_or_states_in_one_sentence_which_it_needs(package: Path) -> None:
     files = sorted((package / package.name).rglob('*.py'))
     modules = ['.'.join(path.relative_to(package).with_suffix('').parts).removesuffix('.__init__') for path in files]
     command = [sys.executable, '-c', WITHOUT_EXTRAS, ' '.join([*EXTRAS, 'h5py']), *modules]

@@ -145,7 +145,7 @@ def test_the_files_that_the_page_on_extending_names_exist() -> None:
     assert [name for name, found in paths.items() if not any(path.exists() for path in found)] == []
 
 
-def test_the_emulated_sensor_of_the_page_passes_its_own_test(examples: Path) -> None:
+def test_the_emulated_sensor_of_the_page_passes_its_test(examples: Path) -> None:
     module = importlib.import_module('my_textures.test_udp_finger')
     module.test_a_slide_arrives_as_it_was_sent_and_a_lost_datagram_is_counted()
 

@@ -60,7 +60,7 @@ def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
     return benches
 
 
-def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
+def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_on_request(benches, tmp_path: Path, capfd) -> None:
     assert set(LONG) > {'overview'}
     for more, count in (([], 1), (['--long'], 2)):
         assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0

@@ -65,7 +65,7 @@ def test_a_slow_channel_keeps_its_value_until_the_next_one_comes() -> None:
     np.testing.assert_array_equal(windows[1, 1], np.repeat(np.arange(25, 50), 20))
 
 
-def test_names_at_lines_stand_apart_and_keep_their_order() -> None:
+def test_names_at_lines_keep_a_spacing_and_their_order() -> None:
     assert spread([0.0, 0.05, 1.0], 0.2) == pytest.approx([0.0, 0.2, 1.0])
     assert spread([1.0, 0.95], 0.2) == pytest.approx([1.15, 0.95])
 

@@ -86,7 +86,7 @@ def test_a_sensor_that_is_gone_is_opened_again_and_reported_of_once() -> None:
     assert reader.fault == ''
 
 
-def test_a_sensor_that_raises_anything_else_is_told_of_with_its_line_and_opened_again() -> None:
+def test_a_sensor_that_raises_anything_else_is_reported_with_its_line_and_opened_again() -> None:
     sensor, reader, logged = run('..v..', 4)
     assert sensor.counts['reopened'] == 1
     assert logged[1].startswith('the sensor raised ValueError in test_health.py, line ')

@@ -364,7 +364,7 @@ def test_a_lost_frame_moves_the_index_by_exactly_its_samples():
     assert counter.overrun == 0
 
 
-def test_samples_that_the_device_left_out_are_reported_apart_from_lost_frames():
+def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
     counter = BlockCounter(BLOCKS_HZ, 'daq')
     assert [counter.place(0, 10, 0), counter.place(4000 + 5 * 400, 10, 0)] == [0, 15]
     assert counter.overrun == 5

@@ -39,7 +39,7 @@ class DaqChannel:
 
     name: str = param('', 'Name of the channel, which must be unique in the file.')
     unit: str = param('V', 'Unit of the published samples.')
-    gain: float = param(1.0, 'Factor from counts to the unit; larger values give larger samples.')
+    gain: float = param(1.0, 'Factor from counts to the unit.')
     offset: float = param(0.0, 'Value of 0 counts in the unit, which is added to every sample.')
 
 

@@ -220,11 +220,11 @@ class FileSettings:
     )
     speed: float = param(
         1.0,
-        'How many times faster than real time the file is played; 0 plays it as fast as it can be read.',
+        'Playback rate relative to real time; 0: as fast as it can be read.',
         low=0.0,
         high=1000.0,
     )
-    loop: bool = param(False, 'Starts the file again from the beginning when its end is reached.')
+    loop: bool = param(False, 'Repeats the file from the beginning at its end.')
     topic: str = param('signal', 'Topic on which the samples are published.', choices=('signal', 'signal_static'))
     unit: str = param('', 'Unit of the published samples; the file does not state one.')
 

@@ -119,7 +119,7 @@ class TareParams:
 
     tare_s: float = param(
         1.0,
-        "Over how long the service '~/tare' averages; a longer time gives a more exact baseline.",
+        "Averaging time of the service '~/tare'.",
         unit='s',
         low=0.1,
         high=60.0,

@@ -49,12 +49,10 @@ class PvdfSettings:
     """Parameters of the PVDF film, its amplifier and the force sensor."""
 
     baud: int = baud_param(BAUD)
-    film_gain_pc: float = param(
-        FILM_PC_PER_COUNT, 'Charge of one count of the film; larger values give larger samples.', unit='pC'
-    )
+    film_gain_pc: float = param(FILM_PC_PER_COUNT, 'Charge of one count of the film.', unit='pC')
     force_gain_n: float = param(
         FORCE_N_PER_COUNT,
-        'Force of one count of the force sensor; larger values give larger samples.',
+        'Force of one count of the force sensor.',
         unit='N',
     )
 

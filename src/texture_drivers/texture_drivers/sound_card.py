@@ -134,7 +134,7 @@ class SoundCardSettings:
     channels: int = param(1, 'Number of channels that are read, from the first on.', low=1, high=8)
     decimation: int = param(
         3,  # 16 kHz: docs/sensors.md has what it gains over 4 and 8 kHz
-        'By what factor the rate is lowered behind a low-pass; a larger factor costs less computing time and '
+        'Factor by which the rate is lowered behind a low-pass; a larger one costs less computing time and '
         'keeps a smaller band, up to 0.34 of the lower rate.',
         low=1,
         high=64,

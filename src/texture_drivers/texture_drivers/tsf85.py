@@ -282,14 +282,14 @@ class Tsf85Settings:
     # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
     acceleration_count_g: float = param(
         16384.0,
-        'Accelerometer counts of one g; larger values give smaller accelerations.',
+        'Accelerometer counts of one g.',
         unit='1/g',
         low=1.0,
         high=1e6,
     )
     rotation_count_dps: float = param(
         131.072,
-        'Gyroscope counts of one degree per second; larger values give smaller angular rates.',
+        'Gyroscope counts of one degree per second.',
         unit='s/deg',
         low=1e-3,
         high=1e6,
@@ -297,7 +297,7 @@ class Tsf85Settings:
     # Data sheet of the ICM-20948: 0.15 microtesla a count.
     field_count_ut: float = param(
         1 / 0.15,
-        'Magnetometer counts of one microtesla; larger values give smaller fields.',
+        'Magnetometer counts of one microtesla.',
         unit='1/µT',
         low=1e-3,
         high=1e6,

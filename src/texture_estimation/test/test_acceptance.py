@@ -147,7 +147,7 @@ def test_slides_end_early_with_as_few_wrong_labels_as_allowed():
 
 
 @pytest.mark.parametrize('coverage', [0.8, 0.95])
-def test_the_true_label_is_in_the_prediction_set_as_often_as_asked(coverage):
+def test_the_true_label_is_in_the_prediction_set_as_often_as_requested(coverage):
     rng = np.random.default_rng(0)
     found = fitted(held_out(rng, 2000, separation=1.5), rates=dataclasses.replace(RATES, coverage=coverage))
     inside = [
@@ -178,7 +178,7 @@ def test_a_slide_of_the_training_scores_as_it_does_window_by_window():
 
 
 @pytest.mark.parametrize('slides', [1, 12, 149, 600])
-def test_a_classifier_that_errs_as_often_as_the_bound_passes_so_many_slides_once_in_twenty(slides):
+def test_a_classifier_that_errs_as_often_as_the_bound_passes_this_many_slides_once_in_twenty(slides):
     error_rate = 1.0 - Acceptance(slides).highest_confidence
     assert binom.pmf(0, slides, error_rate) == pytest.approx(0.05)
 

@@ -58,7 +58,7 @@ def test_without_days_slides_are_held_out_by_themselves(examples):
     assert held_out_parts(replace(examples, conditions=by_slide)) is None
 
 
-def test_places_are_held_out_in_turn_where_each_slide_has_a_bag_of_its_own(examples):
+def test_places_are_held_out_in_turn_where_each_slide_has_a_separate_bag(examples):
     slides = np.unique(examples.groups).tolist()
     made = {slide: SlideConditions(session=slide, place=str(int(slide[-1]) % 2)) for slide in slides}
     parts = held_out_parts(replace(examples, conditions=made))
@@ -87,7 +87,7 @@ def test_confidence_falls_where_days_differ(make_examples):
     assert separated.training['held_out_window_accuracy'] < together.training['held_out_window_accuracy'] - 0.1
 
 
-def test_a_model_of_one_place_says_so_where_it_rejects(make_examples):
+def test_a_model_of_one_place_reports_it_where_it_rejects(make_examples):
     examples = make_examples(slides=8)
     model = train(RECIPE, examples)
     assert model.acceptance.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}

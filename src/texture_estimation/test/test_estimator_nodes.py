@@ -200,7 +200,7 @@ def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
         NodeUnderTest(graph, case[0], tmp_path / 'none.npz')
 
 
-def test_a_node_says_what_the_same_vectors_give_offline(graph, case):
+def test_a_node_publishes_what_the_same_vectors_give_offline(graph, case):
     kind, path, vectors = case
     received = NodeUnderTest(graph, kind, path).ask(vectors)
     evidence = (
@@ -217,7 +217,7 @@ def test_a_node_says_what_the_same_vectors_give_offline(graph, case):
     assert received[-1].processing_s > 0.0
 
 
-def test_a_grade_of_a_known_surface_is_its_own(roughness_model, grade_2):
+def test_a_grade_of_a_known_surface_is_that_of_its_training(roughness_model, grade_2):
     evidence = RoughnessAccumulator(roughness_model)
     assert [evidence.update(vector) for vector in grade_2][-1].grade == pytest.approx(2.0, abs=0.3)
 

@@ -36,7 +36,7 @@ def test_a_texture_of_one_slide_is_recognised_at_every_length_and_the_trained_on
     assert best(gaussians, slide([6.0, 0.0, 0.0], 4)[part], length) != 2
 
 
-def test_textures_that_differ_in_their_variation_alone_are_told_apart_in_a_long_slide():
+def test_textures_that_differ_in_their_variation_alone_are_distinguished_in_a_long_slide():
     gaussians = trained(spread=0.5).with_added([slide([0.0, 0.0, 0.0], 1, spread=3.0)], np.array([2]))
     still, varied = slide([0.0, 0.0, 0.0], 2, spread=0.5), slide([0.0, 0.0, 0.0], 3, spread=3.0)
     assert best(gaussians, varied) == 2
@@ -70,7 +70,7 @@ def fitted(*centres, count=4000):
 
 
 @pytest.mark.parametrize('distance', [1.0, 2.0, 3.0])
-def test_two_gaussians_are_confused_as_often_as_their_distance_says(distance):
+def test_two_gaussians_are_confused_as_often_as_their_distance_predicts(distance):
     classes = fitted([0.0, 0.0], [distance, 0.0])
     wrong = classes.log_probabilities(normal([0.0, 0.0], 40_000, seed=9)).argmax(axis=1).mean()
     assert wrong == pytest.approx(norm.cdf(-distance / 2.0), abs=0.01)

@@ -57,7 +57,7 @@ def test_a_model_predicts_the_same_after_it_was_saved(saved, model, examples, en
     np.testing.assert_equal(loaded.tree, model.tree)
 
 
-def test_models_of_all_own_recipes_answer_without_scikit_learn_and_skops(examples, make_examples, tmp_path):
+def test_models_of_all_shipped_recipes_answer_without_scikit_learn_and_skops(examples, make_examples, tmp_path):
     paths = [f'{name}={train(load_recipe(name), examples).save(tmp_path / name)}' for name in RECIPES]
     grades = Grades({label: 1.0 + number for number, label in enumerate(('cork', 'felt', 'slate', 'wood'))})
     rough = train_grades(load_roughness_recipe('roughness'), examples, grades).save(tmp_path / 'rough')

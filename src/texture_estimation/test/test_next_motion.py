@@ -94,7 +94,7 @@ def test_slides_unfit_for_training_are_refused(
 
 
 @pytest.mark.parametrize('seed', range(3))
-def test_what_lies_apart_by_chance_reports_nothing(seed: int) -> None:
+def test_differences_by_chance_carry_no_information(seed: int) -> None:
     """Three slides of each texture on 40 features: their means are far apart, their distributions the same."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal((60, 40))

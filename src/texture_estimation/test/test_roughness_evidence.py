@@ -109,7 +109,7 @@ def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(mod
         (vector(feature_set='abcd1234 signal=2000Hz*1'), 'the sampling rate'),
     ],
 )
-def test_unusable_input_gives_no_grade_and_says_why(model, window, sentence) -> None:
+def test_unusable_input_gives_no_grade_and_a_reason(model, window, sentence) -> None:
     evidence = RoughnessAccumulator(model)
     for estimate in (evidence.update(window), evidence.update(last())):
         assert not estimate.valid
@@ -177,7 +177,7 @@ def test_a_saved_model_grades_alike_and_holds_no_code(model, tmp_path) -> None:
     assert card['grades'].keys() == model.grades.keys()
 
 
-def test_models_of_the_other_kind_are_reported_apart(model, examples, tmp_path) -> None:
+def test_models_of_the_other_kind_are_reported_separately(model, examples, tmp_path) -> None:
     model.save(tmp_path / 'rough')
     train(load_recipe('default'), examples).save(tmp_path / 'names')
     with pytest.raises(ModelMismatch, match='load it in the roughness_estimator'):

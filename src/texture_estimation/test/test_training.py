@@ -43,7 +43,7 @@ def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
 @pytest.mark.parametrize(
     ('slides', 'windows', 'note'), [(1, 8, 'single slide'), (1, 1, 'single window'), (2, 1, 'slides')]
 )
-def test_few_examples_make_a_model_whose_card_says_how_it_is_calibrated(make_examples, slides, windows, note):
+def test_few_examples_make_a_model_whose_card_states_how_it_is_calibrated(make_examples, slides, windows, note):
     examples = make_examples(slides=slides, windows=windows)
     model = train(RECIPE, examples)
     assert note in model.training['calibration']
@@ -161,7 +161,7 @@ def test_every_label_is_always_trained_on():
         assert set(codes[parameters != part]) == {0, 1}
 
 
-def test_a_label_with_one_slide_is_divided_by_windows_and_the_note_says_so():
+def test_a_label_with_one_slide_is_split_by_windows_and_the_note_states_it():
     parameters, note = assign_folds(np.repeat([0, 1], 4), np.repeat([0, 1], 4), 2)
     assert parameters.tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
     assert 'single slide' in note

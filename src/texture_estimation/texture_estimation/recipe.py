@@ -90,7 +90,7 @@ class DecisionParams(TrainingParams):
     )
     held_out_places: int = param(
         1,
-        'Into how many parts of the track slides are cut that were all made over one track: what is fitted to '
+        'Number of parts of the track into which slides over one track are cut: what is fitted to '
         'held-out slides is fitted to held-out parts of the track, as places that the training does not have; 1: none.',
         low=1,
         high=20,

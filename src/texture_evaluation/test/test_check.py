@@ -125,7 +125,7 @@ def starts(batches):
     return np.cumsum([0, *(len(one.samples) for one in batches[:-1])]).tolist()
 
 
-def test_noise_and_drift_are_measured_where_there_is_rest_and_else_said_not_to_be(trained):
+def test_noise_and_drift_are_measured_where_there_is_rest_and_else_reported_as_missing(trained):
     model, slides = trained
     stored = store_reference(model, TOPICS, slides[:2])
     assert 'noise and drift were not measured' in stored

@@ -77,7 +77,7 @@ ANY, UR5E = (0.1, 6.0), (3.0, 8.0)
         ((4.0, 4.0), UR5E, (4.0, 4.0)),
     ],
 )
-def test_forces_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that_the_explorer_allows(
+def test_forces_that_were_not_requested_are_those_nearest_to_the_usual_ones_that_the_explorer_allows(
     requested, allowed_n, expected_n
 ):
     params = replace(PARAMS, force_low_n=requested[0], force_high_n=requested[1], seed=1)
@@ -88,7 +88,7 @@ def test_forces_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that
     assert min(forces_n) == pytest.approx(expected_n[0])
 
 
-def test_speeds_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that_the_explorer_allows():
+def test_speeds_that_were_not_requested_are_those_nearest_to_the_usual_ones_that_the_explorer_allows():
     def speeds_m_s(most_m_s, **requested):
         plan = PlacePlan('oak', CollectionParams(**requested), PATCH, allowed_speeds_m_s=(0.002, most_m_s))
         made = [plan.next().speed_m_s for _ in range(9)]
@@ -154,7 +154,7 @@ def test_neighbours_of_a_left_out_place_are_left_out_too():
 
 
 @pytest.mark.parametrize(('bands', 'spacing_m'), [((5, 5, 1), 0.08), ((5, 1, 5), 0.04), ((1, 5, 5), 0.0), ((), 0.0)])
-def test_tracks_may_be_twice_as_far_apart_as_the_farthest_good_band(bands, spacing_m):
+def test_the_spacing_of_tracks_is_twice_the_farthest_good_band(bands, spacing_m):
     counted = tuple(Band(far_m, 5, correct, 0) for far_m, correct in zip(BANDS_M, bands, strict=False))
     assert PlaceAccuracy(5, 5, '', 1, counted).spacing_m == pytest.approx(spacing_m)
 
@@ -189,7 +189,7 @@ def test_it_ends_at_the_bound_not_before_the_fewest_places():
     assert end.message.startswith('6 of 6 left-out places correct; at new places at least 68 %')
 
 
-def test_a_bound_that_is_not_met_says_what_is_missing():
+def test_a_bound_that_is_not_met_reports_what_is_missing():
     end, _ = run([PlaceAccuracy(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
     assert (end.error, end.slides) == (CollectionError.BOUND_MISSED, 9)
     assert 'mostly misidentified as felt' in end.message and 'also collect felt at more places' in end.message

@@ -85,7 +85,7 @@ def tones(slides: int = 6, *, seed: int = 0, shuffled: bool = False) -> SlideDat
     return SlideDataset.from_arrays({'signal': samples}, given, {'signal': 1000.0}, speed_m_s=speeds, force_n=1.0)
 
 
-def test_tones_are_told_apart_in_every_fold() -> None:
+def test_tones_are_distinguished_in_every_fold() -> None:
     result = cross_validate(RECIPE, tones(), StratifiedGroupKFold(3))
     figures = result.as_json()
     assert figures['window_accuracy'] == figures['slide_accuracy'] == 1.0
@@ -217,7 +217,7 @@ def test_slides_of_what_was_left_out_are_one_cluster_of_the_interval(
     assert f'surfaces; {shift}' in table(result, 'x')[0]
 
 
-def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
+def test_a_fold_without_two_surfaces_to_train_on_is_named() -> None:
     dataset = tones().select(labels=['cork', 'felt'])
     only = np.array(['x' if label == 'cork' else 'y' for label in dataset.labels])
     with pytest.raises(InvalidData, match="fold 'x' cannot be trained: all windows are of 'felt'"):

@@ -103,7 +103,7 @@ def test_slides_that_prove_nothing_are_refused_with_what_to_do():
         compare(found(slide()), found(slide(), sensor='tsf85'))
 
 
-def test_files_beside_a_model_are_read_back_or_refused(tmp_path):
+def test_files_next_to_a_model_are_read_back_or_refused(tmp_path):
     model = tmp_path / 'cloths.npz'
     assert read_correction(model) is None
     with pytest.raises(ModelMismatch, match=r'no reference is stored.*--store'):

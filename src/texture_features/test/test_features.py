@@ -234,7 +234,7 @@ def test_white_noise_has_the_exponent_zero_and_its_sum_two(coefficients, exponen
 
 
 @pytest.mark.parametrize('speed_m_s', SPEEDS)
-def test_spatial_variation_of_a_wave_is_that_of_places_apart_at_any_speed(speed_m_s) -> None:
+def test_spatial_variation_of_a_wave_is_that_of_places_at_a_distance_at_any_speed(speed_m_s) -> None:
     # The mean square of h·(sin(φ + δ) - sin φ) is h²·(1 - cos δ).
     expected = np.log(3.0**2 * (1 - np.cos(2 * np.pi * 0.25)))
     feature = SpatialVariation(lag_m=2.5e-4, points=512)

@@ -256,7 +256,7 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
     assert as_data(events + cutter.finish()) == expected
 
 
-def test_a_finger_that_drops_out_beside_another_is_named_and_two_silent_ones_are_not() -> None:
+def test_a_finger_that_drops_out_next_to_another_is_named_and_two_silent_ones_are_not() -> None:
     fingers = ('finger0/signal', 'finger1/signal')
     cutter = WindowCutter(PARAMS, fingers)
     batches = stream(2.0, batch=500)
@@ -414,7 +414,7 @@ def test_the_feature_is_the_coefficient_of_coulomb_friction_at_any_stretch(coeff
     assert friction_of(lambda _time_s: 2.0 * coefficient, stretch_to_m_s) == pytest.approx([coefficient] * 2)
 
 
-def test_each_window_has_the_mean_of_its_own_time():
+def test_each_window_has_the_mean_of_its_time():
     assert friction_of(lambda time_s: 0.4 if time_s < 0.4999 else 1.0) == pytest.approx([0.2, 0.5])
 
 

@@ -65,7 +65,7 @@ def outcome(decided: list[int] | np.ndarray) -> MethodResult:
 
 @pytest.mark.benchmark
 @pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=PROTOCOLS)
-def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(
+def test_each_experiment_runs_and_shows_the_papers_figures_next_to_its_figures(
     protocol: PaperProtocol, tmp_path: Path
 ) -> None:
     result, path = run_experiment(protocol.name, Experiment(tmp_path, quick=True))
@@ -131,7 +131,7 @@ def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_
         run_searches('ets-linear', late, until_s=0.0)
 
 
-def test_two_directions_are_joined_into_one_vector_with_components_of_their_own() -> None:
+def test_two_directions_are_joined_into_one_vector_with_separate_components() -> None:
     protocol = PROTOCOLS['hu']
     task = reduced(protocol.tasks[0], 4)
     slides = gather(load_scene(protocol.scene), (), task.visits, 0, slow=False)
@@ -174,7 +174,7 @@ def test_figures_of_a_known_outcome() -> None:
     assert one.taken_for('cork', 'felt').sum() == 2
 
 
-def test_a_claim_holds_only_if_the_interval_says_so() -> None:
+def test_a_claim_holds_only_if_the_interval_supports_it() -> None:
     good, bad = outcome(CODES), outcome(np.where(np.arange(60) % 3 == 0, (CODES + 1) % 3, CODES))
     assert higher('', good, bad).holds is True
     assert higher('', bad, good).holds is False
@@ -199,7 +199,7 @@ def test_intervals_are_those_of_the_textbook() -> None:
 
 
 @pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=PROTOCOLS)
-def test_what_has_no_label_of_its_own_is_the_released_recipe_word_for_word(protocol: PaperProtocol) -> None:
+def test_what_has_no_separate_label_is_the_recipe_as_released(protocol: PaperProtocol) -> None:
     named = [method for task in protocol.tasks for method in task.methods if not method.label]
     for method in named:
         released = load_recipe(method.recipe)

@@ -276,7 +276,7 @@ def test_principal_components_are_orthonormal_and_explain_what_they_should(shape
     assert explained.sum() >= 0.95 > explained[:-1].sum()
 
 
-def test_components_of_examples_less_their_own_means_are_those_of_eq_7():
+def test_components_of_examples_less_their_means_are_those_of_eq_7():
     values = np.random.default_rng(0).normal(size=(40, 6)) + np.arange(6.0) + np.arange(40.0)[:, None]
     codes = np.repeat([0, 1], 20)
     parameters = SvmMaxWins(variance=0.9).fit(values, codes, np.arange(40)).parameters
@@ -289,7 +289,7 @@ def test_components_of_examples_less_their_own_means_are_those_of_eq_7():
     np.testing.assert_allclose(np.abs(projected), np.abs(centred @ vectors[:, ::-1][:, :count]), atol=1e-9)
 
 
-def test_two_directions_have_components_of_their_own_and_odd_features_are_refused(examples):
+def test_two_directions_have_separate_components_and_odd_features_are_refused(examples):
     codes, groups = codes_of(examples)
     components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parameters['components']
     assert SvmMaxWins(components=2, blocks=2).fit(examples.values, codes, groups).parameters['components'].shape == (

@@ -94,7 +94,7 @@ def test_the_search_writes_recipes_that_can_be_trained_and_grades_unseen_texture
     assert 0.01 <= recipe.regressor.c <= 10.0
 
 
-def test_a_missing_grade_is_counted_apart_and_each_texture_is_one_opinion() -> None:
+def test_a_missing_grade_is_counted_separately_and_each_texture_is_one_sample() -> None:
     nan = np.nan
     answers = Answers(
         np.array([1.0, 2.0, nan, 5.0]), np.full(4, 0.5), np.array([1.0, 1.0, 4.0, 4.0]), ['a', 'a', 'b', 'b']

@@ -125,7 +125,7 @@ def test_the_machine_of_a_search_decides_as_the_learner_does(box: float, scale: 
     np.testing.assert_allclose(decisions_of_pair(learner, values, codes, rows), exact, atol=5e-3)  # libsvm's tolerance
 
 
-def test_each_pair_of_textures_gets_variables_and_a_machine_of_its_own(tmp_path: Path) -> None:
+def test_each_pair_of_textures_gets_separate_variables_and_a_separate_machine(tmp_path: Path) -> None:
     scans, base = tones(noise=0.5), load_recipe('ets-linear-svm')
     names = np.unique(scans.labels).tolist()
     found = {pair: search(base, scans.of(np.isin(scans.labels, pair)), SMALL) for pair in combinations(names, 2)}

@@ -49,7 +49,7 @@ def numbers(examples):
     return tuple(np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
 
 
-def test_each_pair_is_decided_by_its_own_learner_on_its_own_features_alone(tuned, examples, numbers, make_examples):
+def test_each_pair_is_decided_by_its_learner_on_its_features_alone(tuned, examples, numbers, make_examples):
     codes, groups = numbers
     fresh = make_examples(seed=3).values
     decisions = tuned.predictor(tuned.fit(examples.values, codes, groups).parameters).decisions(fresh)

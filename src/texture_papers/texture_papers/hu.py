@@ -67,7 +67,7 @@ class Spectrum:
 
     points: int = param(
         12288,
-        'Number of frequency bins k · rate / (2 · points), k from 1; more bins resolve finer.',
+        'Number of frequency bins k · rate / (2 · points), k from 1.',
         low=2,
         high=1 << 19,
     )
@@ -110,7 +110,7 @@ class SvmMaxWins:
 
     variance: float = param(
         0.99,
-        'Fraction of the variance that the kept principal components explain; a larger one keeps more of them.',
+        'Fraction of the variance that the kept principal components explain.',
         low=0.01,
         high=1.0,
     )

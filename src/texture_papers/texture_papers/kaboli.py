@@ -183,7 +183,7 @@ class SvmLinear:
     folds: int = param(5, 'Number of cross-validation folds; more folds take longer to train.', low=2, high=50)
     repeats: int = param(
         10,
-        'Number of repetitions of the cross-validation with other random folds; more take longer to train.',
+        'Number of repetitions of the cross-validation with other random folds.',
         low=1,
         high=1000,
     )
@@ -240,7 +240,7 @@ class PassiveAggressive:
     rounds: int = param(0, 'Number of examples of each label to train on; 0 takes all.', low=0)
     passes: int = param(
         1,
-        'How often all examples are gone through; more passes fit them more closely. The paper names no number.',
+        'Number of passes over all examples; the paper names no number.',
         low=1,
         high=10_000,
     )

@@ -117,7 +117,7 @@ class Ann1:
         low=1,
         high=200,
     )
-    iterations: int = param(50, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    iterations: int = param(50, 'Largest number of training iterations.', low=1, high=10_000)
     seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
@@ -141,7 +141,7 @@ class Ann5(Ann1):
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
 
-    iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
         """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""

@@ -480,7 +480,7 @@ class AnnPairs:
         low=1,
         high=200,
     )
-    iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
     seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:

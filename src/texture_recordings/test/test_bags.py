@@ -145,7 +145,7 @@ def test_without_an_explorer_each_folder_of_signals_is_a_namespace(tmp_path: Pat
     assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', namespace='finger1')] == ['signal']
 
 
-def test_only_the_stretch_asked_for_is_read(tmp_path: Path) -> None:
+def test_only_the_requested_stretch_is_read(tmp_path: Path) -> None:
     bag = write(tmp_path / 'bag', count=10)
     assert [log_ns - STAMP_NS for _, log_ns, _ in read_bag(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)] == [3, 4]
 

@@ -63,7 +63,7 @@ def test_the_inertial_unit_is_published_as_imu_too(graph: LocalGraph, tmp_path: 
     assert imus[0].orientation_covariance[0] == -1.0  # no orientation
 
 
-def test_a_tare_is_asked_for_and_the_baseline_is_published_and_subtracted(graph: LocalGraph, tmp_path: Path) -> None:
+def test_a_tare_is_requested_and_the_baseline_is_published_and_subtracted(graph: LocalGraph, tmp_path: Path) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
         device.measure(np.full((ticks, 15), 0.25))
 

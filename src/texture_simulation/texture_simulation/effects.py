@@ -97,11 +97,9 @@ class Dropouts:
     Samples that are missing altogether are a fault of the line: see devices/fingers.py.
     """
 
-    per_s: float = param(
-        0.5, 'How often a dropout occurs; a higher rate gives more dropouts.', unit='1/s', low=0.0, high=100.0
-    )
+    per_s: float = param(0.5, 'Rate of dropouts.', unit='1/s', low=0.0, high=100.0)
     length_s: float = param(
-        0.02, 'How long a dropout lasts; the last good sample is repeated during it.', unit='s', low=1e-3, high=1.0
+        0.02, 'Duration of a dropout, in which the last good sample is repeated.', unit='s', low=1e-3, high=1.0
     )
 
     def start_signal(
@@ -170,12 +168,12 @@ class Skids:
 
     per_s: float = param(
         0.5,
-        'How often the skin sticks and jumps; a higher rate disturbs more slides.',
+        'Rate at which the skin sticks and jumps.',
         unit='1/s',
         low=0.0,
         high=20.0,
     )
-    length_s: float = param(0.05, 'How long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
+    length_s: float = param(0.05, 'Duration of sticking before the jump.', unit='s', low=1e-3, high=1.0)
 
     def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
         """Return what lets the skin lag behind the finger."""

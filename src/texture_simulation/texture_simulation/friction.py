@@ -38,7 +38,7 @@ class Stribeck:
     kinetic: float = param(0.5, 'Coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
     stribeck_m_s: float = param(
         0.05,
-        'Stribeck speed over which friction falls from static to kinetic; larger values fall more slowly.',
+        'Stribeck speed over which friction falls from static to kinetic.',
         unit='m/s',
         low=1e-4,
         high=10.0,

@@ -238,7 +238,7 @@ class SlidePlan:
         low=0.001,
         high=1.0,
     )
-    force_n: float = param(2.0, 'Normal force; a larger force gives a stronger signal.', unit='N', low=0.05, high=20.0)
+    force_n: float = param(2.0, 'Normal force.', unit='N', low=0.05, high=20.0)
     slide_s: float = param(3.0, 'Duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
     direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
     fingers: int = param(

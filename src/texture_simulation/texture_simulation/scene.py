@@ -32,7 +32,7 @@ class Contact:
     )
     stiffness_n_m: float = param(
         2000.0,
-        'Force per height of the texture; larger values give stronger signals.',
+        'Force per height of the texture.',
         unit='N/m',
         low=1.0,
         high=1e6,

@@ -147,9 +147,7 @@ class Relief:
 class Cut(Relief):
     """A relief as a tool cuts it: its depth and the cross-section of the ridges or posts."""
 
-    depth_m: float = param(
-        2e-4, 'Height above the grooves; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
-    )
+    depth_m: float = param(2e-4, 'Height above the grooves.', unit='m', low=0.0, high=0.01)
     shape: str = param('sine', "Cross-section, 'sine' or 'square'.", choices=SHAPES)
     duty: float = param(0.5, 'Fraction of the pitch that a square ridge, post or hollow takes.', low=0.05, high=0.95)
 
@@ -401,7 +399,7 @@ class Sandpaper(RandomRelief):
     )
     grain_height_m: float = param(
         5e-5,
-        'Mean height of a grain above the sheet; a larger height gives a stronger signal.',
+        'Mean height of a grain above the sheet.',
         unit='m',
         low=0.0,
         high=0.005,
@@ -439,7 +437,7 @@ class SelfAffine(RandomRelief):
 
     rms_m: float = param(
         1e-5,
-        'Standard deviation of the height; larger values give a stronger signal.',
+        'Standard deviation of the height.',
         unit='m',
         low=0.0,
         high=1e-3,
@@ -505,14 +503,14 @@ class Weave(Seeded):
     )
     thickness_x_m: float = param(
         1e-4,
-        'Height of the yarns crossed along x; larger values give a stronger signal.',
+        'Height of the yarns that a slide along x crosses.',
         unit='m',
         low=0.0,
         high=0.01,
     )
     thickness_y_m: float = param(
         1e-4,
-        'Height of the yarns crossed along y; larger values give a stronger signal.',
+        'Height of the yarns that a slide along y crosses.',
         unit='m',
         low=0.0,
         high=0.01,

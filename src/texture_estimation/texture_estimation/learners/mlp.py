@@ -202,9 +202,7 @@ class Mlp:
     decay: float = param(
         0.01, 'Weight decay, divided by the number of examples; a larger one smooths more.', low=0.0, high=1e6
     )
-    epochs: int = param(
-        60, 'Number of passes over the training examples; more take longer to train.', low=1, high=100_000
-    )
+    epochs: int = param(60, 'Number of passes over the training examples.', low=1, high=100_000)
     folds: int = param(
         5,
         'Number of cross-validation folds for the calibration; more folds take longer to train.',

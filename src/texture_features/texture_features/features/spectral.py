@@ -293,7 +293,7 @@ class LowFftBins(Feature):
 
     bins: int = param(
         32,
-        'Number of FFT bins, from the first above 0 Hz; more bins reach higher frequencies.',
+        'Number of FFT bins, from the first above 0 Hz.',
         low=1,
         high=512,
     )
@@ -503,9 +503,7 @@ class ShortTimeFourier(Feature):
     [2, 6]
     """
 
-    parts: int = param(
-        4, 'Number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
-    )
+    parts: int = param(4, 'Number of equal time segments of the window.', low=1, high=256)
     bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
 
     @property

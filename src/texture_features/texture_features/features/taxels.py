@@ -256,7 +256,7 @@ class SpatialBandPower(WelchPower):
     [2, 2, 2]
     """
 
-    bands: int = param(4, 'Number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
+    bands: int = param(4, 'Number of spatial frequency bands.', low=1, high=128)
     longest_m: float = param(
         2e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
     )
@@ -332,7 +332,7 @@ class SpatialBands(Feature):
     [True, True]
     """
 
-    bands: int = param(32, 'Number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
+    bands: int = param(32, 'Number of spatial frequency bands.', low=2, high=512)
     longest_m: float = param(
         33e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1e3
     )

@@ -76,7 +76,7 @@ class ReplayParams:
         low=0,
         high=100,
     )
-    deadline_s: float = param(30.0, 'How long to wait for the subscribers before giving up.', unit='s', low=0.0)
+    deadline_s: float = param(30.0, 'Time to wait for the subscribers.', unit='s', low=0.0)
     end_delay_s: float = param(
         0.0,
         'Time to wait after the last message, in which the last estimates come, before the node ends.',

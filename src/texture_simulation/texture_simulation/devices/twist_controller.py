@@ -69,7 +69,7 @@ class TwistControllerParams(TouchedSurfaceParams):
 
     lag_s: float = param(
         0.02,
-        'Time after which a commanded velocity comes into effect; larger values make the arm later.',
+        'Time after which a commanded velocity comes into effect.',
         unit='s',
         low=0.0,
         high=0.2,
@@ -86,7 +86,7 @@ class TwistControllerParams(TouchedSurfaceParams):
     )
     max_acceleration_m_s2: float = param(
         10.0,
-        'Highest acceleration of the arm; larger values follow commands faster.',
+        'Highest acceleration of the arm.',
         unit='m/s²',
         low=0.1,
         high=150.0,
@@ -108,9 +108,7 @@ class TwistControllerParams(TouchedSurfaceParams):
     surface_rz_rad: float = param(
         0.0, 'Z component of the rotation vector of the surface in the base frame.', unit='rad'
     )
-    friction: float = param(
-        0.3, 'Coefficient of Coulomb friction; larger values drag the finger more.', low=0.0, high=3.0
-    )
+    friction: float = param(0.3, 'Coefficient of Coulomb friction.', low=0.0, high=3.0)
     tool_mass_kg: float = param(
         0.2, 'Mass of the tool, whose weight the force sensor shows.', unit='kg', low=0.0, high=20.0
     )

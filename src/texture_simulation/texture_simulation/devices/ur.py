@@ -135,7 +135,7 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
         100.0, 'Force above which the controller goes into a protective stop.', unit='N', low=1.0
     )
     unlock_delay_s: float = param(
-        5.0, 'How long a protective stop cannot be unlocked after it occurred.', unit='s', low=0.0, high=60.0
+        5.0, 'Time after a protective stop before it can be unlocked.', unit='s', low=0.0, high=60.0
     )
 
 
