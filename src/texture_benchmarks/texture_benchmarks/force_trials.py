@@ -119,7 +119,7 @@ class VirtualMachine:
         return self.now_ns < self.broken_until_ns
 
     def advance(self) -> None:
-        """Go on by one step."""
+        """Advance by one step."""
         self.now_ns += STEP_NS
         while self._coming and self._coming[0][0] <= self.now_ns:
             self.velocity = self._coming.popleft()[1]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every study is given and hands back; their common recordings and workers."""
+"""Inputs and results of every study; their common recordings and workers."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ FINGER_SEED = 7  # the same other finger for all slides
 
 
 def at_other_speed(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Return the way at another speed: less of it in the same time, or all of it in less."""
+    """Return the path at another speed: less of it in the same time, or all of it in less."""
     return at_speed(windows, strength, windows.samples.shape[1])
 
 

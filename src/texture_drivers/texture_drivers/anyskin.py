@@ -71,7 +71,7 @@ class FrameRun(NamedTuple):
 
 
 class FrameParser:
-    """Turn a byte stream into frames, whatever is lost or added on the way.
+    """Turn a byte stream into frames, whatever is lost or added in transmission.
 
     A frame has no header, number or checksum: only its length, CR LF at its end and the range of its values show it,
     and the values may hold CR LF, too. So a frame is believed only where three fit in a row, the first of them only
@@ -242,7 +242,7 @@ class AnySkinDecoder(Decoder):
         return {SIGNAL: (-RANGE_UT, RANGE_UT)}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index according to the host's clock."""
+        """Resume after an interruption, with the index according to the host's clock."""
         self._parser.restart()
         self._meter.restart()
         if self._numbering:

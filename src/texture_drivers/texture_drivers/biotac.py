@@ -38,13 +38,13 @@ class SpiFrame(NamedTuple):
 
 
 class SpiLink:
-    """The way to a board; `counts` are totals kept over reopening."""
+    """The link to a board; `counts` are totals kept over reopening."""
 
     max_drift: float  # largest relative error of its clock
     serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
 
     def open(self) -> None:
-        """Open the way and start sampling; DeviceError if it is not there."""
+        """Open the link and start sampling; DeviceError if it is missing."""
         raise NotImplementedError
 
     def read(self) -> Sequence[SpiFrame]:
@@ -57,7 +57,7 @@ class SpiLink:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Return what went wrong on the way."""
+        """Return the faults of the link."""
         raise NotImplementedError
 
 
@@ -524,7 +524,7 @@ class BioTac:
     fingers
         Several places instead of `params.finger`; topics are then 'finger0/signal' and so on.
     link
-        Another way to the board than `params.device` names.
+        Another link to the board than `params.device` names.
     """
 
     def __init__(

@@ -249,7 +249,7 @@ class FilePlayer:
         self._first_index = self._position = 0  # index of the first sample of this opening; samples since then
 
     def open(self) -> None:
-        """Load the file and begin; the index goes on, with a jump as long as the player was closed.
+        """Load the file and begin; the index continues, with a jump as long as the player was closed.
 
         Raises
         ------

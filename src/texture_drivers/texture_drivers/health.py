@@ -152,7 +152,7 @@ class StreamWatch:
 
     @property
     def taring(self) -> bool:
-        """Whether a tare is under way."""
+        """Whether a tare is in progress."""
         return self._tare is not None
 
     def start_tare(self, tare: Tare | None) -> None:
@@ -165,7 +165,7 @@ class StreamWatch:
             self._batches.append(batch)
         tare, found = self._tare, None
         if tare is not None:
-            self._tare = None  # unless it goes on
+            self._tare = None  # unless it continues
             found = tare.add(batch)
             self._tare = None if found else tare
         if found:
@@ -243,7 +243,7 @@ class ChannelWatch:
 
     @property
     def taring(self) -> bool:
-        """Whether a tare is under way."""
+        """Whether a tare is in progress."""
         return any(stream.taring for stream in self._streams.values())
 
     @property

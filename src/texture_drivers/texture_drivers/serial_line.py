@@ -63,7 +63,7 @@ class FramedStream:
 
 
 # --------------------
-# A serial port that fails in one way: DeviceError, whatever pyserial, the kernel or termios raise.
+# A serial port with one kind of error: DeviceError, whatever pyserial, the kernel or termios raise.
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
 PORT_ERRORS = (serial.SerialException, OSError, termios.error)
@@ -105,7 +105,7 @@ class SerialPort:
         """Return what has arrived, without waiting."""
         data = b''
         with self._faults():
-            # The kernel hands over 4 kB at once and holds more behind them; what comes meanwhile is for the next time.
+            # The kernel returns 4 kB at once and holds more; what comes meanwhile is read next time.
             while (waiting := self._serial.in_waiting) and len(data) < MAX_BYTES:
                 data += self._serial.read(waiting)
         return data
@@ -172,7 +172,7 @@ class Decoder:
         return {}
 
     def restart(self) -> None:
-        """Go on after an interruption."""
+        """Resume after an interruption."""
         raise NotImplementedError
 
     def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
@@ -410,7 +410,7 @@ class StreamDecoder(Decoder):
         return {tracker.stream.topic: tracker.stream.limits for tracker in self.trackers.values()}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index according to the host's clock."""
+        """Resume after an interruption, with the index according to the host's clock."""
         self.deframer.restart()
         self._restart_streams()
 

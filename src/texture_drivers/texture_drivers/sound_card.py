@@ -33,7 +33,7 @@ FULL_SCALE = 'FS'  # unit of uncalibrated samples: 1 is the largest
 
 
 # --------------------
-# Blocks of samples from a sound card, through miniaudio: captured in its thread, handed over in order.
+# Blocks of samples from a sound card, through miniaudio: captured in its thread, delivered in order.
 
 CAPTURE_FULL_SCALE = 2.0**15
 NULL = 'null'  # the name of a card that is always there and delivers zeros
@@ -87,7 +87,7 @@ class Capture:
 
     def close(self) -> None:
         """Stop and close; never raises."""
-        with contextlib.suppress(Exception):  # a device may be gone in many ways
+        with contextlib.suppress(Exception):  # a lost device raises many kinds of errors
             self._stream.close()
 
     def _receive(self) -> Generator[None, bytes, None]:

@@ -110,7 +110,7 @@ class StreamClock:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the stream: another one begins, with another index and another delay. Its drift is still believed."""
+        """Reset for a new stream, with another index and another delay. The drift is kept."""
         self.settled = False
         self._origin: tuple[int, int] | None = None  # index and host time of the first arrival
         self._bins: deque[Arrival] = deque()  # the least late of each bin; the last bin is still open
@@ -161,7 +161,7 @@ class StreamClock:
         return first_index + (elapsed_ns - remaining_ns) / self._period_ns
 
     def _follow_step(self, origin: tuple[int, int]) -> None:
-        """Begin anew where the host's clock was set to another time."""
+        """Restart where the host's clock was set to another time."""
         self.steps += 1
         self.restart()
         self._origin = origin
@@ -272,7 +272,7 @@ class StampStatus(enum.Enum):
 class SampleCounter:
     """Count samples by the device's stamps, `ticks` of them a sample; 0 measures by the first four stamps.
 
-    A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
+    A stamp that does not follow its forerunner is a loss if the next stamp continues from there, and a damaged stamp if
     not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
     trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
     """
@@ -420,7 +420,7 @@ class BlockCounter:
         return self._next_us
 
     def resume(self, missing: int) -> None:
-        """Go on after an interruption with another time; `missing` samples are lost."""
+        """Resume after an interruption with another time; `missing` samples are lost."""
         self.next_index += missing
         self._next_us = None
         self._restart_check()
@@ -491,7 +491,7 @@ class ArrivalNumbering:
         self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
 
     def interrupt(self) -> None:
-        """Forget what belongs to the stream so far: another one begins."""
+        """Reset the state for a new stream."""
         self._interrupted = True
 
     def place(self, blocks: Sequence[tuple[int, int]], arrival_ns: int) -> list[int]:
@@ -539,7 +539,7 @@ class ArrivalNumbering:
     def _skipped(self, index: int) -> int:
         """Return how many samples an interruption has cost that is over now.
 
-        That is known when the clock is settled again and not before: what arrives first may be long on its way.
+        That is known when the clock is settled again and not before: the first arrivals may be long delayed.
         """
         if self._clock_before is None or not self.clock.settled:
             return 0

@@ -116,7 +116,7 @@ class Packet(NamedTuple):
 
 
 class Tsf85Parser:
-    """Turn a byte stream into packets, whatever is lost or added on the way.
+    """Turn a byte stream into packets, whatever is lost or added in transmission.
 
     The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item
     types, index bits 0, a finger that exists, no item twice (a flipped type or finger would make a sample that never
@@ -447,7 +447,7 @@ class FingerStream:
         return {**rates, IMU: RATE_HZ} if self.cutter.has_motion else rates
 
     def interrupt(self) -> None:
-        """Forget what belongs to the stream so far: another one begins."""
+        """Reset the state for a new stream."""
         self._numbering.interrupt()
         self.counter.interrupt()
         self._waiting = []
@@ -530,7 +530,7 @@ class Tsf85Decoder(Decoder):
         return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in LIMITS.items()}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index according to the host's clock."""
+        """Resume after an interruption, with the index according to the host's clock."""
         for finger in self._fingers.values():
             finger.interrupt()
 
@@ -608,7 +608,7 @@ class Tsf85(SerialSensor):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of the decoder, and how often the device was opened again and woken."""
+        """Totals of the decoder, and how often the device was reopened and restarted."""
         return {**super().counts, 'revived': self._revived}
 
     @property

@@ -147,7 +147,7 @@ class Domain:
 
     @property
     def reach_reason(self) -> str:
-        """Where slides may be rejected as the training knew nothing else, in one sentence; '' if it is not known."""
+        """Where slides may be rejected for lack of training, in one sentence; '' if unknown."""
         if not self.reach or any(counts['places'] > 1 or counts['sessions'] > 1 for counts in self.reach.values()):
             return ''
         return ONE_PLACE

@@ -186,7 +186,7 @@ TRAIN, TEST = 'train', 'test'
 class Grades:
     """The grade of each texture, and for which each is meant.
 
-    A grade is an opinion; the physical roughness of a surface is another quantity.
+    A grade is subjective; the physical roughness of a surface is another quantity.
     """
 
     grades: Mapping[str, float]

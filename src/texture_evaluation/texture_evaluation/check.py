@@ -92,7 +92,7 @@ def check_finger(
     faults = _faults(found)
     correction = file_next_to(model, CORRECTION)
     if not faults:
-        # Of a finger that is as trained a correction would make another one.
+        # A correction would falsify a finger that is as trained.
         removed = correct and correction.exists()
         if removed:
             correction.unlink()

@@ -321,7 +321,7 @@ def collect(
     evaluate_all: Callable[[int], PlaceAccuracy],
     tell: Callable[[str, int], None],
 ) -> CollectionEnd:
-    """Touch place after place until the bound is met, the places are used up, or it cannot or shall not go on.
+    """Touch place after place until the bound is met, the places are used up, or it cannot or must not continue.
 
     Ctrl-C, a recorder that ends and recordings that cannot be read are also such ends: the slides so far count.
     """

@@ -130,7 +130,7 @@ def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]
 def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides that were rejected, early ('early') or at their end ('final'); None without slides.
 
-    A slide that is never decided goes on to its end: there its last estimate also counts as early.
+    A slide that is never decided continues to its end: there its last estimate also counts as early.
     """
     early = [not estimate.accepted for _, estimate in _early_ends(results)]
     return {'early': _fraction(early), 'final': _fraction([not result.end.accepted for result in results])}

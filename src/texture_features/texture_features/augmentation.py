@@ -125,7 +125,7 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
 
 @lru_cache(maxsize=RATIO_LIMIT)
 def _resampling_filter(rate: int) -> Array:
-    """Return the low-pass that `resample_poly` makes anew at each call, which takes as long as the rest of the call."""
+    """Return the low-pass that `resample_poly` designs at each call, which takes as long as the rest of the call."""
     return firwin(20 * rate + 1, 1.0 / rate, window=('kaiser', 5.0))
 
 

@@ -99,7 +99,7 @@ def find_sliding(
             runs[-1][1] = last
         else:
             runs.append([first, last])
-    # What goes on before the first sample or after the last one has no ramp there.
+    # Sliding that continues before the first sample or after the last one has no ramp there.
     found = [
         (
             first * cell_s + (params.ramp_s if first else 0.0),

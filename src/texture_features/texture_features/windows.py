@@ -416,11 +416,11 @@ class CoveredSpan:
 
 
 class SlideCoverage:
-    """The covered time of consecutive `slide` states, handed out window by window.
+    """The covered time of consecutive `slide` states, given window by window.
 
     After a state without guarantee, though others had one, the time up to the next state is not covered: the finger has
     lost the surface, turns, or does not slide as commanded. If its force or speed is far from that of the slide so far,
-    what is left of the guarantee is not covered either; windows that were already handed out are not taken back.
+    what is left of the guarantee is not covered either; windows that were already given are kept.
 
     Its output depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.
@@ -482,7 +482,7 @@ class SlideCoverage:
             self._intervals.popleft()
 
     def advance(self, count: int = 1) -> int:
-        """Go on by this many windows, but not beyond the covered stretch of the present one; return by how many."""
+        """Advance by this many windows, but not beyond the covered stretch of the present one; return by how many."""
         left = (self._intervals[0][1] - self._length_ns - self._next_ns) // self._hop_ns + 1
         count = min(count, left)
         self._next_ns += count * self._hop_ns
@@ -699,7 +699,7 @@ class WindowCutter:
 
     @property
     def waiting_for(self) -> tuple[str, ...]:
-        """Inputs of which nothing has come yet."""
+        """Inputs without any message yet."""
         return tuple(topic for topic, source in self._inputs.items() if not source.buffers)
 
     def dropped(self, now_s: float) -> tuple[str, ...]:

@@ -127,7 +127,7 @@ def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_
     run_experiment('ets-linear', Experiment(tmp_path, seed=1, quick=True, tune=True))
     assert (tmp_path / 'searches.jsonl').read_text() == searches  # what is done is not searched again
     late = Experiment(tmp_path, seed=2, quick=True, tune=True)
-    with pytest.raises(TextureError, match='12 of 12 searches are left; the same command goes on'):
+    with pytest.raises(TextureError, match='12 of 12 searches are left; the same command continues'):
         run_searches('ets-linear', late, until_s=0.0)
 
 

@@ -89,7 +89,7 @@ def run_searches(
 ) -> Experiment:
     """Search the variables of all pairs for this many seeds; return the experiment with what was found.
 
-    Each search is a line of a file in the folder of the results, written when it is done: another call goes on there.
+    Each search is a line of a file in the folder of the results, written when it is done: another call continues there.
     """
     if not experiment.tune or name not in TUNED:
         return experiment
@@ -114,7 +114,7 @@ def run_searches(
                     file.write(json.dumps({'search': str(one), 'found': asdict(found)}) + '\n')
     left = sum(str(one) not in done for one in wanted)
     if left:
-        raise TextureError(f'{left} of {len(wanted)} searches are left; the same command goes on with them')
+        raise TextureError(f'{left} of {len(wanted)} searches are left; the same command continues with them')
     return replace(experiment, found={one: done[str(one)] for one in wanted})
 
 

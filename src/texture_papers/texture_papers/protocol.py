@@ -656,7 +656,7 @@ VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests: Mapping[str, str]) -> ExperimentResult:
     """Run an experiment with this many seeds, each alike, and add means and intervals over them to the first's result.
 
-    Each seed is kept in the folder `seeds`; what is there already, with the digests of now, is not run again.
+    Each seed is kept in the folder `seeds`; what is there already, with the present digests, is not run again.
     """
     if count < 2:
         raise InvalidParameter(f'{count} seeds were requested; two or more are needed for an interval over seeds')

@@ -45,7 +45,7 @@ from texture_simulation.friction import sliding_coefficient
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
 
-# The paper's sizes; the search for parts goes on from that for whole scans, and has half of the paper's halves.
+# The paper's sizes; the search for parts continues from that for whole scans, and has half of the paper's halves.
 FULL, OF_PARTS, OF_TEN = SearchParams(20, 30, 20), SearchParams(10, 10, 10), SearchParams(13, 10, 20)
 LINEAR_S = 0.5
 LINEAR_SLIDES = 'linear slides'

@@ -425,7 +425,7 @@ def evenly(samples: Array, duration_s: float) -> Array:
 # with a key `date/Fabric/forceN/speedmms[/repeat]` for each slide. Slides of a fabric are numbered by date, then force,
 # speed and repeat. Direction: +π/2 for speeds above 0, −π/2 below. Forces are as the keys name them; those of 100 and
 # more (23 May) are hardly newtons. No rate is published. Rows of a slide grow by 28 (May) to 32 (February) m over the
-# speed in m/s; at 50 Hz that is a way of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
+# speed in m/s; at 50 Hz that is a distance of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
 
 NOMINAL_HZ = 50.0
 FREE_FRACTION = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact

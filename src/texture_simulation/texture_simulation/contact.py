@@ -75,7 +75,7 @@ class SkinContact:
         return float(self._blur_and_stiffness(np.array([force_n]))[0][0])
 
     def placed(self, path: Trajectory) -> Trajectory:
-        """Return where the skin goes on the sample."""
+        """Return the path of the skin on the sample."""
         placed = path.moved(self._x_m, self._y_m)
         for apply in self._trajectory_filters:
             placed = apply(placed)
@@ -121,7 +121,7 @@ class SkinContact:
     def centre_m(self, placed: Trajectory) -> tuple[Array | float, Array | float]:
         """Return where on the fingertip the load is, x and y, (..., n) each; 0 on a plane.
 
-        Over a curved object the place wanders as the finger slides on: the normal of the object turns by the way over
+        On a curved object the place moves as the finger slides: its normal turns by the distance over
         the sum of both radii, as the finger keeps its direction.
         """
         radius_m, tip_m = self._surface.shape.radius_m, self._contact.tip_radius_m

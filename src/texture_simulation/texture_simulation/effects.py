@@ -161,7 +161,7 @@ FORGOTTEN = 8.0  # time constants after which nothing of a skid is left
 
 @dataclass(frozen=True)
 class Skids:
-    """Now and then the skin stays where it is for a moment while the finger goes on, then catches up.
+    """Occasionally the skin sticks for a moment while the finger moves on, then catches up.
 
     A cheap approximation of stick-slip, for slides of which some failed.
     """
@@ -206,7 +206,7 @@ class Skids:
 
 
 def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array:
-    """Return where the skin is: `weight` of the way back to where the last skid began, (..., n)."""
+    """Return the position of the skin: `weight` of the distance back to the beginning of the last skid, (..., n)."""
     began = np.take_along_axis(place_m, np.maximum(last, 0), axis=-1)
     began = np.where(last >= 0, began, held_m[..., None])
     return place_m + weight * (began - place_m)
@@ -215,7 +215,7 @@ def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array
 # --------------------
 # A robot is not quite as fast and does not press quite as hard as it should.
 
-MIN_FRACTION = 0.05  # of what was wanted
+MIN_FRACTION = 0.05  # of the request
 
 
 @dataclass(frozen=True)

@@ -236,7 +236,7 @@ class Emulator:
         return {
             'samples': self._sensor.done,
             'skipped samples': self._sensor.skipped,
-            'bytes nobody took': self.device.dropped_bytes,
+            'unread bytes': self.device.dropped_bytes,
             'finger states': self._link.received,
             'refused finger states': self._link.refused,
         }

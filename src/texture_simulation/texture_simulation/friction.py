@@ -322,7 +322,7 @@ class TipDrag:
         return nothing, nothing, nothing, force_n
 
     def _along(self, path: Trajectory) -> Array:
-        """Return the speed at each point, (..., n); below 0 while the path goes back the way it came."""
+        """Return the speed at each point, (..., n); below 0 while the path reverses."""
         x_m, y_m = self._before[:2] if self._before else (path.x_m[..., :1], path.y_m[..., :1])
         dx_m, dy_m = np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)
         speed_m_s: Array = np.hypot(dx_m, dy_m) * self._rate_hz
@@ -339,7 +339,7 @@ class TipDrag:
         before = np.concatenate([np.zeros_like(last[..., :1]), last[..., :-1]], axis=-1)
         along = dx_m * np.take_along_axis(x, before, -1) + dy_m * np.take_along_axis(y, before, -1)
         signs: Array = np.cumprod(np.where(moving & (along < 0), -1.0, 1.0), axis=-1)
-        # What counts as forward stays, whatever way the tip goes at the end of the block.
+        # The forward direction stays, whatever the direction of the tip at the end of the block.
         end = last[..., -1:]
         forward_x, forward_y = (signs[..., -1:] * np.take_along_axis(place, end, -1) for place in (x, y))
         self._forward = forward_x, forward_y
@@ -378,7 +378,7 @@ class SlidingDrag:
         self._before: tuple[Array, Array] | None = None
 
     def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses, (..., n) N: of one sign, whichever way the finger goes."""
+        """Return the force that the sensor senses, (..., n) N: of one sign, for both directions of the finger."""
         if not len(path):
             return np.zeros_like(path.x_m)
         x_m, y_m = self._before or before_first(path)

@@ -256,7 +256,7 @@ class Rig(Graph):
         node.__enter__()
         deadline_s = time.monotonic() + ANSWERS_S
         while name == 'explorer' and time.monotonic() < deadline_s:
-            with suppress(LaunchFailed):  # an answer to one whom it has not discovered yet is lost
+            with suppress(LaunchFailed):  # an answer to a client that is not discovered yet is lost
                 self._operator.stop()
                 return
         if name == 'explorer':

@@ -67,7 +67,7 @@ class Adaptor(Node):
         self._diagnostics = Diagnostics(self, self._report)
 
     def _listen(self, topic: str, message_type: str, take: Callable[[Any, int], None]) -> None:
-        """Subscribe; a message is handed over with the time at which it was sent."""
+        """Subscribe; a message is passed on with the time at which it was sent."""
 
         def on_message(message: Any, info: Mapping[str, int]) -> None:
             self._received += 1

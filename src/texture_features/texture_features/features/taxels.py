@@ -390,7 +390,7 @@ class MeanSpatialBands(SpatialBands):
 
 
 # --------------------
-# How much the surface, as measured, changes within a short way.
+# How much the surface, as measured, changes within a short distance.
 
 
 @dataclass(frozen=True)

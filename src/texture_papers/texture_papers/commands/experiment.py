@@ -35,7 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--jobs', type=core_count, default=1, metavar='N', help='cores for the searches of --tune')
     parser.add_argument(
-        '--minutes', type=float, default=math.inf, metavar='M', help='end the searches then; the same command goes on'
+        '--minutes', type=float, default=math.inf, metavar='M', help='end the searches then; the same command continues'
     )
     add_seed(parser)
 

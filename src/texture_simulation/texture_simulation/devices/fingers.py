@@ -90,7 +90,7 @@ def stuff(content: bytes) -> bytes:
 
 
 # --------------------
-# What goes wrong on the way: with bytes, and with whole frames.
+# Faults in transmission: of bytes, and of whole frames.
 
 
 class ByteFaults(NamedTuple):
@@ -220,7 +220,7 @@ class EmulatedDevice:
         self.faults = ByteFaults()  # bytes lost, added, changed
         self.frame_faults = FrameFaults()  # frames left out or sent twice
         self.silent = False  # open but silent
-        self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
+        self.stalled = False  # keeps what it samples, and sends it all at once when it resumes
         self.wrong_firmware = False  # sends unknown data
         self._port = PtyPort(link)
         self._rng = rng

@@ -27,7 +27,7 @@ class TouchedSurfaceParams(ContactParams):
     surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
     wall_m: float = param(
         2.0,
-        'X coordinate, in the surface frame, of a wall across the way of the finger.',
+        'X coordinate, in the surface frame, of a wall across the path of the finger.',
         unit='m',
         low=-2.0,
         high=2.0,

@@ -422,7 +422,7 @@ class EmulatedController:
             speeding = robot.motion
             robot.end_force_mode()
             yield from self._stop(FORCE_MODE_STOP)
-            if not speeding.done:  # a speed goes on afterwards: its thread lives
+            if not speeding.done:  # a speed continues afterwards: its thread lives
                 robot.motion = speeding
         elif number == ScriptCommand.ZERO_FT_SENSOR:
             robot.zero_force()
@@ -871,7 +871,7 @@ class ControllerProcess:
         os.kill(self.pid, signal.SIGSTOP)
 
     def resume(self) -> None:
-        """Let it go on."""
+        """Resume it."""
         os.kill(self.pid, signal.SIGCONT)
 
     def stop(self) -> None:
