@@ -198,7 +198,7 @@ def test_a_bound_that_is_not_met_reports_what_is_missing():
 def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
     end, _ = run([PlaceAccuracy(3, 0), PlaceAccuracy(4, 0)])
     assert (end.error, end.slides) == (CollectionError.NONE, 4)
-    assert 'no other surface is in the folder yet' in end.message
+    assert 'the folder holds no other surface yet' in end.message
 
 
 def test_three_failures_in_a_row_end_it_and_two_do_not():

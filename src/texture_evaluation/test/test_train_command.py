@@ -63,7 +63,7 @@ def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureMode
 
 def test_a_training_with_one_slide_of_a_label_is_reported_as_too_confident(simulated: Path) -> None:
     lines = summary(train_from_bags('default', [simulated], '1'), Path('model.npz'))
-    assert lines[2] == 'this fraction is of held-out windows, as a label has a single slide: too confident'
+    assert lines[2] == 'this accuracy is of held-out windows, as a label has a single slide: too confident'
 
 
 def test_the_training_reports_nothing_where_they_are_enough(model: TextureModel) -> None:
@@ -89,7 +89,7 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ('hop_s', 'warning'),
     [
-        (0.1, r'\d+\.\d % of the held-out windows is not above chance, 50\.0 % of 2'),
+        (0.1, r'\d+\.\d % accuracy of held-out windows is not above chance, 50\.0 % of 2'),
         (0.005, 'windows overlap more than'),
     ],
 )

@@ -58,9 +58,7 @@ class CollectionParams:
         low=0.0,
         high=50.0,
     )
-    bound: float = param(
-        0.6, 'Fraction of new places right that must be shown, as a lower 90 % bound.', low=0.0, high=0.99
-    )
+    bound: float = param(0.6, 'Required accuracy at new places, as a lower 90 % bound.', low=0.0, high=0.99)
     seed: int = param(0, 'Seed of places and directions.', low=0)
 
     def __post_init__(self) -> None:
@@ -123,7 +121,7 @@ class PlacePlan:
     ) -> None:
         self._surface, self._params, self._patch = checked_label(surface), params, patch
         if not self._surface:
-            raise InvalidData('no surface was named; give the label of what is collected')
+            raise InvalidData('no surface was named; give its label')
         forces, speeds = USUAL
         self._forces_n = fitted_range(params, forces, allowed_forces_n)
         self._speeds_m_s = fitted_range(params, speeds, allowed_speeds_m_s)
@@ -230,7 +228,7 @@ class PlaceAccuracy:
     def sentence(self) -> str:
         """Results so far."""
         if not self.others:
-            return f'{self.places} places; no other surface is in the folder yet to distinguish it from'
+            return f'{self.places} places; the folder holds no other surface yet'
         mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
         found = (
             f'{self.correct} of {self.places} left-out places correct{mistaken}; at new places at least '
