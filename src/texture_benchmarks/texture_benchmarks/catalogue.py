@@ -45,7 +45,7 @@ Act = Callable[[str], int]  # runs a study by its name and returns the exit code
 
 
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
-    """Run one study; return its result and the JSON file, next to which its charts are."""
+    """Run one study; return its result and the JSON file, with the charts next to it."""
     result = find(BENCHMARKS, name, 'benchmark')(options)
     if options.quick:
         result = replace(result, data=f'REDUCED, not for publishing; part of: {result.data}')

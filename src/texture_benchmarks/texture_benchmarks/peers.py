@@ -147,6 +147,6 @@ class SpectrumNetwork:
         power = np.log(np.abs(np.fft.rfft(cut, axis=-1)) ** 2 + 1e-3).transpose(0, 2, 1)
         length = n_samples // FRAMES
         slow = windows[:, 1:, : length * FRAMES].reshape(n, n_channels - 1, FRAMES, length).mean(axis=-1)
-        # Levels would betray the mounting: their changes are kept.
+        # Levels depend on the mounting: only their changes are kept.
         changes = np.log(np.abs(np.diff(slow, axis=-1, append=slow[..., -1:])) + 0.1)
         return np.concatenate([power, changes], axis=1).astype(np.float32)

@@ -38,7 +38,7 @@ ROUNDING = 1e-9  # of a quotient of two times
 
 @dataclass(frozen=True)
 class BenchmarkOptions:
-    """Where a benchmark writes, where recorded data lies, and whether to hurry."""
+    """Folders of results and recorded data, and whether to run a reduced benchmark."""
 
     out: Path  # Folder for the JSON and the chart
     # Folder that holds the recorded data sets, each in a separate folder; None if there is none

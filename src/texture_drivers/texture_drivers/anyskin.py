@@ -74,7 +74,7 @@ class FrameParser:
     """Turn a byte stream into frames, whatever is lost or added in transmission.
 
     A frame has no header, number or checksum: only its length, CR LF at its end and the range of its values show it,
-    and the values may hold CR LF, too. So a frame is believed only where three fit in a row, the first of them only
+    and the values may hold CR LF, too. So a frame is accepted only where three fit in a row, the first of them only
     behind CR LF (a byte more or less at its beginning would change a value and not its end), and, from there on, as
     long as each follows the one before without a byte between. A changed bit that leaves a value in its range cannot
     be seen.

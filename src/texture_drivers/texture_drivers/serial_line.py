@@ -354,7 +354,7 @@ class StreamTracker:
 # Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
 # endian, row after row; its kind identifies the stream, its time is that of the first row.
 
-LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock gives the gap
+LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that jumps further is another one; the host's clock gives the gap
 
 
 class StreamDecoder(Decoder):
@@ -439,7 +439,7 @@ class StreamDecoder(Decoder):
         self._newest_us = 0
 
     def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[StreamBlock]]:
-        """Return the blocks of each stream; those before a restart of the device's clock are given up."""
+        """Return the blocks of each stream; those before a restart of the device's clock are dropped."""
         blocks: dict[int, list[StreamBlock]] = {}
         for frame in frames:
             if not self._fits(frame):

@@ -272,7 +272,7 @@ class StampStatus(enum.Enum):
 class SampleCounter:
     """Count samples by the device's stamps, `ticks` of them a sample; 0 measures by the first four stamps.
 
-    A stamp that does not follow its forerunner is a loss if the next stamp continues from there, and a damaged stamp if
+    A stamp not following its predecessor is a loss if the next stamp continues from there, and a damaged stamp if
     not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
     trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
     """

@@ -118,7 +118,7 @@ class Packet(NamedTuple):
 class Tsf85Parser:
     """Turn a byte stream into packets, whatever is lost or added in transmission.
 
-    The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item
+    The protocol has no checksum, so a packet is accepted only if everything about it fits: a data command, known item
     types, index bits 0, a finger that exists, no item twice (a flipped type or finger would make a sample that never
     was), items that end exactly with the payload, and a start byte after it as far as one has come. A flipped value
     byte inside such a packet cannot be seen.
@@ -473,7 +473,7 @@ class FingerStream:
 # The TSF-85 fingertip as a sensor of the suite.
 
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
-REVIVALS = 3  # restarts, as the vendor does, before the port is given up
+REVIVALS = 3  # restarts, as the vendor does, before the port is closed
 REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 

@@ -153,7 +153,7 @@ class EvidenceAccumulator:
             )
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
-        # As long as the windows that the classifier trusts do not add up to one, their mean counts less.
+        # As long as the weights of the windows do not add up to one, their mean counts less.
         mean = self._evidence.mean
         if self._trusted_ns < self._window_ns:
             mean = mean * (self._trusted_ns / self._window_ns)

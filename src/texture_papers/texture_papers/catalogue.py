@@ -128,7 +128,7 @@ def _searched(wanted: PairSearch, start: Sequence[Individual], until_s: float) -
 
 
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
-    """Run one experiment; return its result and the JSON file, next to which its charts lie."""
+    """Run one experiment; return its result and the JSON file, with the charts next to it."""
     run_of = _run_of(name, experiment)
     result = run_of(experiment if experiment.found else run_searches(name, experiment))
     return result, result.write(experiment.out)

@@ -363,7 +363,7 @@ BROKEN = (
 
 
 class RawMessage(NamedTuple):
-    """One message as it lies in a bag."""
+    """One message as stored in a bag."""
 
     topic: str
     msgtype: str

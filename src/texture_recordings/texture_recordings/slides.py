@@ -149,7 +149,7 @@ class SlideSamples:
     Parameters
     ----------
     slide
-        Where it lies, its surface and number.
+        Its bag, surface and number.
     before : (m, n_channels)
         Samples before the slide began, in contact; often none.
     samples : (n, n_channels)

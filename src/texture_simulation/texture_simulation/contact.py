@@ -60,7 +60,7 @@ class SkinContact:
         self._drag = self._make_drag()
 
     def relocate(self) -> None:
-        """Let the sample lie otherwise from now on: no two touches meet the same place, unless the sample varies."""
+        """Move the sample: no two touches meet the same place, unless the sample varies."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._batch_shape, 1))
         if self._surface.variation is not None:  # then a place of the surface frame is a place of the sample
             self._x_m, self._y_m = np.zeros((2, *self._batch_shape, 1))

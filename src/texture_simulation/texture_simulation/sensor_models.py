@@ -340,7 +340,7 @@ REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of t
 class PressedElements:
     """Return what each element senses of the force on the skin.
 
-    The force spreads over the elements like a bell; each senses its part, blurred as it lies, and its axes are not
+    The force spreads over the elements like a bell; each senses its part, blurred by its depth; its axes are not
     quite at right angles. All these numbers are ours.
     """
 

@@ -182,7 +182,7 @@ def measure(model_path: Path, slide: LiveSlide, namespaces: Sequence[str] = ('',
 
 
 def _wait_for_nodes(graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], topics: Sequence[str]) -> None:
-    """Wait until each node listens to what is streamed, and each classifier can be heard."""
+    """Wait until each node subscribes to the streams, and each classifier is discovered."""
     needed = [finger.topic(topic) for finger in fingers for topic in ('exploration', *topics)]
 
     def ready() -> bool:

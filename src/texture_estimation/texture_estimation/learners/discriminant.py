@@ -165,7 +165,7 @@ OUTERMOST = 0.05  # of the windows lie below the trained range, and as many abov
 
 
 class ForceDiscriminantPredictor:
-    """The layer of the nearest force; what lies outside the trained forces counts less."""
+    """The layer of the nearest force; windows outside the trained forces count less."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.weights, self.offsets, self.log_forces, self.trained = (
@@ -236,7 +236,7 @@ class ForceDiscriminant(Discriminant):
     reach: float = param(
         0.1,
         'How fast a window counts less outside the trained forces: 1 / e where the logarithm of the force is so '
-        'far outside; a smaller one trusts the trained forces alone.',
+        'far outside; a smaller one relies on the trained forces alone.',
         low=0.01,
         high=1e6,
     )

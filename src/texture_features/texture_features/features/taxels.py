@@ -205,7 +205,7 @@ class DifferenceCorrelation(Feature):
 
 
 # --------------------
-# The load on the whole array: whether it is that of the training, not what lies under it.
+# The load on the whole array: whether it is that of the training, not the surface.
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ class RailsFirmware:
         self.watchdog_stops = self.bad_frames = 0
         self.position = np.array([0.0, 0.0, machine.start_height_m])
         self.velocity = np.zeros(3)
-        self.surface_m = 0.0  # height of what lies there
+        self.surface_m = 0.0  # height of the surface there
         self._flags = 0
         self._wanted = np.zeros(2)
         self._mode, self._value = HOLD, 0.0

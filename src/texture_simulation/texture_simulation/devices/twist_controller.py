@@ -20,7 +20,7 @@ from texture_simulation.devices.rails import ContactParams
 
 @dataclass(frozen=True)
 class TouchedSurfaceParams(ContactParams):
-    """Where the surface lies, and what else is there."""
+    """Position of the surface and of obstacles."""
 
     surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
     surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')

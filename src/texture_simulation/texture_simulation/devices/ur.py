@@ -326,7 +326,7 @@ class EmulatedController:
     def catch_up(self) -> None:
         """Do a cycle that should have been done before; it is not the client that was silent in it.
 
-        A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
+        A silent client gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
         """
         if self._excused_s < MAX_EXCUSED_S:
             self._excused_s += self.step_s
