@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A client that knows the messages alone: it explores, and turns every answer into a next step by its constants.
+"""A client that needs only the messages: it explores, and maps every result to a next step by its constants.
 
 Next to `texture launch emulator`: .venv/bin/ros-run python examples/explore_client.py
 """
@@ -41,7 +41,7 @@ REJECTED = {
 
 
 class TextureClient(Node):
-    """Explore as Nav2's BasicNavigator drives: start, ask whether it is complete, cancel, read the result."""
+    """Explore as Nav2's BasicNavigator drives: start, check for completion, cancel, read the result."""
 
     def __init__(self) -> None:
         super().__init__('texture_client')
@@ -55,7 +55,7 @@ class TextureClient(Node):
         self.feedback = message.feedback
 
     def start(self, **request: Any) -> None:
-        """Ask for an exploration; what is left out takes the default of the motion."""
+        """Request an exploration; omitted values take the default of the motion."""
         self.feedback = None
         self._explore.wait_for_server()
         goal = Explore.Goal(request=ExplorationRequest(**request))
@@ -74,7 +74,7 @@ class TextureClient(Node):
         self._goal.cancel_goal_async()
 
     def stop(self) -> None:
-        """Abort any exploration, whoever asked for it; the finger is lifted."""
+        """Abort any exploration, whoever requested it; the finger is lifted."""
         self._stop.wait_for_service()
         self._stop.call_async(Trigger.Request())
 

@@ -106,12 +106,12 @@ def write_csv(folder: Path, recorded: list[Recording], broken: dict[int, str] | 
         ]
         for index, text in (broken or {}).items():
             rows[index] = text
-        head = '# made by a logger of somebody else\nt;phase;acc_x;acc_y;acc_z;grip\n'
+        head = '# made by a third-party logger\nt;phase;acc_x;acc_y;acc_z;grip\n'
         (folder / f'{one.name}.csv').write_text(head + '\n'.join(rows) + '\n')
     return folder
 
 
 if __name__ == '__main__':
-    # As they come from a logger: a bad cell, a line that is no row, and materials that are hard to tell apart.
+    # As they come from a logger: a bad cell, a line that is no row, and materials that are hard to distinguish.
     broken = {60: '5000600.00;stroke 1;oops;1.0;2.0;150.0', 400: 'logger restarted'}
     write_csv(Path(sys.argv[1]), recordings(files=4, noise=1.0, spread=0.25), broken)

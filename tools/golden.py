@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The golden set: what recipes say of fixed slides and arms are sent, so that a change of the structure changes none.
+"""The golden set: results of recipes on fixed slides, and what arms are sent, so that refactoring changes none.
 
 `python tools/golden.py --check` computes all rows anew and compares them with `golden.json`; `--write` stores them.
 `--only WORD` takes the rows whose name contains the word, in both uses. A row is a recipe on a source of slides: a
@@ -12,8 +12,8 @@ replaced: a recipe whose pairs only vote, such as ets-linear-svm, shows a change
 A row 'arms: NAME' holds the phases of one exploration and what was sent to the arm or hand, thinned; where only real
 time exists, the kinds of commands on the wire.
 
-A difference is explained or mended, never re-recorded in silence: the commit that writes `golden.json` again says which
-rows changed, and why.
+A difference is explained or fixed, never re-recorded without a reason: the commit that writes `golden.json` names the
+changed rows, and why.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ import numpy as np
 
 from texture_core.types import ExplorationRequest
 
-# All that the golden set knows of the suite: after a move only these lines change.
+# All imports of the golden set from the suite: after a move only these lines change.
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness import RoughnessAccumulator, load_roughness_recipe, read_grades, train_grades
 from texture_estimation.training import train
@@ -82,7 +82,7 @@ SMALLEST = 1e-9  # features below it do not count in a digest
 class GoldenSlides:
     """Slides over a few surfaces: of a scene, or of a public data set where `data_set` names one."""
 
-    recipes: tuple[str, ...]  # names; '*' stands for anything
+    recipes: tuple[str, ...]  # names; '*' matches anything
     surfaces: tuple[str, ...]
     scene: str = ''
     plan: SlidePlan | None = None
@@ -253,7 +253,7 @@ def _recipes(source: GoldenSlides) -> list[str]:
 
 
 def _bags(source: GoldenSlides, folder: Path) -> list[Path]:
-    """Write the bags of a source; a second set along y lies in a folder of its own."""
+    """Write the bags of a source; a second set along y lies in a separate folder."""
     if source.data_set:
         command = ['texture', 'import', source.data_set, str(DATA), str(folder / 'x'), '--slides', '1-7']
         subprocess.run([*command, '--materials', *source.surfaces], check=True, stdout=subprocess.DEVNULL)
@@ -283,7 +283,7 @@ def _dataset(bags: Sequence[Path], slides: str, topics: Sequence[str], crossed: 
         signals = {}
         for topic, batches in x.signals.items():
             more = y.signals[topic]
-            # As many samples are missing between the parts as the clock says.
+            # As many samples are missing between the parts as the clock shows.
             end, gap_ns = batches[-1], more[0].stamp_ns + later_ns - batches[-1].end_ns
             shift = end.next_sample + round(gap_ns * 1e-9 * end.sampling_rate_hz) - more[0].first_sample
             signals[topic] = (
@@ -295,18 +295,18 @@ def _dataset(bags: Sequence[Path], slides: str, topics: Sequence[str], crossed: 
 
 
 def _recognised(name: str, bags: Sequence[Path]) -> dict[str, Any]:
-    """Return what a recipe learns, and what it says of slides it has not seen."""
+    """Return what a recipe learns, and its estimates of slides that were not trained."""
     recipe = load_recipe(name)
     crossed = any('@' in topic for topic in recipe.as_mapping()['inputs'])
     topics = recipe.feature_set.topics
     model = train(recipe, training_examples(recipe, _dataset(bags, TRAINED, topics, crossed)), name)
-    said = {}
+    results = {}
     for slide, events in _dataset(bags, TESTED, topics, crossed).windows(recipe.feature_set):
         vectors, estimates, _ = run_model(model, events)
         windows = [vector for vector in vectors if not vector.last]
         logs = model.predict_log_proba(np.stack([vector.values for vector in windows]))
         final = estimates[-1]
-        said[slide.surface] = {
+        results[slide.surface] = {
             'windows': len(windows),
             'features': [digest(vector.values) for vector in windows[:SHOWN_WINDOWS]],
             # Logarithms: the probabilities of a certain window are all 1 or 0 but for the last digits.
@@ -326,7 +326,7 @@ def _recognised(name: str, bags: Sequence[Path]) -> dict[str, Any]:
         'feature_set': model.feature_set,
         'features': len(model.names),
         'exponent': rounded(float(model.tempering_exponent)),
-        'slides': said,
+        'slides': results,
     }
 
 
@@ -336,19 +336,19 @@ def _graded(name: str, bags: Sequence[Path]) -> dict[str, Any]:
     cut = replace(recipe.feature_set, windows=recipe.training_windows)
     examples = SlideDataset.from_bags(bags, TRAINED, None, cut.topics).features(cut)
     model = train_grades(recipe, examples, read_grades('ets_roughness'), name)
-    said = {}
+    results = {}
     for slide, vectors in SlideDataset.from_bags(bags, TESTED, None, cut.topics).vectors(recipe.feature_set):
         accumulator, estimate = RoughnessAccumulator(model), None
         for vector in vectors:
             estimate = accumulator.update(vector) or estimate
         windows = np.stack([vector.values for vector in vectors if not vector.last][:SHOWN_WINDOWS])
-        said[slide.surface] = {
+        results[slide.surface] = {
             'features': [digest(values) for values in windows],
             'grades': rounded([np.asarray(part) for part in model.grade(windows)]),
             'final': estimate
             and rounded({'grade': estimate.grade, 'std': estimate.grade_std, 'valid': estimate.valid}),
         }
-    return {'feature_set': model.feature_set, 'features': len(model.names), 'slides': said}
+    return {'feature_set': model.feature_set, 'features': len(model.names), 'slides': results}
 
 
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=2.0, distance_m=0.03)
@@ -538,7 +538,7 @@ def check(only: str = '', strict: bool = False) -> list[str]:
 
 
 def main() -> int:
-    """Write or check, as the command line says."""
+    """Write or check, as the command line requests."""
     parser = argparse.ArgumentParser(description='the golden set of the suite')
     use = parser.add_mutually_exclusive_group(required=True)
     use.add_argument('--write', action='store_true', help='store the rows; explain every change in the commit')

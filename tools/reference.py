@@ -69,7 +69,7 @@ def parameter_table(cls: type) -> str:
 
 
 def messages(root: Path) -> str:
-    """Return all interfaces as Markdown: what a file says before its first field, then the file as it is."""
+    """Return all interfaces as Markdown: what a file documents before its first field, then the file as it is."""
     parts = []
     for kind, title in INTERFACE_KINDS.items():
         parts.append(f'## {title}\n')
@@ -227,11 +227,11 @@ def experiment(name: str, root: Path) -> str:
             ]
             rows.append(f'| {task} | {method} | {" | ".join(cells)} |')
             for condition, part in {**figures.get('conditions', {}), **figures.get('sets', {})}.items():
-                shares = f'{percent(part["test"])} | – | {percent(part.get("over_seeds"))}'
-                rows.append(f'| {task} | {method}: {condition} | – | – | {shares} |')
+                fractions = f'{percent(part["test"])} | – | {percent(part.get("over_seeds"))}'
+                rows.append(f'| {task} | {method}: {condition} | – | – | {fractions} |')
     table = '\n'.join(rows) if numbers.get('tasks') else ''
     anchor = difficulty(numbers.get('difficulty') or {})
-    unit = 100.0 if numbers.get('tasks') else 1.0  # points of a share, or grades
+    unit = 100.0 if numbers.get('tasks') else 1.0  # percentage points, or grades
     data = f'Data: {content["data"]}. Split: {content["split"]}.'
     return f'{data}\n\n{table}\n\n{anchor}\n{_findings(numbers["findings"], seeds[0], count, unit)}\n'
 
@@ -283,18 +283,18 @@ def grades(root: Path) -> str:
         for regressor, figures in found.items():
             published = numbers['paper'].get(regressor, {})
             for kind in ('seen', 'unseen'):
-                own = figures[kind]
-                means = own.get('means', {})
+                figures_of_kind = figures[kind]
+                means = figures_of_kind.get('means', {})
                 cells = [
                     f'{regressor}{label}',
                     kind,
                     f'{published[kind]:.2f}' if published else '–',
-                    plain(own.get('over_seeds', [own['error']])),
-                    plain(own.get('over_textures', []), middle=False),
-                    plain(means.get('error_none_as_0', [own['error_none_as_0']])),
-                    f'{100 * own["without_grade"]:.0f} %',
+                    plain(figures_of_kind.get('over_seeds', [figures_of_kind['error']])),
+                    plain(figures_of_kind.get('over_textures', []), middle=False),
+                    plain(means.get('error_none_as_0', [figures_of_kind['error_none_as_0']])),
+                    f'{100 * figures_of_kind["without_grade"]:.0f} %',
                     f'{published[f"std_{kind}"]:.2f}' if published else '–',
-                    plain(means.get('std', [own['std']])),
+                    plain(means.get('std', [figures_of_kind['std']])),
                 ]
                 rows.append(f'| {" | ".join(cells)} |')
     about = f'Mean absolute error in grades from 1 to 5. Data: {content["data"]}. Split: {content["split"]}.'
@@ -321,8 +321,8 @@ def later(root: Path) -> str:
     ]
     for name, cell in sorted(cells.items(), key=lambda item: -item[1]['window_accuracy']):
         after = cell['accuracy_at_s']['5.0']
-        shares = (cell['window_accuracy'], after, cell['unclassified_windows'])
-        rows.append(f'| {name} | {" | ".join(map(percent, shares))} | {_definition(name, cell)} |')
+        fractions = (cell['window_accuracy'], after, cell['unclassified_windows'])
+        rows.append(f'| {name} | {" | ".join(map(percent, fractions))} | {_definition(name, cell)} |')
     return '\n'.join(rows) + '\n'
 
 
@@ -332,14 +332,14 @@ def _definition(recipe: str, cell: dict[str, Any]) -> str:
     return measured if measured and measured == digest_of(recipe) else 'an earlier one'
 
 
-def percent(share: float | list[float] | None) -> str:
-    """Return a share in percent, with its interval if it has one."""
-    if share is None:
+def percent(fraction: float | list[float] | None) -> str:
+    """Return a fraction in percent, with its interval if it has one."""
+    if fraction is None:
         return '–'
-    if isinstance(share, list):
-        middle, low, high = (100 * value for value in share)
+    if isinstance(fraction, list):
+        middle, low, high = (100 * value for value in fraction)
         return f'{middle:.1f} % ({low:.1f} to {high:.1f})'
-    return f'{100 * share:.1f} %'
+    return f'{100 * fraction:.1f} %'
 
 
 def recipes(root: Path) -> str:
@@ -398,7 +398,7 @@ def experiments(root: Path) -> str:
 
 
 def elements(root: Path) -> str:
-    """Return what each paper says and what is done here, element by element, from the docstrings of its module."""
+    """Return what each paper describes and what is done here, element by element, from the docstrings of its module."""
     return '\n\n'.join(_elements(root / PAPERS / f'{name}.py', title) for name, title in PAPER_MODULES.items())
 
 
@@ -431,7 +431,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'commands': (
         'Commands',
         'Each is called as `texture NAME`, and has `--help`. It ends with 0 for success, 2 if an argument is wrong or '
-        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C broke it off.',
+        'something is missing, 1 for a bad outcome, and 130 if Ctrl-C interrupted it.',
         commands,
     ),
     'parameters': (
@@ -444,7 +444,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
     'catalogues': (
         'Catalogues',
         'All names that recipes, scenes, requests and parameters may use. Instead of a name write `module:Class` for '
-        'one of your own.',
+        'a custom one.',
         parts(
             ('Sensors', 'Values of the parameter `sensor`.', catalogue(SENSORS)),
             ('Arms', 'Values of the parameter `arm`.', catalogue(ARMS)),
@@ -491,7 +491,7 @@ PAGES: Mapping[str, tuple[str, str, Callable[[Path], str]]] = {
             ('Roughness', 'Mean error of the roughness grades, in the paper and here.', grades),
             (
                 'Experiments',
-                'All methods of each experiment: the share of the tested slides that were recognised, where a tie '
+                'All methods of each experiment: the fraction of the tested slides that were recognised, where a tie '
                 'counts as not recognised, and what was found about the claims of its paper.',
                 experiments,
             ),

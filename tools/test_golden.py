@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The suite says of fixed slides what it said when the golden set was stored; see golden.py on what to do if not."""
+"""The suite gives the results of the stored golden set on fixed slides; see golden.py on what to do if not."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_every_recipe_and_arm_is_in_the_golden_set() -> None:
         for name, source in golden.SOURCES.items()
     ],
 )
-def test_the_recipes_say_what_they_said(source: str) -> None:
+def test_the_recipes_give_the_stored_results(source: str) -> None:
     if not golden.available(golden.SOURCES[source]):
         pytest.skip(f'no recorded data in {golden.DATA}; set TEXTURE_DATA to its folder')
     assert golden.check(f' on {source}') == []
@@ -62,10 +62,10 @@ def test_a_word_that_no_row_has_is_refused_in_one_sentence(
     monkeypatch.setattr(sys, 'argv', ['golden.py', use, '--only', 'defualt'])
     before = golden.STORED.read_bytes()
     assert golden.main() == 2
-    said = capsys.readouterr()
-    assert said.out == ''
-    assert said.err.startswith("golden: no row that can be computed here has 'defualt' in its name")
-    assert said.err.count('\n') == 1
+    output = capsys.readouterr()
+    assert output.out == ''
+    assert output.err.startswith("golden: no row that can be computed here has 'defualt' in its name")
+    assert output.err.count('\n') == 1
     assert golden.STORED.read_bytes() == before
 
 

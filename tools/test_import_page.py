@@ -30,7 +30,7 @@ COMMAND = re.compile(r'^    (texture .*)$', re.MULTILINE)
 
 
 @pytest.fixture(scope='module')
-def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def output(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Follow the page in an empty folder, and return what its commands print."""
     before, folder = Path.cwd(), tmp_path_factory.mktemp('reader')
     os.chdir(folder)
@@ -52,24 +52,24 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.mark.benchmark
-def test_the_page_shows_the_file_that_its_script_writes(said: str) -> None:
+def test_the_page_shows_the_file_that_its_script_writes(output: str) -> None:
     first = Path('my_csv/2031-05-01, linen, v20.csv').read_text().split('\n')[:4]
     assert '\n'.join(first) in PAGE
 
 
 @pytest.mark.benchmark
-def test_the_page_shows_what_the_import_prints(said: str) -> None:
+def test_the_page_shows_what_the_import_prints(output: str) -> None:
     shown = TUTORIAL.split('```text\n')[2].split('```')[0]
-    assert said.count(shown) == 2  # once by --dry-run
+    assert output.count(shown) == 2  # once by --dry-run
 
 
 @pytest.mark.benchmark
-def test_a_reader_ends_with_figures_charts_and_a_file(said: str) -> None:
+def test_a_reader_ends_with_figures_charts_and_a_file(output: str) -> None:
     for name in ('figure.png', 'figures.json', 'slides.parquet'):
         assert Path(name).stat().st_size > 200, name
-    assert "'mine' against 'default' on 36 slides" in said
-    assert '36 (250, 3)' in said
-    assert "36 ['cork_thick', 'linen', 'oak board']" in said
+    assert "'mine' against 'default' on 36 slides" in output
+    assert '36 (250, 3)' in output
+    assert "36 ['cork_thick', 'linen', 'oak board']" in output
 
 
 @pytest.mark.parametrize('text', BLOCK.findall(REFERENCE))

@@ -31,9 +31,9 @@ def test_every_cell_runs_after_those_above_it(
     names: dict[str, object] = {'__name__': '__main__'}
     for number, text in enumerate(cells(notebook), 1):
         exec(compile(text, f'{notebook.name}, cell {number}', 'exec'), names)
-    said = capsys.readouterr().out
-    assert '36 slides over 3 surfaces from 12 files' in said
-    assert 'PairedComparison(first=' in said
+    output = capsys.readouterr().out
+    assert '36 slides over 3 surfaces from 12 files' in output
+    assert 'PairedComparison(first=' in output
     assert (tmp_path / 'figure.png').stat().st_size > 10_000
 
 

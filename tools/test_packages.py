@@ -88,7 +88,7 @@ LAUNCHING = {'launch_ros', 'launch_xml', 'ros2launch'}
 
 @dataclass(frozen=True)
 class Layer:
-    """What a package may import of the suite, what its tests may beside, and which libraries it must do without."""
+    """What a package may import of the suite, what its tests may in addition, and which libraries it must not need."""
 
     may: frozenset[str]
     tests: frozenset[str] = frozenset()
@@ -104,7 +104,7 @@ def of(*short: str) -> frozenset[str]:
 LEARNING = frozenset({'sklearn', 'skops', 'pymoo', 'joblib', 'distributed'})
 DRAWING = frozenset({'matplotlib'})
 SCIPY = frozenset({'scipy'})
-# As in docs/architecture.md. A package stands below all that it may import, so there can be no cycle.
+# As in docs/architecture.md. A package comes after all that it may import, so there can be no cycle.
 LAYERS: Mapping[str, Layer] = {
     'texture_msgs': Layer(of()),
     'texture_core': Layer(of('msgs'), never=LEARNING | DRAWING | SCIPY),
@@ -170,8 +170,8 @@ def top(modules: Iterable[str]) -> set[str]:
 def imports(package: Path, folder: str) -> set[str]:
     """Return what the modules in a folder of a package import from outside Python and the package."""
     files = list((package / folder).rglob('*.py'))
-    beside = {path.stem for path in (*files, *ROOT.glob('examples/*.py'))} if folder == 'test' else set()
-    return set().union(*(top(at_once | late) for at_once, late in map(imported, files))) - {package.name} - beside
+    importable = {path.stem for path in (*files, *ROOT.glob('examples/*.py'))} if folder == 'test' else set()
+    return set().union(*(top(at_once | late) for at_once, late in map(imported, files))) - {package.name} - importable
 
 
 def depends(package: Path, *tags: str) -> set[str]:
@@ -217,14 +217,14 @@ def test_a_manifest_names_the_extras_that_its_package_imports(package: Path) -> 
 
 
 @pytest.mark.parametrize('package', DEPLOYED, ids=lambda package: package.name)
-def test_what_is_deployed_runs_without_extras_or_says_in_one_sentence_which_it_needs(package: Path) -> None:
+def test_what_is_deployed_runs_without_extras_or_states_in_one_sentence_which_it_needs(package: Path) -> None:
     files = sorted((package / package.name).rglob('*.py'))
     modules = ['.'.join(path.relative_to(package).with_suffix('').parts).removesuffix('.__init__') for path in files]
     command = [sys.executable, '-c', WITHOUT_EXTRAS, ' '.join([*EXTRAS, 'h5py']), *modules]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    said = set(done.stdout.splitlines())
-    assert said == ({str(MissingLibrary('rosbags', 'bags', 'bags'))} if package.name in NEED_BAGS else set())
+    printed = set(done.stdout.splitlines())
+    assert printed == ({str(MissingLibrary('rosbags', 'bags', 'bags'))} if package.name in NEED_BAGS else set())
 
 
 @each
@@ -254,7 +254,7 @@ def test_the_table_of_layers_has_every_package_once_and_below_what_it_imports() 
     assert set(LAYERS) == {package.name for package in PACKAGES}
     above: set[str] = set()
     for name, layer in LAYERS.items():
-        assert layer.may <= above, f'{name} may import what stands below it'
+        assert layer.may <= above, f'{name} may import what comes after it'
         above.add(name)
 
 

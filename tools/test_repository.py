@@ -87,7 +87,7 @@ def public_classes(text: str) -> set[str]:
 
 
 def test_no_two_public_classes_of_the_suite_have_the_same_name() -> None:
-    """Who reads the name of a class shall know which one is meant, without looking at its import."""
+    """The name of a class is unambiguous without looking at its import."""
     modules = [path for root in ('src', 'tools') for path in (ROOT / root).rglob('*.py')]
     code = [path for path in modules if 'test' not in path.parts and not path.name.startswith('test_')]
     counts = Counter(name for path in code for name in public_classes(path.read_text(encoding='utf-8')))

@@ -145,7 +145,7 @@ def test_the_files_that_the_page_on_extending_names_exist() -> None:
     assert [name for name, found in paths.items() if not any(path.exists() for path in found)] == []
 
 
-def test_the_emulated_sensor_of_the_page_passes_its_own_test(examples: Path) -> None:
+def test_the_emulated_sensor_of_the_page_passes_its_test(examples: Path) -> None:
     module = importlib.import_module('my_textures.test_udp_finger')
     module.test_a_slide_arrives_as_it_was_sent_and_a_lost_datagram_is_counted()
 
@@ -218,7 +218,7 @@ def test_the_learner_of_the_page_holds_nothing_out_where_a_label_has_a_single_wi
     np.testing.assert_allclose(np.exp(predicted).sum(axis=1), 1.0)
 
 
-def said(path: Path) -> Iterator[str]:
+def texts(path: Path) -> Iterator[str]:
     """Yield every text of a file, with … where something is filled in."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.JoinedStr):
@@ -228,7 +228,7 @@ def said(path: Path) -> Iterator[str]:
 
 
 def test_the_sentences_in_troubleshooting_are_those_of_the_programs() -> None:
-    spoken = '\n'.join(text for path in ROOT.glob('src/texture_*/texture_*/**/*.py') for text in said(path))
+    spoken = '\n'.join(text for path in ROOT.glob('src/texture_*/texture_*/**/*.py') for text in texts(path))
     tables = (('operate', '## Troubleshooting'), ('integrate', '## The first ten faults'))
     rows = '\n'.join((DOCS / f'{page}.md').read_text().partition(heading)[2] for page, heading in tables)
     quoted = re.findall(r'^\| `([^`]+)`', rows, re.MULTILINE)
@@ -259,8 +259,8 @@ def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line:
 def options_of(parser: argparse.ArgumentParser) -> set[str]:
     """Return all options of a parser and of its sub-commands."""
     below = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
-    own = {option for action in parser._actions for option in action.option_strings}
-    return own.union(*(options_of(found) for action in below for found in action.choices.values()))
+    names = {option for action in parser._actions for option in action.option_strings}
+    return names.union(*(options_of(found) for action in below for found in action.choices.values()))
 
 
 def test_every_option_that_a_page_names_is_one_of_a_command() -> None:
@@ -280,9 +280,9 @@ OF_OTHERS = {'--build-arg'}  # docker
 def launch_arguments(name: str) -> set[str]:
     """Return the arguments that a launch file of the suite declares, with those of the files it includes."""
     text = (ROOT / 'src/texture_bringup/launch' / f'{name}.launch.xml').read_text()
-    own = set(re.findall(r'<arg name="(\w+)" (?:default|description)=', text))
+    names = set(re.findall(r'<arg name="(\w+)" (?:default|description)=', text))
     included = re.findall(r'<include file="\S+ texture_bringup\)/launch/(\w+)\.launch', text)
-    return own.union(*(launch_arguments(name) for name in included))
+    return names.union(*(launch_arguments(name) for name in included))
 
 
 @pytest.mark.parametrize(('page', 'line'), commands('ros2 run'))

@@ -26,9 +26,9 @@ def test_another_distribution_is_refused_with_what_to_do(
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
     monkeypatch.setenv('ROS_DISTRO', 'humble')
     assert workspace.main() == 2
-    said = capsys.readouterr().err
-    assert "ROS 2 'humble' is sourced in this shell" in said
-    assert 'source /opt/ros/jazzy/setup.bash' in said
+    output = capsys.readouterr().err
+    assert "ROS 2 'humble' is sourced in this shell" in output
+    assert 'source /opt/ros/jazzy/setup.bash' in output
 
 
 def test_the_python_of_an_environment_is_kept_whatever_runs_the_set_up(

@@ -35,7 +35,7 @@ BUILD_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
 BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages')
 # Files of a package that need a new build when they change; Python modules are linked, not copied.
 BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.action')
-# Behind the suite come an overlay that the user has sourced, and sensors, motions and features of their own.
+# After the suite come an overlay that the user has sourced, and custom sensors, motions and features.
 EXTENDED = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH')
 # These are linked: only their names matter.
 LISTED = ('nodes/*.py', 'commands/*.py', 'bin/*', 'launch/*', 'config/*', 'config/*/*')
@@ -58,7 +58,7 @@ def main() -> int:
 
 
 class SetupError(Exception):
-    """A sentence that says what is missing and what to do."""
+    """A sentence that states what is missing and what to do."""
 
 
 def own_interpreter() -> list[str]:
@@ -92,7 +92,7 @@ def choose_interpreter(kept: list[str]) -> tuple[str, tuple[int, ...]]:
 
 
 def sourced_ros() -> str:
-    """Return the name of the ROS distribution sourced in this shell, or '' (our own environment does not count)."""
+    """Return the name of the ROS distribution sourced in this shell, or '' (the suite's does not count)."""
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     foreign = [p for p in prefixes if p and not Path(p).is_relative_to(ROOT)]
     return os.environ.get('ROS_DISTRO', '') if foreign else ''
@@ -109,7 +109,7 @@ def checked_distribution(sourced: str) -> str:
 
 
 def once(step: str, version: tuple[int, ...], inputs: list[Path], action: Callable[[], None], extra: str = '') -> str:
-    """Run `action` unless the stamp of `step` says that it ran on just these inputs; return the stamp."""
+    """Run `action` unless the stamp of `step` shows that it ran on these inputs; return the stamp."""
     digest = hashlib.sha256(f'{version} {ROOT} {extra}'.encode())
     for path in inputs:
         digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
@@ -136,7 +136,7 @@ def make_venv(interpreter: str, sourced: str) -> None:
 
 
 def install_packages(sourced: str) -> None:
-    """Install the locked packages, or what is missing beside a sourced installation."""
+    """Install the locked packages, or what is missing from a sourced installation."""
     print('set-up: installing packages')
     pip = [PYTHON, '-m', 'pip', '--disable-pip-version-check', '--quiet', 'install']
     if sourced:
@@ -254,7 +254,7 @@ def write_commands(env: dict[str, str]) -> None:
         'export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"',
     ]
     head = '#!/usr/bin/env bash\n# Written by tools/workspace.py.\n' + '\n'.join(exports) + '\n'
-    # In the folder the user stands in nothing is looked for: it may be a stranger's.
+    # The current folder is not searched: it may be somebody else's.
     texture = f'exec env PYTHONSAFEPATH=1 {PYTHON} -m texture_bringup.command "$@"\n'
     for name, tail in {'ros-run': 'exec "$@"\n', 'texture': texture}.items():
         command = VENV / 'bin' / name

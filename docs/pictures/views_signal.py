@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Draw a slide from a bag of /views/signal as PlotJuggler does: by header stamps, by readers that know no texture.
+"""Draw a slide from a bag of /views/signal as PlotJuggler does: by header stamps, by readers independent of the suite.
 
 The bag comes from `ros2 bag record --storage mcap --output slide /views/signal`, with `texture launch views` during an
 exploration; then `pip install mcap-ros2-support matplotlib` and `python docs/pictures/views_signal.py slide`.

@@ -60,24 +60,24 @@ def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
     return benches
 
 
-def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
+def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_on_request(benches, tmp_path: Path, capfd) -> None:
     assert set(LONG) > {'overview'}
     for more, count in (([], 1), (['--long'], 2)):
         assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
-        said = capfd.readouterr().out
-        assert f'{count} benchmarks in ' in said
-        assert 'missing: left out: no folder of recorded data was given' in said
-        assert 'left out, for their data is missing: missing; failed: none' in said
+        output = capfd.readouterr().out
+        assert f'{count} benchmarks in ' in output
+        assert 'missing: left out: no folder of recorded data was given' in output
+        assert 'left out, for their data is missing: missing; failed: none' in output
 
 
 def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path: Path, capfd) -> None:
     benches['clock'] = bad
     benches['last'] = good
     assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path)]) == 1
-    said = capfd.readouterr()
-    assert '2 benchmarks in ' in said.out
-    assert 'failed: clock' in said.out
-    assert 'deliberately' in said.err
+    output = capfd.readouterr()
+    assert '2 benchmarks in ' in output.out
+    assert 'failed: clock' in output.out
+    assert 'deliberately' in output.err
     assert (tmp_path / 'good.json').is_file()
 
 
@@ -88,9 +88,9 @@ def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path:
 def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
     monkeypatch.delenv('TEXTURE_DATA', raising=False)
     assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count('\n') == 1
+    output = capsys.readouterr().err
+    assert sentence in output
+    assert output.count('\n') == 1
 
 
 @pytest.mark.parametrize(

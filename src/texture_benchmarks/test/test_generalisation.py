@@ -106,7 +106,7 @@ def test_what_is_finished_is_not_computed_again_and_what_is_not_is_named(tmp_pat
     assert result.numbers[DISTANCE]['0'] == {SVC: json.loads(json.dumps(cell))}
 
 
-def test_names_are_of_the_places_asked_for() -> None:
+def test_names_are_of_the_requested_places() -> None:
     assert names_of(slides().in_parts(2), '2', '2/2') == ['cork/2 part 2/2', 'felt/2 part 2/2']
 
 

@@ -64,7 +64,7 @@ def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
     assert all(chart.is_file() for chart in result.charts)
     chosen = result.numbers['chosen_motions']
     assert chosen[SIMULATED]['informed'][-1] >= 0.6
-    assert all(0.25 < shares[-1] <= 1.0 for shares in chosen[RECORDED].values())  # chance is a quarter
+    assert all(0.25 < fractions[-1] <= 1.0 for fractions in chosen[RECORDED].values())  # chance is a quarter
 
 
 def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_without_recordings_there_is_one_sentence(tmp_path: Path) -> None:
 
 def test_trials_are_recognised_once_a_motion_distinguishes_the_textures() -> None:
     textures = ('cork', 'felt', 'wood')
-    motions = MOTIONS[:2]  # the second one tells nothing
+    motions = MOTIONS[:2]  # the second one carries no information
     values = np.random.default_rng(0).standard_normal((2, 3, 8, 2))
     values[0, :, :, 0] += 100.0 * np.arange(3)[:, None]
     known = known_from(motions, values, textures)

@@ -76,7 +76,7 @@ def call_through(graph: Graph, received: Estimates) -> None:
         return bool(received)
 
     graph.wait_until(answered, 60.0, 'the answer to an empty slide')
-    graph.node.destroy_publisher(states)  # beside which nothing can be replayed
+    graph.node.destroy_publisher(states)  # while it exists nothing can be replayed
     graph.spin(0.5)
     received.clear()
 

@@ -12,7 +12,7 @@ from texture_benchmarks import overview, peers
 from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.overview import ALL_CHANNELS, RECIPES, VIBRATION, jobs_of, spread
 from texture_benchmarks.peers import CLASSIFIERS, recipe_of, right_over_time
-from texture_benchmarks.study import APART_S, BenchmarkOptions, trained_apart
+from texture_benchmarks.study import SPACING_S, BenchmarkOptions, with_spaced_windows
 from texture_core.types import ExplorationState, Phase, TactileSignal
 from texture_estimation.recipe import FAST_TOPIC, load_recipe
 from texture_recordings.slides import LabelledSlide
@@ -31,11 +31,11 @@ def test_recipes_are_compared_with_the_channels_that_they_read(channels: str) ->
 
 def test_only_the_distance_of_training_windows_differs_from_the_released_recipe() -> None:
     released = load_recipe('ets-fine-svm')
-    compared = trained_apart(released)
-    assert compared.training.hop_s == APART_S
+    compared = with_spaced_windows(released)
+    assert compared.training.hop_s == SPACING_S
     assert compared.feature_set == released.feature_set
     assert compared.learner == released.learner
-    assert trained_apart(load_recipe('jamali-naive-bayes-5')).training.hop_s == 2.0
+    assert with_spaced_windows(load_recipe('jamali-naive-bayes-5')).training.hop_s == 2.0
 
 
 def test_peers_are_left_out_where_their_packages_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,7 +65,7 @@ def test_a_slow_channel_keeps_its_value_until_the_next_one_comes() -> None:
     np.testing.assert_array_equal(windows[1, 1], np.repeat(np.arange(25, 50), 20))
 
 
-def test_names_at_lines_stand_apart_and_keep_their_order() -> None:
+def test_names_at_lines_keep_a_spacing_and_their_order() -> None:
     assert spread([0.0, 0.05, 1.0], 0.2) == pytest.approx([0.0, 0.2, 1.0])
     assert spread([1.0, 0.95], 0.2) == pytest.approx([1.15, 0.95])
 

@@ -69,7 +69,7 @@ def times_to_be_ready_again(model, folder, kills):
         assert received[-1].model
         times_s = []
         for _ in range(kills):
-            graph.spin(1.0)  # what is under way
+            graph.spin(1.0)  # what is in progress
             *_, pid = re.findall(r'\[launch\] classifier started \(process (\d+)\)', (folder / 'log').read_text())
             os.kill(int(pid), signal.SIGKILL)
             began_s = time.monotonic()

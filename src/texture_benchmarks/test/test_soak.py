@@ -23,7 +23,7 @@ MIB = 2**20
 def failed(*trials, counts=(), memory=()):
     """Return what does not hold, shortened to its beginning."""
     found = check([FAULT, CALM, *trials], Counter(dict(counts)), memory)
-    return [asked for asked, one in found.items() if not one['holds']]
+    return [requirement for requirement, one in found.items() if not one['holds']]
 
 
 def test_a_calm_run_holds_everything() -> None:
@@ -31,7 +31,7 @@ def test_a_calm_run_holds_everything() -> None:
 
 
 @pytest.mark.parametrize(
-    ('trials', 'asked'),
+    ('trials', 'requirement'),
     [
         ([FAULT._replace(took_s=61.0)], 'every exploration ends in 60 s'),
         ([FAULT._replace(message='')], 'every exploration succeeds or ends by name'),
@@ -43,8 +43,8 @@ def test_a_calm_run_holds_everything() -> None:
         ([FAULT._replace(silent=1)], 'every vector is answered or counted'),
     ],
 )
-def test_what_does_not_hold_is_named(trials, asked) -> None:
-    assert failed(*trials) == [asked]
+def test_what_does_not_hold_is_named(trials, requirement) -> None:
+    assert failed(*trials) == [requirement]
 
 
 def test_what_a_killed_classifier_leaves_and_what_is_counted_is_excused() -> None:
@@ -95,8 +95,8 @@ def test_after_each_fault_that_ends_an_exploration_calm_ones_come_until_one_succ
 @pytest.mark.benchmark
 @pytest.mark.realtime
 def test_each_fault_ends_within_the_limits_with_a_free_finger_and_a_calm_exploration_after_it() -> None:
-    said: list[str] = []
-    numbers = soak(1.0, 0, said.append).numbers
+    logged: list[str] = []
+    numbers = soak(1.0, 0, logged.append).numbers
     assert set(numbers['faults']) == {*FAULTS, NONE}
-    assert [asked for asked, one in numbers['requirements'].items() if not one['holds']] == [], said
+    assert [requirement for requirement, one in numbers['requirements'].items() if not one['holds']] == [], logged
     assert all(one['explorations'] == sum(one[ending] for ending in ENDINGS) for one in numbers['faults'].values())

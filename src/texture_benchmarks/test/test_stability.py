@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The predicted border of stability against a running controller on a finely integrated spring."""
+"""The predicted stability limit against a running controller on a finely integrated spring."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What studies share: data sets, work on all cores, intervals."""
+"""Common to studies: data sets, work on all cores, intervals."""
 
 import threading
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from texture_benchmarks.study import BenchmarkOptions, finished_forked, imported, map_forked, share_interval
+from texture_benchmarks.study import BenchmarkOptions, accuracy_interval, finished_forked, imported, map_forked
 from texture_core.errors import InvalidData
 
 
@@ -57,6 +57,6 @@ def test_linear_algebra_keeps_to_one_thread_in_each() -> None:
 
 
 def test_an_interval_is_as_wide_as_slides_and_surfaces_ask_for() -> None:
-    assert share_interval([True] * 20, ['a', 'b'] * 10) == pytest.approx((0.8316, 1.0), abs=1e-4)  # 1 - 0.025^(1/20)
-    low, high = share_interval([True] * 10 + [False] * 10, ['a'] * 10 + ['b'] * 10)
-    assert (low, high) == (0.0, 1.0)  # one surface is right and one is wrong: any share may be
+    assert accuracy_interval([True] * 20, ['a', 'b'] * 10) == pytest.approx((0.8316, 1.0), abs=1e-4)  # 1 - 0.025^(1/20)
+    low, high = accuracy_interval([True] * 10 + [False] * 10, ['a'] * 10 + ['b'] * 10)
+    assert (low, high) == (0.0, 1.0)  # one surface is right and one is wrong: any fraction is possible

@@ -54,11 +54,11 @@ def test_wear_halves_the_power_at_its_cut_off_and_half_the_speed_the_frequency()
 
 
 @pytest.mark.parametrize(
-    ('shares', 'expected'),
+    ('fractions', 'expected'),
     [((1.0, 0.95, 0.85), 1.5), ((0.5, 0.4), 0.5), ((1.0, 0.9), None), ((0.0, 0.0), None)],
 )
-def test_a_curve_breaks_down_where_it_crosses_nine_tenths_of_its_start(shares, expected) -> None:
-    assert breakdown(range(len(shares)), shares) == (expected and pytest.approx(expected))
+def test_a_curve_breaks_down_where_it_crosses_nine_tenths_of_its_start(fractions, expected) -> None:
+    assert breakdown(range(len(fractions)), fractions) == (expected and pytest.approx(expected))
 
 
 def test_factors_break_down_on_both_sides_of_one() -> None:
@@ -76,7 +76,7 @@ def test_what_the_training_covers_is_read_from_the_recipe() -> None:
     assert covered['gain'] == pytest.approx((1 / 1.6, 1.6))
     assert covered['white noise'] == (0.0, 0.05)
     assert covered['speed'] == pytest.approx((0.85, 1.15))
-    assert {name for name, own in covered.items() if own} == {'gain', 'white noise', 'speed'}
+    assert {name for name, inside in covered.items() if inside} == {'gain', 'white noise', 'speed'}
 
 
 def batches(samples: np.ndarray, rate_hz: float, batch: int) -> LabelledSlide:

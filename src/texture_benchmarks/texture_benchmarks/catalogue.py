@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Studies by name, and how all of them run: each in a process of its own, so that one that fails stops no other."""
+"""Studies by name, and how all of them run: each in a separate process, so that one that fails stops no other."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Act = Callable[[str], int]  # runs a study by its name and returns the exit code
 
 
 def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
-    """Run one study; return its result and the JSON file, beside which its charts lie."""
+    """Run one study; return its result and the JSON file, with the charts next to it."""
     result = find(BENCHMARKS, name, 'benchmark')(options)
     if options.quick:
         result = replace(result, data=f'REDUCED, not for publishing; part of: {result.data}')
@@ -53,7 +53,7 @@ def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult
 
 
 def run_all(names: Sequence[str], act: Act) -> dict[str, int]:
-    """Run the act for each name in a process of its own; return the exit codes, below 0 of what was killed."""
+    """Run the act for each name in a separate process; return the exit codes, below 0 of what was killed."""
     context = multiprocessing.get_context('fork')  # nothing is imported again
     codes = {}
     for name in names:

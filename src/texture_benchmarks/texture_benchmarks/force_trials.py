@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Explorations in virtual time, on physics of their own: how hard a finger presses, and how each one ends.
+"""Explorations in virtual time, on independent physics: how hard a finger presses, and how each one ends.
 
 Needs neither ROS nor recorded data: `python -m texture_benchmarks.force_trials --out FOLDER` runs the whole sweep on
 all cores, and `texture benchmark motion --data FOLDER` makes the tables and charts of it.
@@ -95,7 +95,7 @@ class TrialEnd(NamedTuple):
 
 
 class VirtualMachine:
-    """A robot that holds the last velocity for ever, over a plane at z = 0 of its base."""
+    """A robot that keeps executing the last velocity, over a plane at z = 0 of its base."""
 
     def __init__(self, trial: ForceTrial) -> None:
         self.now_ns = 1_000_000_000
@@ -119,7 +119,7 @@ class VirtualMachine:
         return self.now_ns < self.broken_until_ns
 
     def advance(self) -> None:
-        """Go on by one step."""
+        """Advance by one step."""
         self.now_ns += STEP_NS
         while self._coming and self._coming[0][0] <= self.now_ns:
             self.velocity = self._coming.popleft()[1]
@@ -206,7 +206,7 @@ class Commander:
         """Return that another commands the arm, once ROS has shown it."""
         begin_ns, found_s = self.machine.second_ns, self.machine.trial.found_s
         seen = begin_ns and (self.machine.now_ns - begin_ns) * 1e-9 >= found_s
-        return 'another explorer commands the arm, too' if seen else ''
+        return 'another explorer also commands the arm' if seen else ''
 
     def beat(self, *, moving: bool) -> None:
         """There is no guard."""
@@ -281,7 +281,7 @@ class VirtualExplorer:
 
 
 class Second(threading.Thread):
-    """A second explorer, in turn with whoever calls `step`: one of both threads runs at a time."""
+    """A second explorer, alternating with the caller of `step`: one of both threads runs at a time."""
 
     def __init__(self, machine: VirtualMachine) -> None:
         super().__init__(daemon=True)
@@ -323,7 +323,7 @@ class Second(threading.Thread):
 
 
 def explored(trial: ForceTrial) -> TrialEnd:
-    """Explore once, or with a second explorer that begins meanwhile; what raises is an end, too."""
+    """Explore once, or with a second explorer that begins meanwhile; an exception is also an end."""
     machine, seconds, seen = VirtualMachine(trial), list[Second](), 0
 
     def happens(phase: str) -> None:

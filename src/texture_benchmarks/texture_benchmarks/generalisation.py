@@ -29,7 +29,7 @@ from texture_benchmarks.study import (
     finished_forked,
     imported,
     map_forked,
-    trained_apart,
+    with_spaced_windows,
 )
 from texture_benchmarks.trust import TRAINED, simulate
 from texture_core.errors import InvalidData
@@ -57,7 +57,7 @@ BETWEEN, THERE = 'between', 'at trained places'
 # Slides trained and tested: three draws, each trained before it is tested.
 DRAWS = {'1-20 → 21-30': ('1-20', '21-30'), '11-30 → 31-40': ('11-30', '31-40'), '1-20 → 31-40': ('1-20', '31-40')}
 FIRST_DRAW = next(iter(DRAWS))
-# Parts of ten of the track that are trained, and those that are tested then; from the other end, too.
+# Parts of ten of the track that are trained, and those that are tested then; also from the other end.
 PARTS = 10
 Span = tuple[int, int]
 GAPS: Sequence[tuple[Span, Mapping[str, Span]]] = (
@@ -132,24 +132,24 @@ def run(options: BenchmarkOptions, readers: Readers | None = None) -> BenchmarkR
     """
     sets = REDUCED if options.quick else SETS
     slides = _read_all(list(dict.fromkeys(one.data for one in sets.values())), options, readers or READERS)
-    pieces = [(name, recipe) for name, one in sets.items() for recipe in one.recipes if one.data in slides]
+    chunks = [(name, recipe) for name, one in sets.items() for recipe in one.recipes if one.data in slides]
     if not peers.available(peers.CNN):
-        pieces = [piece for piece in pieces if piece[1] != peers.CNN]
+        chunks = [chunk for chunk in chunks if chunk[1] != peers.CNN]
     # What was finished before, in the same folder, is not computed again.
     path = options.out / FINISHED
     options.out.mkdir(parents=True, exist_ok=True)
     found = _finished(path)
     if found:
-        print(f"{len(found)} pieces are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
-    left = [piece for piece in pieces if ', '.join(piece) not in found]
-    left.sort(key=lambda piece: (piece[1] == peers.CNN, piece[1] not in SLOW))
+        print(f"{len(found)} parts are of an earlier run, from '{path}'; remove it to compute all again", flush=True)
+    left = [chunk for chunk in chunks if ', '.join(chunk) not in found]
+    left.sort(key=lambda chunk: (chunk[1] == peers.CNN, chunk[1] not in SLOW))
     work = partial(_piece, slides, options.seed)
     with path.open('a', encoding='utf-8') as file:
-        for piece, cells in finished_forked(work, left, options.workers, options.budget_s):
-            found[', '.join(piece)] = cells
-            file.write(json.dumps({'piece': ', '.join(piece), 'cells': cells}) + '\n')
+        for chunk, cells in finished_forked(work, left, options.workers, options.budget_s):
+            found[', '.join(chunk)] = cells
+            file.write(json.dumps({'piece': ', '.join(chunk), 'cells': cells}) + '\n')
             file.flush()
-    missing = [piece for piece in map(', '.join, pieces) if piece not in found]
+    missing = [chunk for chunk in map(', '.join, chunks) if chunk not in found]
     missing += [f'{name} (no recordings)' for name, one in sets.items() if one.data not in slides]
     if not missing:
         path.unlink()
@@ -176,14 +176,14 @@ def _read(reader: Reader, options: BenchmarkOptions) -> SlideDataset | InvalidDa
 
 
 def _finished(path: Path) -> dict[str, list[Figures]]:
-    """Return the figures of the pieces in a file, by their names."""
+    """Return the figures of the parts in a file, by their names."""
     lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
     return {line['piece']: line['cells'] for line in map(json.loads, lines)}
 
 
-def _piece(slides: Mapping[str, SlideDataset], seed: int, piece: tuple[str, str]) -> list[Figures]:
+def _piece(slides: Mapping[str, SlideDataset], seed: int, chunk: tuple[str, str]) -> list[Figures]:
     """Return table, row and figures of each cell of one recipe on one set."""
-    name, recipe = piece
+    name, recipe = chunk
     source = {**SETS, **REDUCED}[name]
     found: defaultdict[tuple[str, str], dict[str, list[Answer]]] = defaultdict(lambda: defaultdict(list))
     for (table, row, _, draw), answers in answers_of(source.make(slides[source.data]), seed, recipe_of, recipe):
@@ -197,7 +197,7 @@ def _pooled(draws: Mapping[str, Sequence[Answer]]) -> dict[str, Any]:
     if len(draws) > 1:
         keys = ('accuracy', 'accepted_correct', 'accepted_wrong', 'most_accepted_wrong')
         each = {draw: figures(answers) for draw, answers in draws.items()}
-        cell['draws'] = {draw: {key: own[key] for key in keys} for draw, own in each.items()}
+        cell['draws'] = {draw: {key: figures_of_draw[key] for key in keys} for draw, figures_of_draw in each.items()}
     return cell
 
 
@@ -218,7 +218,7 @@ def answers_of(
         fit = partial(_peer, slides, windows, name, seed)
     else:
         long = trials.slides[0].sliding[-1].stamp_ns - trials.slides[0].sliding[0].stamp_ns > LONG_NS
-        recipe = trained_apart(recipe_named(name)) if name == SVC and long else recipe_named(name)
+        recipe = with_spaced_windows(recipe_named(name)) if name == SVC and long else recipe_named(name)
         fit = _recipe(trials.slides, recipe, accepts_all=name == SVC)
     found = []
     chosen = [one for one in trials.trials if one.all_recipes or name in QUICK_RECIPES]
@@ -566,7 +566,7 @@ def _sessions(slides: SlideDataset) -> TrialSet:
 
 def _read_borealtc(options: BenchmarkOptions) -> SlideDataset:
     """Cut the runs of a wheeled robot into slides."""
-    pieces = []
+    chunks = []
     length = round(BOREAL_S * BOREAL_HZ)
     with np.load(options.recordings('borealtc') / 'runs.npz', allow_pickle=False) as file:
         keys = sorted(key for key in file.files if key.endswith('/imu'))
@@ -576,8 +576,8 @@ def _read_borealtc(options: BenchmarkOptions) -> SlideDataset:
                 session = key.removesuffix('/imu').replace('/', '-')
                 starts = range(0, len(samples) - length + 1, length)
                 step = -(-len(starts) // BOREAL_SLIDES) or 1
-                pieces += [(ground, session, samples[start : start + length]) for start in starts[::step]]
-    return _of_sessions(pieces, 'signal', BOREAL_HZ, 'borealtc/imu')
+                chunks += [(ground, session, samples[start : start + length]) for start in starts[::step]]
+    return _of_sessions(chunks, 'signal', BOREAL_HZ, 'borealtc/imu')
 
 
 def _runs(slides: SlideDataset) -> TrialSet:
@@ -585,10 +585,10 @@ def _runs(slides: SlideDataset) -> TrialSet:
     trained: list[str] = []
     tested: list[str] = []
     for _, group in groupby(slides, key=lambda one: one.surface):
-        own = list(group)
-        runs = list(dict.fromkeys(one.session for one in own))
+        slides_of_material = list(group)
+        runs = list(dict.fromkeys(one.session for one in slides_of_material))
         earlier = set(runs[: math.ceil(BOREAL_TRAINED * len(runs))])
-        for one in own:
+        for one in slides_of_material:
             (trained if one.session in earlier else tested).append(one.name)
     return TrialSet('runs of borealtc', slides, [Trial('', trained, {(OTHER, 'borealtc, other runs'): tested})])
 
@@ -627,7 +627,7 @@ def _read_bags(name: str, options: BenchmarkOptions) -> SlideDataset:
 
 
 def _read_biotac20(options: BenchmarkOptions) -> SlideDataset:
-    """Read the materials at once, each by a process of its own: one after the other takes minutes."""
+    """Read the materials in parallel processes: one after the other takes minutes."""
     names = sorted(path.stem for path in options.recordings('biotac20').glob('material*.npz'))
     return SlideDataset(tuple(one for slides in map_forked(partial(_read_material, options), names) for one in slides))
 
@@ -687,7 +687,7 @@ def figures(answers: Sequence[Answer]) -> dict[str, Any]:
     ends = [one.ends[END] for one in answers]
     correct = np.array([label == one.surface for one, (label, _) in zip(answers, ends, strict=True)])
     accepted = np.array([known for _, known in ends])
-    shares = {'accuracy': correct, 'accepted_correct': accepted & correct, 'accepted_wrong': accepted & ~correct}
+    cases = {'accuracy': correct, 'accepted_correct': accepted & correct, 'accepted_wrong': accepted & ~correct}
     clusters = [one.cluster for one in answers]
     wrong = defaultdict(list)
     for one in answers:
@@ -696,9 +696,9 @@ def figures(answers: Sequence[Answer]) -> dict[str, Any]:
     return {
         'slides': len(answers),
         'clusters': len(set(clusters)),
-        **{name: float(which.mean()) for name, which in shares.items()},
+        **{name: float(which.mean()) for name, which in cases.items()},
         'interval': {
-            name: interval(np.stack([which, np.ones(len(which))], axis=1), clusters) for name, which in shares.items()
+            name: interval(np.stack([which, np.ones(len(which))], axis=1), clusters) for name, which in cases.items()
         },
         'accepted_wrong_at': {when: sum(which) / len(answers) for when, which in wrong.items()},
         'most_accepted_wrong': max(sum(which) / len(answers) for which in wrong.values()),
@@ -709,7 +709,7 @@ def figures(answers: Sequence[Answer]) -> dict[str, Any]:
 def result_of(
     found: Mapping[str, Sequence[Figures]], missing: Sequence[str], options: BenchmarkOptions
 ) -> BenchmarkResult:
-    """Return the figures of all cells, their chart, and the pieces that are missing."""
+    """Return the figures of all cells, their chart, and the missing parts."""
     numbers: dict[str, Any] = {table: {} for table in (DISTANCE, SPACING, HALVES, OTHER)}
     for table, row, name, cell in (one for cells in found.values() for one in cells):
         numbers[table].setdefault(row, {})[name] = cell

@@ -75,7 +75,7 @@ def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: Ben
     cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
     # The last of each slide is its end, which is no window; the first pass warms up.
     passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
-    alone_us = np.concatenate([own for timed in passes[1:] for own in timed])
+    alone_us = np.concatenate([of_slide for timed in passes[1:] for of_slide in timed])
     median, p99 = np.percentile(alone_us, (50, 99)).tolist()
     slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
     [live] = measure(folder / f'{recipe}.npz', slide).values()
@@ -96,7 +96,7 @@ HAND_TARGETS = {'cpu_percent': 50.0, 'p99_ms': 10.0}
 def run_hand(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on one simulated BioTac, then recognise with five of them at once through the running nodes.
 
-    Each finger has a feature extractor and a classifier of its own: 2.2 kHz of vibration in batches of 10 ms and 22
+    Each finger has a separate feature extractor and classifier: 2.2 kHz of vibration in batches of 10 ms and 22
     slow channels at 100 Hz; windows of 0.5 s every 0.1 s. Latency from publishing the last sample of a window to
     receiving its estimate, ms; computing time of all extractors and classifiers, in percent of one core.
     """
@@ -174,7 +174,7 @@ def grading_us(model: RoughnessModel, windows: Sequence[CutWindow], count: int) 
     """Return the computing time of `count` windows, taken in turn, µs: of the core, whatever other programs take."""
     evidence, taken_us = RoughnessAccumulator(model), []
     for number in range(WARM_UP + count):
-        # each a slide of its own: nothing follows a grade that is final
+        # each a separate slide: nothing follows a grade that is final
         window = windows[number % len(windows)]
         began = time.thread_time()
         evidence.update(model.recipe.feature_set.extract(window))

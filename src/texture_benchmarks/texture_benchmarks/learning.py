@@ -40,9 +40,9 @@ from texture_simulation.sensor_models import SENSORS
 
 @dataclass(frozen=True)
 class Score:
-    """Shares of test windows and of whole test slides that are right, 0 to 1.
+    """Accuracy of test windows and of whole test slides, 0 to 1.
 
-    `known` is the share of slides that are reported as known surfaces, `certain_and_wrong` that of slides which could
+    `known` is the fraction of slides that are accepted, `certain_and_wrong` that of slides that could
     have been stopped at their end with a wrong label.
     """
 
@@ -76,7 +76,7 @@ def run_incremental(
     stages: Sequence[int],
     path: Path,
 ) -> IncrementalRun:
-    """Return how a model does that knows all labels but `new` and is trained these slide by slide."""
+    """Return the figures of a model of all labels but `new` to which these are added slide by slide."""
     numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
     is_new = np.isin(examples.labels, list(new))
     test, training = numbers > last_training, numbers <= last_training
@@ -130,7 +130,7 @@ def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> Textu
 
 
 # --------------------
-# Slides needed to recognise a texture: with motions chosen for what they tell, in a fixed order, and at random.
+# Slides needed to recognise a texture: with motions chosen by information gain, in a fixed order, and at random.
 
 SIMULATED, RECORDED = 'simulated', 'recorded'
 SCENE, SLIDE_S = 'oriented', 0.5
@@ -148,7 +148,7 @@ TOUCH_M, TOUCHES = 0.006, 4  # each texture of ntp21 has one slide of 52 to 60 m
 def right_after_slides(
     known: NextTouchModel, motions: Sequence[SlideMotion], values: Array, rng: np.random.Generator, n_slides: int
 ) -> dict[str, Array]:
-    """Return the share of trials that are right after each slide, by the way in which motions are chosen.
+    """Return the accuracy of trials after each slide, by the strategy that chooses motions.
 
     `values` are features of slides (n_motions, n_textures, n_trials · n_slides, n_features), in the order of the known
     textures. The fixed order is the one that is chosen most often.
@@ -159,7 +159,7 @@ def right_after_slides(
         'fixed order': lambda _, slide: Counter(chosen[slide::n_slides]).most_common(1)[0][0],
         'random': lambda *_: motions[int(rng.integers(len(motions)))],
     }
-    shares = {}
+    fractions = {}
     for name, choose in ways.items():
         right = []
         for truth, first in itertools.product(range(values.shape[1]), range(0, values.shape[2], n_slides)):
@@ -169,8 +169,8 @@ def right_after_slides(
                 chosen += [motion] * (name == 'informed')
                 posterior = known.update(posterior, motion, values[motions.index(motion), truth, first + slide])
                 right.append(int(posterior.argmax()) == truth)
-        shares[name] = np.reshape(right, (-1, n_slides)).mean(axis=0)
-    return shares
+        fractions[name] = np.reshape(right, (-1, n_slides)).mean(axis=0)
+    return fractions
 
 
 def known_from(motions: Sequence[SlideMotion], values: Array, textures: Sequence[str]) -> NextTouchModel:
@@ -193,7 +193,7 @@ def simulated_slides(motions: Sequence[SlideMotion], count: int, rng: np.random.
         samples = simulate_slides(
             scene, surface, count, SimulatedSlide(speed, force, SLIDE_S, motion.direction_rad), rng
         )
-        windows = [Window(own.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force) for own in samples]
+        windows = [Window(raw.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force) for raw in samples]
         events = [CutWindow(0, '', SLIDE_S, SLIDE_S, {'signal': window}, speed, force, '') for window in windows]
         cells.append(np.stack([vector.values for vector in TOUCH_FEATURES.extract_many(events)]))
     return np.stack(cells).reshape(len(motions), len(scene.surfaces), count, -1)
@@ -204,13 +204,13 @@ def recorded_touches(slide: SlideSamples) -> Array:
     length = round(TOUCH_M / slide.speed_m_s * slide.rate_hz)
     count = len(slide.samples) // length
     batch = WindowBatch(slide.samples[: count * length].reshape(count, length, -1), slide.rate_hz)
-    [signal] = TOUCH_FEATURES.inputs
-    values: Array = np.concatenate([feature(batch) for _, feature in signal.features], axis=-1).mean(axis=1)
+    [raw] = TOUCH_FEATURES.inputs
+    values: Array = np.concatenate([feature(batch) for _, feature in raw.features], axis=-1).mean(axis=1)
     return values
 
 
 def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str, dict[str, list[float]]]:
-    """Return the share right after each slide, simulated and recorded, by the way in which motions are chosen."""
+    """Return the accuracy after each slide, simulated and recorded, by the strategy that chooses motions."""
     found: dict[str, list[dict[str, Array]]] = {SIMULATED: [], RECORDED: []}
 
     # Simulated: other slides of the same textures and motions.
@@ -233,11 +233,11 @@ def chosen_motions(options: BenchmarkOptions, bags: Sequence[Path]) -> dict[str,
     recorded, surfaces = list(dict.fromkeys(motion for motion, _ in touches)), sorted({name for _, name in touches})
     for trained in (0, 1):
         rng = np.random.default_rng([options.seed, trained])
-        own = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
+        tests = [(motion, name, values[trained::2]) for (motion, name), values in touches.items()]
         known = NextTouchModel.fit(
-            np.concatenate([values for *_, values in own]),
-            [name for _, name, values in own for _ in values],
-            [motion for motion, _, values in own for _ in values],
+            np.concatenate([values for *_, values in tests]),
+            [name for _, name, values in tests for _ in values],
+            [motion for motion, _, values in tests for _ in values],
         )
 
         def drawn(values: Array, rng: np.random.Generator = rng) -> Array:
@@ -266,8 +266,8 @@ FOLDS = 2  # for the calibration alone: less to wait for
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on 15 materials, add 5 more, test on later slides of all; several draws of the five.
 
-    Share of test windows and of whole test slides (final estimate) that are right, mean over the draws; processor
-    time of adding a slide, stored on disk. Chosen motions: share of trials in which the most probable texture is right
+    Accuracy of test windows and of whole test slides (final estimate), mean over the draws; processor
+    time of adding a slide, stored on disk. Chosen motions: accuracy of the most probable texture over trials
     after each slide, of simulated slides of 0.5 s (scene oriented, 16 motions) and of recorded touches of 6 mm (ntp21,
     16 speeds and forces, every other touch of each slide trained on), both described by mean_log_bands and moments.
     """

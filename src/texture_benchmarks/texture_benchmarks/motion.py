@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""How hard a finger presses in virtual time, on physics of its own; and where the force control is stable."""
+"""How hard a finger presses in virtual time, on independent physics; and where the force control is stable."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from texture_exploration.force_control import (
 # --------------------
 # The stability limit: predicted by eigenvalues, and that of the running controller.
 
-CYCLES = 60  # a simulated loop is judged after so many delays
+CYCLES = 60  # number of delays after which a simulated loop is evaluated
 SMALL = 0.1
 FINE = 20  # simulation steps per period
 
@@ -83,16 +83,16 @@ def stability_chart(
     }
 
 
-def border_chart(border: Mapping[str, Array], path: Path) -> Path:
+def limit_chart(limit: Mapping[str, Array], path: Path) -> Path:
     """Draw the gain from which the loop is unstable over its delay, predicted and simulated, and the chosen gains."""
     with chart(path, (8.0, 5.0)) as figure:
         axes = figure.subplots()
-        delay_ms = 1000 * border['delay_s']
-        rows = zip(border['stiffness_n_m'], border['predicted'], border['simulated'], COLOURS, strict=False)
+        delay_ms = 1000 * limit['delay_s']
+        rows = zip(limit['stiffness_n_m'], limit['predicted'], limit['simulated'], COLOURS, strict=False)
         for stiffness, predicted, simulated, colour in rows:
             chosen = [
                 ForceLoopParams(loop_delay_s=delay, max_stiffness_n_m=stiffness).gain_m_s_n(1 / ARM_RATE_HZ)
-                for delay in border['delay_s']
+                for delay in limit['delay_s']
             ]
             axes.semilogy(delay_ms, predicted, color=colour, label=f'{stiffness / 1000:g} kN/m')
             axes.semilogy(delay_ms, simulated, '.', color=colour)
@@ -125,8 +125,8 @@ def force_chart(rows: Mapping[str, Trials], path: Path) -> Path:
 
 
 ARM_RATE_HZ = 250.0
-BORDER_STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
-BORDER_DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
+STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
+DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
 QUICK_DELAYS_S = (0.0, 0.008, 0.02)
 
 
@@ -135,7 +135,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
     A late integrator on a spring with friction, by an arm of ROS controllers that holds the last velocity: stiffness
     of 0.2 to 20 kN/m, delay of 0 to 50 ms, noise of 3 to 20 mN; a wall, wrong signs and axes, a surface upside down 1
-    to 12 mm away; in each phase samples that are no numbers, broken links and a second explorer. Largest true forces of
+    to 12 mm away; in each phase non-finite samples, broken links and a second explorer. Largest true forces of
     each kind of trial, the most time above 10 N, and how the trials ended. Trials that `force_trials` has written
     into the folder of recorded data are taken from there.
     """
@@ -146,7 +146,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         planned = list(sweep(seeds, options.quick))
         result = Sweep(seeds, len(planned), ran(planned))
     rows = by_name(result.trials)
-    border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else BORDER_DELAYS_S)
+    limit = stability_chart(STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S)
     return BenchmarkResult(
         name='motion',
         measured=run.__doc__,
@@ -156,10 +156,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'seeds': result.seeds,
             'planned': result.planned,
             'rows': {name: row(trials) for name, trials in rows.items()},
-            'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
+            'border_error': float(np.abs(limit['simulated'] / limit['predicted'] - 1).max()),
         },
         charts=(
             force_chart(rows, options.out / 'motion_forces.png'),
-            border_chart(border, options.out / 'motion_stability.png'),
+            limit_chart(limit, options.out / 'motion_stability.png'),
         ),
     )

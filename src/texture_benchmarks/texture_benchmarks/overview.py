@@ -24,10 +24,10 @@ from texture_benchmarks.study import (
     QUICK_SLIDES,
     BenchmarkOptions,
     BenchmarkResult,
+    accuracy_interval,
     imported,
     map_forked,
-    share_interval,
-    trained_apart,
+    with_spaced_windows,
 )
 from texture_core.types import AnyArray, Array
 from texture_estimation.recipe import FAST_TOPIC
@@ -78,16 +78,16 @@ class _Job(NamedTuple):
     name: str
 
 
-# What comes of a job: its figures, and what tells how long each window takes, in µs.
+# Results of a job: its figures, and a function that returns the time for each window, in µs.
 _Tried = tuple[dict[str, Any], Callable[[], Array]]
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Train every method on earlier slides and test it on later ones, each with its own windows.
+    """Train every method on earlier slides and test it on later ones, each with the windows of its recipe.
 
     Recipes as released, those of papers with one set of variables each, their training windows at least 0.5 s apart;
-    peers with windows of 0.5 s that do not overlap. Share of slides recognised over the sliding time, with 95 %
-    intervals by bootstrap over surfaces, or exact over slides where these are wider; mean sliding time and share right
+    peers with windows of 0.5 s that do not overlap. Accuracy of slides over the sliding time, with 95 %
+    intervals by bootstrap over surfaces, or exact over slides where these are wider; mean sliding time and accuracy
     when each slide ends as soon as it is decided; computing time of a training (s) and of one window from samples to
     estimate (µs, median and 99th percentile), by the clock of the processor, of the round of 5 over all methods whose
     median was lowest.
@@ -102,7 +102,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         rounds = [{job: time_us() for job, (_, time_us) in tried.items()} for _ in range(LATENCY_ROUNDS)]
     numbers: dict[str, Any] = {VIBRATION: {}, ALL_CHANNELS: {}}
     for job, (figures, _) in tried.items():
-        median, p99 = min((np.percentile(own[job], (50, 99)).tolist() for own in rounds), key=itemgetter(0))
+        median, p99 = min((np.percentile(times[job], (50, 99)).tolist() for times in rounds), key=itemgetter(0))
         latency_us = {'median': round(median, 1), 'p99': round(p99, 1)}
         numbers[job.channels][job.name] = {**figures, 'latency_us': latency_us}
     return BenchmarkResult(
@@ -141,7 +141,7 @@ def _try(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tried:
 def _try_recipe(dataset: SlideDataset, split: Split, job: _Job) -> _Tried:
     recipe = recipe_of(job.name)
     if job.kind != OURS:
-        recipe = trained_apart(recipe)
+        recipe = with_spaced_windows(recipe)
     [fold] = (found := cross_validate(recipe, dataset, split.splitter)).folds
     results = found.pooled
     times = sorted({round(e.evidence_s, 6) for result in results for e in result.decisions})
@@ -192,7 +192,7 @@ def _try_peer(dataset: SlideDataset, split: Split, seed: int, job: _Job) -> _Tri
         alone += (votes.argmax(axis=1) == code).tolist()
         over_time.append(right_over_time(votes, code))
     hop_s = peers.WINDOWS.hop_s
-    right = {round(hop_s * number, 6): list(own) for number, own in enumerate(zip(*over_time, strict=False), 1)}
+    right = {round(hop_s * number, 6): list(each) for number, each in enumerate(zip(*over_time, strict=False), 1)}
     figures = {
         'kind': job.kind,
         'window_accuracy': float(np.mean(alone)),
@@ -214,18 +214,18 @@ def _time_peer(classifier: Any, windows: AnyArray) -> Array:
 
 
 def _over_time(right: Mapping[float, Sequence[bool]], surfaces: Sequence[str]) -> dict[str, Any]:
-    """Return the share of slides that are right after each time, with intervals over the surfaces."""
-    intervals = {seconds: share_interval(own, surfaces) for seconds, own in right.items()}
-    share = {seconds: float(np.mean(own)) for seconds, own in right.items()}
+    """Return the accuracy of slides after each time, with intervals over the surfaces."""
+    intervals = {seconds: accuracy_interval(each, surfaces) for seconds, each in right.items()}
+    accuracy = {seconds: float(np.mean(each)) for seconds, each in right.items()}
     usual = (*metrics.TIMES_S, AT_S)
     return {
         'slides': len(surfaces),
         's': [*right],
-        'share': [round(one, 4) for one in share.values()],
+        'share': [round(one, 4) for one in accuracy.values()],
         'interval': [[round(edge, 4) for edge in edges] for edges in intervals.values()],
-        'accuracy_at_s': {f'{seconds:.1f}': _at(share, seconds) for seconds in usual},
+        'accuracy_at_s': {f'{seconds:.1f}': _at(accuracy, seconds) for seconds in usual},
         'interval_at_s': {f'{seconds:.1f}': _at(intervals, seconds) for seconds in usual},
-        'accuracy_at_end': [*share.values()][-1],
+        'accuracy_at_end': [*accuracy.values()][-1],
     }
 
 
@@ -249,9 +249,9 @@ TICKS = {LEAST: '0', 0.5: '0.5', 1.0: '1', 2.0: '2', 5.0: '5', 10.0: '10', 20.0:
 TICKS_S = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0)
 
 
-def wrong_percent(share: AnyArray | Sequence[float] | float) -> Array:
+def wrong_percent(value: AnyArray | Sequence[float] | float) -> Array:
     """Return the percentage wrong, LEAST for none."""
-    return np.maximum(100.0 * (1.0 - np.asarray(share, dtype=np.float64)), LEAST)
+    return np.maximum(100.0 * (1.0 - np.asarray(value, dtype=np.float64)), LEAST)
 
 
 def sliding_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
@@ -302,12 +302,12 @@ def _draw_sliding(axes: Any, shown: Mapping[str, Mapping[str, Any]]) -> None:
     axes.minorticks_off()
 
 
-def spread(wanted: Sequence[float], apart: float) -> list[float]:
-    """Return heights near those wanted, in the same order, at least so far apart."""
+def spread(wanted: Sequence[float], spacing: float) -> list[float]:
+    """Return heights near those wanted, in the same order, with at least this spacing."""
     order = sorted(range(len(wanted)), key=wanted.__getitem__)
     found = {order[0]: wanted[order[0]]} if order else {}
     for before, number in pairwise(order):
-        found[number] = max(wanted[number], found[before] + apart)
+        found[number] = max(wanted[number], found[before] + spacing)
     return [found[number] for number in range(len(wanted))]
 
 
@@ -323,17 +323,17 @@ def computing_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
         for name, cell in numbers[channels].items()
         if cell['accuracy_at_s'][f'{AT_S:.1f}'] is not None
     ]
-    shares = [cell['accuracy_at_s'][f'{AT_S:.1f}'] for _, _, cell in cells]
-    points = [(cell['latency_us']['median'], share) for (_, _, cell), share in zip(cells, shares, strict=True)]
+    accuracies = [cell['accuracy_at_s'][f'{AT_S:.1f}'] for _, _, cell in cells]
+    points = [(cell['latency_us']['median'], value) for (_, _, cell), value in zip(cells, accuracies, strict=True)]
     front = pareto_front(points)
     title = f'Same track: slides wrong after {AT_S:g} s of sliding, against computing time'
     with chart(path, (8.0, 7.6), title, points=11.0) as figure:
         axes = figure.subplots()
         axes.step([points[at][0] for at in front], wrong_percent([points[at][1] for at in front]), where='post',
                   color='black', linewidth=1.0, zorder=1, label='Pareto front')  # fmt: skip
-        for (_, channels, cell), (cost, share) in zip(cells, points, strict=True):
+        for (_, channels, cell), (cost, value) in zip(cells, points, strict=True):
             edges = wrong_percent(cell['interval_at_s'][f'{AT_S:.1f}'])
-            wrong, style = wrong_percent(share), STYLES[cell['kind']]
+            wrong, style = wrong_percent(value), STYLES[cell['kind']]
             axes.plot([cost, cost], edges, linewidth=1.0, alpha=0.35, **style)
             axes.plot([cost, cell['latency_us']['p99']], [wrong, wrong], linewidth=1.0, alpha=0.6, **style)
             axes.plot(cost, wrong, MARKS[channels], markersize=7, **style)
@@ -362,7 +362,7 @@ OFFSETS = [(x, y) for y in (7, -8, 20, -21, 33, -34) for x in (6, -6)]  # of a n
 
 def _name_points(axes: Any, names: Sequence[str], kinds: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
     """Write names next to their points, the most accurate first, where they cover no other name and no point."""
-    places = [(cost, wrong_percent(share)) for cost, share in points]
+    places = [(cost, wrong_percent(value)) for cost, value in points]
     taken = [Bbox.from_bounds(x - 6, y - 6, 12, 12) for x, y in axes.transData.transform(places)]
     for index in sorted(range(len(names)), key=lambda at: -points[at][1]):
         for offset in OFFSETS:

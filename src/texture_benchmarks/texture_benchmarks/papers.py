@@ -35,7 +35,7 @@ RECIPES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     'kaboli-em': ('kaboli-em', {}),
     'default, ours': ('default', {}),
 }
-# One finger gives 8 numbers; two slides over one material stand for the two fingers of the paper.
+# One finger gives 8 numbers; two slides over one material represent the two fingers of the paper.
 OF_TWO = ('kaboli-svm', 'kaboli-pa', 'kaboli-pa, 200 passes', 'kaboli-em')
 QUICK = ('ets-linear-svm-vote', 'kaboli-pa')
 PLACES = ('1/2', '2/2')
@@ -57,7 +57,7 @@ def recipe_of(name: str) -> Recipe:
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes of the papers on slides over one half of a track, and test other slides over both halves.
 
-    Fraction of the slides that are right at their end, of one finger; of two, where two slides stand for two fingers.
+    Fraction of the slides that are right at their end, of one finger; of two, where two slides represent two fingers.
     Intervals of 95 % by bootstrap over material × half.
     """
     some = ('1-12', ('material01', 'material02', 'material03')) if options.quick else ()
@@ -105,10 +105,10 @@ def _of_two(slides: SlideDataset, earlier: str, later: str, recipe: Recipe) -> M
         predictor = learner.predictor(learner.fit(X, codes, np.arange(len(codes))).parameters)
         for shift, half in ((SAME, place), (PLACE, other)):
             others = slides.take(np.isin(slides.names, names_of(slides, later, half)))
-            asked, true = _joined(others.features(recipe.feature_set))
-            named = names[predictor(asked).argmax(axis=1)]
+            requested, true = _joined(others.features(recipe.feature_set))
+            named = names[predictor(requested).argmax(axis=1)]
             right[shift] += [(f'{label} {half}', bool(label == one)) for label, one in zip(true, named, strict=True)]
-    return {shift: _share(pairs) for shift, pairs in right.items()}
+    return {shift: _accuracy(pairs) for shift, pairs in right.items()}
 
 
 def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:
@@ -116,14 +116,14 @@ def _joined(features: LabelledFeatures) -> tuple[Array, NDArray[np.str_]]:
     first = np.unique(features.groups, return_index=True)[1]
     rows, labels = [], []
     for label in np.unique(features.labels):
-        own = [row for row in first if features.labels[row] == label]
-        pairs = list(pairwise(own))
+        of_label = [row for row in first if features.labels[row] == label]
+        pairs = list(pairwise(of_label))
         rows += [np.concatenate((features.values[one], features.values[other])) for one, other in pairs]
         labels += [label] * len(pairs)
     return np.stack(rows), np.array(labels)
 
 
-def _share(pairs: list[tuple[str, bool]]) -> dict[str, Any]:
+def _accuracy(pairs: list[tuple[str, bool]]) -> dict[str, Any]:
     which = np.array([right for _, right in pairs])
     counts = np.stack([which, np.ones(len(which))], axis=1)
     return {

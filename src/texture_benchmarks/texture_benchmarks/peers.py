@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""General classifiers on the same slides: a support vector machine on log bands, and some in packages of their own."""
+"""General classifiers on the same slides: a support vector machine on log bands, and some in separate packages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from texture_features.feature_set import read_recipe
 from texture_features.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.slides import LabelledSlide
 
-SVC = 'SVC on log bands'  # the typical spectrum of each window; it has no rejection of its own
+SVC = 'SVC on log bands'  # the typical spectrum of each window; it has no rejection
 PACKAGES = 'TEXTURE_PEERS'  # environment variable: the folder of the packages that `make peers` installs
 MINIROCKET, QUANT, CNN = 'MiniRocket', 'QUANT', 'convolutional network'
 CLASSIFIERS: Mapping[str, str] = {
@@ -147,6 +147,6 @@ class SpectrumNetwork:
         power = np.log(np.abs(np.fft.rfft(cut, axis=-1)) ** 2 + 1e-3).transpose(0, 2, 1)
         length = n_samples // FRAMES
         slow = windows[:, 1:, : length * FRAMES].reshape(n, n_channels - 1, FRAMES, length).mean(axis=-1)
-        # Levels would betray the mounting: their changes are kept.
+        # Levels depend on the mounting: only their changes are kept.
         changes = np.log(np.abs(np.diff(slow, axis=-1, append=slow[..., -1:])) + 0.1)
         return np.concatenate([power, changes], axis=1).astype(np.float32)

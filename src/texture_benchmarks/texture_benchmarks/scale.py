@@ -64,7 +64,7 @@ class FeatureSpread:
         )
 
     def textures(self, labels: int, rng: np.random.Generator) -> Array:
-        """Return the centres of so many textures."""
+        """Return the centres of this many textures."""
         return self.mean + rng.standard_normal((labels, len(self.mean))) @ self.among_textures
 
     def slides(
@@ -102,7 +102,7 @@ KIB_PER_MIB = 1024.0
 
 
 def _measure(recipe: Recipe, spread: FeatureSpread, seed: int, labels: int) -> dict[str, Any]:
-    """Return what one training on so many textures costs, and what its model recognises of another slide of each."""
+    """Return what one training on this many textures costs, and what its model recognises of another slide of each."""
     rng = np.random.default_rng(seed)
     textures = spread.textures(labels, rng)
     examples = spread.slides(textures, SLIDES, WINDOWS, rng)
@@ -126,7 +126,7 @@ def _measure(recipe: Recipe, spread: FeatureSpread, seed: int, labels: int) -> d
 
 
 def _tested(model: TextureModel, examples: LabelledFeatures) -> tuple[tuple[float, float], Array]:
-    """Return the shares of windows and of slides recognised, and the times from features to estimate."""
+    """Return the accuracy of windows and of slides, and the times from features to estimate."""
     slides = np.unique(examples.groups)
     chosen = slides[:: max(1, len(slides) // MOST_TESTED)]
     windows = examples.of_slides(chosen)
@@ -160,11 +160,11 @@ def scale_chart(rows: Sequence[Mapping[str, Any]], path: str | Path) -> Path:
         },
     }
     with chart(path, (9.0, 5.6), f'More textures ({RECIPE}): drawn features, simulated', points=11.0) as figure:
-        for axes, (what, own) in zip(figure.subplots(2, 2, sharex=True).flat, lines.items(), strict=True):
-            for (label, values), colour in zip(own.items(), COLOURS, strict=False):
+        for axes, (what, curves) in zip(figure.subplots(2, 2, sharex=True).flat, lines.items(), strict=True):
+            for (label, values), colour in zip(curves.items(), COLOURS, strict=False):
                 axes.plot([row['labels'] for row in rows], values, marker='.', color=colour, label=label)
             axes.set(title=what, xscale='log', ylim=(0, None))
-            if len(own) > 1:
+            if len(curves) > 1:
                 axes.legend()
         for axes in figure.axes[2:]:
             axes.set_xlabel('textures')
@@ -177,7 +177,7 @@ TARGETS = {'1000 textures': {'train_s': 300.0, 'memory_mib': 2048.0, 'window_us'
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train a recipe on drawn features of more and more textures.
 
-    Computing time (s) and memory (MiB) of a training; time from features to estimate (µs); share of single windows
+    Computing time (s) and memory (MiB) of a training; time from features to estimate (µs); fraction of single windows
     and of slides (of as many windows as those trained on) recognised.
     """
     recipe = load_recipe(RECIPE)

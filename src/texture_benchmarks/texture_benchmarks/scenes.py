@@ -55,7 +55,7 @@ class TouchProtocol:
     radius_m: float = 0.0
     # A surface is measured once in each of these directions, and all are evaluated together
     turned_rad: Sequence[float] = (0.0,)
-    slow: bool = False  # Whether the slow channels are used, too
+    slow: bool = False  # Whether the slow channels are also used
     tested_forces_n: Sequence[float] = ()  # Other forces for the test; as in learning if empty
     # training_by, tested_by: individuals of the sensor
     training_by: Sequence[int] = (0,)
@@ -96,7 +96,7 @@ REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
     },
     'sticky': {'patch_growth': PatchGrowth(), 'unevenness': Unevenness(0.1)},
 }
-# Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
+# Effects that no scene names: each alone is added to `HOST`, with the default strength, to be measured.
 HOST = 'twelve_textures'
 ADDED = ('skids',)
 
@@ -158,7 +158,7 @@ def ablate(
 ) -> dict[str, Any]:
     """Return the accuracy on a scene, and how it changes without each of its terms, or of some, one at a time.
 
-    About so many slides are trained on, and as many tested; all is repeated with other random numbers. Of each term
+    About this many slides are trained on, and as many tested; all is repeated with other random numbers. Of each term
     'accuracy_without' is the change when neither training nor test has it, 'accuracy_trained_without' that when only
     the test has it.
     """
@@ -166,8 +166,8 @@ def ablate(
     rows = [_repeat(scene, others, touch_protocol, slides, [seed, number]) for number in range(repeats)]
     changes = {
         term: {
-            'accuracy_without': difference([own[term][0] for _, _, own in rows]),
-            'accuracy_trained_without': difference([own[term][1] for _, _, own in rows]),
+            'accuracy_without': difference([of_term[term][0] for _, _, of_term in rows]),
+            'accuracy_trained_without': difference([of_term[term][1] for _, _, of_term in rows]),
         }
         for term in others
     }
@@ -223,8 +223,8 @@ def _repeat(
     right = float(learned(scene).score(values, codes))
     differences = {}
     for term, other in others.items():
-        own = learned(other)
-        differences[term] = own.score(*tested(other)) - right, own.score(values, codes) - right
+        learner = learned(other)
+        differences[term] = learner.score(*tested(other)) - right, learner.score(values, codes) - right
     return right, len(codes), differences
 
 
@@ -316,11 +316,11 @@ def with_paper(
 
     scene = completed(load_scene(name), TOUCH_PROTOCOLS[name])
     worlds = {term: world for term, world in variants(scene, TOUCH_PROTOCOLS[name]).items() if term in scene.effects}
-    shares = np.array([[right(world, number) for world in (scene, *worlds.values())] for number in range(repeats)])
-    changes = dict(zip(worlds, map(difference, (shares[:, 1:] - shares[:, :1]).T), strict=True))
+    fractions = np.array([[right(world, number) for world in (scene, *worlds.values())] for number in range(repeats)])
+    changes = dict(zip(worlds, map(difference, (fractions[:, 1:] - fractions[:, :1]).T), strict=True))
     return {
-        **{term: {**own, 'paper_without': changes[term]} if term in changes else own for term, own in figures.items()},
-        'paper_accuracy': round(float(shares[:, 0].mean()), 4),
+        **{term: {**row, 'paper_without': changes[term]} if term in changes else row for term, row in figures.items()},
+        'paper_accuracy': round(float(fractions[:, 0].mean()), 4),
     }
 
 
@@ -329,18 +329,18 @@ COLUMNS = 2
 
 def ablation_chart(numbers: Mapping[str, Any], path: str | Path) -> Path:
     """Draw for each scene how the accuracy changes when a term is left out; the last panel is of terms put in."""
-    added = {term: own[term] for term, own in numbers['added'].items()}
+    added = {term: row[term] for term, row in numbers['added'].items()}
     without = np.mean(
-        [own['accuracy'] + own[term]['accuracy_without']['change'] for term, own in numbers['added'].items()]
+        [row['accuracy'] + row[term]['accuracy_without']['change'] for term, row in numbers['added'].items()]
     )
     panels = {**numbers['terms'], f'{HOST}, with one of': {'accuracy': float(without), **added}}
-    terms = {name: {t: own for t, own in figures.items() if isinstance(own, dict)} for name, figures in panels.items()}
+    terms = {name: {t: row for t, row in figures.items() if isinstance(row, dict)} for name, figures in panels.items()}
     rows = -(-len(panels) // COLUMNS)
     size = (9.0, 0.9 + rows * (0.8 + 0.27 * max(map(len, terms.values()))))
     with chart(path, size, 'Change of accuracy when a term of a simulated scene is left out') as figure:
         grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for axes, (name, own) in zip(grid, terms.items(), strict=False):
-            _draw_terms(axes, own)
+        for axes, (name, row) in zip(grid, terms.items(), strict=False):
+            _draw_terms(axes, row)
             axes.set_title(f'{name}: {panels[name]["accuracy"]:.0%} right'.replace('%', ' %'), fontsize=9)
         for axes in grid[len(panels) :]:
             axes.axis('off')
@@ -354,7 +354,7 @@ def _draw_terms(axes: Any, terms: Mapping[str, Mapping[str, Mapping[str, float]]
         ('training slides only', 'accuracy_trained_without', COLOURS[1], 0.2),
         ("both, with the paper's method", 'paper_without', COLOURS[2], 0.0),
     ):
-        known = [(place + shift, own[which]) for place, own in enumerate(terms.values()) if which in own]
+        known = [(place + shift, row[which]) for place, row in enumerate(terms.values()) if which in row]
         axes.errorbar(
             [100 * item['change'] for _, item in known], [place for place, _ in known],
             xerr=[100 * item['half_interval'] if np.isfinite(item['half_interval']) else 0.0 for _, item in known],
@@ -400,9 +400,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     size, costs = QUICK if options.quick else _Size(), {}
     for name in size.scenes:
         scene = load_scene(name)
-        sticks = {own: hasattr(surface.friction, 'BRISTLE_1_M') for own, surface in scene.surfaces.items()}
+        sticks = {label: hasattr(surface.friction, 'BRISTLE_1_M') for label, surface in scene.surfaces.items()}
         for kind in sorted(set(sticks.values())):
-            surfaces = [own for own in sticks if sticks[own] is kind]
+            surfaces = [label for label in sticks if sticks[label] is kind]
             costs[name, kind] = scan_cost(scene, surfaces, size.scan_repeats, size.many)
     whole = {
         name: size.ablation(completed(load_scene(name), TOUCH_PROTOCOLS[name]), options.seed) for name in size.scenes
@@ -414,8 +414,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     numbers = {
         'scan_ms': {f'{name}, stick-slip' if kind else name: cost for (name, kind), cost in costs.items()},
         'terms': {
-            name: with_paper(own, name, size.paper_repeats, 1000 + options.seed, quick=options.quick)
-            for name, own in whole.items()
+            name: with_paper(scene, name, size.paper_repeats, 1000 + options.seed, quick=options.quick)
+            for name, scene in whole.items()
         },
         'added': added,
     }

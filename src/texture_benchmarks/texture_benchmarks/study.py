@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every study is given and hands back; recordings and workers that several of them share."""
+"""Inputs and results of every study; their common recordings and workers."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ DATA = {
     'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
 }
 QUICK_MATERIALS, QUICK_SLIDES = ('material01', 'material02', 'material03'), '1-6'
-APART_S = 0.5
+SPACING_S = 0.5
 ROUNDING = 1e-9  # of a quotient of two times
 
 
 @dataclass(frozen=True)
 class BenchmarkOptions:
-    """Where a benchmark writes, where recorded data lies, and whether to hurry."""
+    """Folders of results and recorded data, and whether to run a reduced benchmark."""
 
     out: Path  # Folder for the JSON and the chart
-    # Folder that holds the recorded data sets, each in its own folder; None if there is none
+    # Folder that holds the recorded data sets, each in a separate folder; None if there is none
     data: Path | None = None
     seed: int = 0  # Of everything random
     quick: bool = False  # Fewer repetitions, for tests; such numbers are not for publishing
-    workers: int = 0  # Processes of a study that can be cut into pieces; 0: one for each core
-    budget_s: float = math.inf  # After so long such a study ends with the pieces that it has
+    workers: int = 0  # Processes of a study that can be split into parts; 0: one for each core
+    budget_s: float = math.inf  # After this time such a study ends with the parts that it has
 
     def recordings(self, name: str) -> Path:
-        """Return the folder of a recorded data set, by its name; InvalidData says that it is missing."""
+        """Return the folder of a recorded data set, by its name; InvalidData if it is missing."""
         if self.data is None or not (self.data / name).is_dir():
             missing = f"there is no '{name}' in '{self.data}'" if self.data else 'no folder of recorded data was given'
             raise InvalidData(f'{missing}; give the folder that holds {name}/ with --data')
@@ -105,7 +105,7 @@ def map_forked(work: Callable[[Job], Out], jobs: Sequence[Job]) -> list[Out]:
         try:
             return list(pool.map(_do, jobs))
         except BrokenProcessPool as error:
-            sentence = 'a measurement ended without an answer; see above, or give it more memory'
+            sentence = 'a measurement ended without a result; see above, or give it more memory'
             raise DeviceError(sentence) from error
 
 
@@ -142,10 +142,10 @@ def _do(job: Any) -> Any:
         return _work[0](job)
 
 
-def share_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
-    """Return the 95 % interval of a share of slides: by bootstrap over surfaces, or exact over slides where wider.
+def accuracy_interval(right: Sequence[bool], surfaces: Sequence[str]) -> tuple[float, float]:
+    """Return the 95 % interval of a fraction of slides: by bootstrap over surfaces, or exact over slides where wider.
 
-    Slides over one surface are no independent draws. Where all surfaces are alike, resampling them says nothing.
+    Slides over one surface are no independent draws. Where all surfaces are alike, resampling them shows nothing.
     Source of the exact one: Clopper & Pearson 1934.
     """
     drawn = interval(np.stack([right, np.ones(len(right))], axis=1), surfaces)
@@ -165,8 +165,8 @@ def imported(
         yield IMPORTS[name](source, Path(folder), slides, materials)
 
 
-def trained_apart(recipe: Recipe) -> Recipe:
-    """Return a recipe whose training windows begin APART_S apart or more: the papers' machines take hours otherwise."""
+def with_spaced_windows(recipe: Recipe) -> Recipe:
+    """Return a recipe whose training windows begin every SPACING_S or more: the papers' SVMs take hours otherwise."""
     hop_s = recipe.feature_set.windows.hop_s
-    apart_s = hop_s * math.ceil(APART_S / hop_s - ROUNDING)
-    return replace(recipe, training=replace(recipe.training, hop_s=apart_s))
+    spacing_s = hop_s * math.ceil(SPACING_S / hop_s - ROUNDING)
+    return replace(recipe, training=replace(recipe.training, hop_s=spacing_s))

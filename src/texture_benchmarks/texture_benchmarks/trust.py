@@ -18,9 +18,9 @@ from texture_benchmarks.study import (
     DATA,
     BenchmarkOptions,
     BenchmarkResult,
+    accuracy_interval,
     imported,
-    share_interval,
-    trained_apart,
+    with_spaced_windows,
 )
 from texture_core.types import Array, TactileSignal, join_batches
 from texture_estimation.evidence import EvidenceAccumulator
@@ -60,7 +60,7 @@ FINGER_SEED = 7  # the same other finger for all slides
 
 
 def at_other_speed(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Return the way at another speed: less of it in the same time, or all of it in less."""
+    """Return the path at another speed: less of it in the same time, or all of it in less."""
     return at_speed(windows, strength, windows.samples.shape[1])
 
 
@@ -193,18 +193,16 @@ class Outcome:
     # others were never decided
     early_right: int
     early_wrong: int
-    # final_right, final_wrong: slides with a right and with a wrong label that were taken for known at the end;
+    # final_right, final_wrong: slides with a right and with a wrong label that were accepted at the end;
     # the others were rejected
     final_right: int
     final_wrong: int
-    label_right: int  # Slides with the right label at the end, whether they were taken for known or not
-    interval: tuple[
-        float, float
-    ]  # Of the share of those, 95 %, over surfaces: slides over one are no independent draws
+    label_right: int  # Slides with the right label at the end, whether they were accepted or not
+    interval: tuple[float, float]  # Of their fraction, 95 %, over surfaces: slides over one are no independent draws
 
     @property
     def worst_wrong(self) -> float:
-        """The larger share of slides that were accepted but wrong: at the first decided estimate, or at the end."""
+        """The larger fraction of slides that were accepted but wrong: at the first decided estimate, or at the end."""
         return max(self.early_wrong, self.final_wrong) / self.slides
 
     @classmethod
@@ -222,7 +220,7 @@ class Outcome:
             final_right=sum(final),
             final_wrong=len(final) - sum(final),
             label_right=sum(labels),
-            interval=share_interval(labels, [result.surface for result in results]),
+            interval=accuracy_interval(labels, [result.surface for result in results]),
         )
 
 
@@ -230,7 +228,7 @@ Outcomes = dict[str, dict[str, Outcome]]  # by recipe and row
 
 
 def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> list[SlideResult]:
-    """Return what a model says of slides, window by window."""
+    """Return the estimates of a model for slides, window by window."""
     results = []
     for slide, vectors in SlideDataset(tuple(slides)).vectors(model.recipe.feature_set):
         evidence = EvidenceAccumulator(model)
@@ -300,7 +298,7 @@ def _trained(name: str, slides: SlideDataset) -> TextureModel:
 
 
 def _recipe(name: str) -> Recipe:
-    return trained_apart(recipe_of(name)) if name in (PEER, PAPER) else recipe_of(name)
+    return with_spaced_windows(recipe_of(name)) if name in (PEER, PAPER) else recipe_of(name)
 
 
 def _under_disturbances(
@@ -312,15 +310,15 @@ def _under_disturbances(
     """Return the outcomes of undisturbed slides, and of the slides under each disturbance."""
     outcomes: Outcomes = {name: {UNDISTURBED: Outcome.of(results)} for name, results in clean.items()}
     for row, kind in enumerate(_rows(options)):
-        own = ROWS[kind]
-        for column, strength in enumerate(own.strengths):
+        row_kind = ROWS[kind]
+        for column, strength in enumerate(row_kind.strengths):
             seeds = np.random.SeedSequence([options.seed, row, column]).spawn(len(to_disturb))
             slides = [
-                disturbed(item, own, strength, np.random.default_rng(seed))
+                disturbed(item, row_kind, strength, np.random.default_rng(seed))
                 for item, seed in zip(to_disturb, seeds, strict=True)
             ]
             for name, model in models.items():
-                outcomes[name][own.name(strength)] = Outcome.of(evaluate_slides(model, slides))
+                outcomes[name][row_kind.name(strength)] = Outcome.of(evaluate_slides(model, slides))
     return outcomes
 
 
@@ -354,23 +352,23 @@ def ordered(sweep: DisturbanceSweep) -> list[tuple[float, str]]:
     return sorted([*measured, clean]) if sweep.is_factor else [clean, *measured]
 
 
-def breakdown(places: Sequence[float], shares: Sequence[float]) -> float | None:
+def breakdown(places: Sequence[float], accuracies: Sequence[float]) -> float | None:
     """Return where a curve first falls below KEPT of its start, linear between places; None if it never does."""
-    limit = KEPT * shares[0]
-    below = next((index for index, share in enumerate(shares) if share < limit), 0)
+    limit = KEPT * accuracies[0]
+    below = next((index for index, accuracy in enumerate(accuracies) if accuracy < limit), 0)
     if not below:
         return None
-    fallen = (shares[below - 1] - limit) / (shares[below - 1] - shares[below])
+    fallen = (accuracies[below - 1] - limit) / (accuracies[below - 1] - accuracies[below])
     return float(places[below - 1] + fallen * (places[below] - places[below - 1]))
 
 
 def breakdowns(sweep: DisturbanceSweep, outcomes: Mapping[str, Outcome]) -> list[float]:
-    """Return the places on the axis of a sweep, 0 for its first strength, where the share of right labels breaks."""
+    """Return the places on the axis of a sweep, 0 for its first strength, where the accuracy breaks down."""
     rows = ordered(sweep)
-    shares = [outcomes[name].label_right / outcomes[name].slides for _, name in rows]
+    accuracies = [outcomes[name].label_right / outcomes[name].slides for _, name in rows]
     clean = [name for _, name in rows].index(UNDISTURBED)
     sides = (list(range(clean, -1, -1)), list(range(clean, len(rows))))
-    found = [breakdown(side, [shares[place] for place in side]) for side in sides]
+    found = [breakdown(side, [accuracies[place] for place in side]) for side in sides]
     return [place for place in found if place is not None]
 
 
@@ -435,19 +433,19 @@ def _draw_sweep(lines: Any, strip: Any, sweep: DisturbanceSweep, numbers: Mappin
         lines.axvspan(0, 0, color='#cfe3f2', linewidth=0)
     for name, (label, colour, marker) in LINES.items():
         ends = [numbers[name]['outcomes'][row] for _, row in rows]
-        share = 100 * np.array([end['label_right'] / end['slides'] for end in ends])
+        accuracy = 100 * np.array([end['label_right'] / end['slides'] for end in ends])
         low, high = 100 * np.array([end['interval'] for end in ends]).T
         lines.fill_between(places, low, high, color=colour, alpha=0.13, linewidth=0)
-        lines.plot(places, share, color=colour, marker=marker, markersize=4, label=label)
+        lines.plot(places, accuracy, color=colour, marker=marker, markersize=4, label=label)
     ours = {row: Outcome(**numbers[OURS]['outcomes'][row]) for _, row in rows}
     for place in breakdowns(sweep, ours):
         lines.axvline(place, color=COLOURS[0], linestyle=':')
     lines.plot([], [], color=COLOURS[0], linestyle=':', label=f'{OURS} breaks down: 90 % of undisturbed')
     lines.set(ylim=(0, 105), xticks=places, xlim=(-0.5, len(rows) - 0.5))
     lines.tick_params(labelbottom=False)
-    own = [numbers[OURS]['outcomes'][row] for _, row in rows]
-    shares = np.array([[end['final_right'], end['final_wrong'], end['label_right']] for end in own])
-    _draw_ends(strip, 100 * shares / np.array([[end['slides']] for end in own]))
+    outcomes_of_rows = [numbers[OURS]['outcomes'][row] for _, row in rows]
+    accuracies = np.array([[end['final_right'], end['final_wrong'], end['label_right']] for end in outcomes_of_rows])
+    _draw_ends(strip, 100 * accuracies / np.array([[end['slides']] for end in outcomes_of_rows]))
     crowded = len(rows) > 6
     strip.set_xticks(places, ['none' if name == UNDISTURBED and not sweep.is_factor else sweep.tick(strength)
                               for strength, name in rows], rotation=60 if crowded else 0)  # fmt: skip
@@ -464,10 +462,10 @@ def _draw_unknown(panel: Any, below: Any, unknown: Mapping[str, Mapping[str, Any
     panel.set_title('unknown materials accepted')
 
 
-def _draw_ends(strip: Any, shares: Array) -> None:
+def _draw_ends(strip: Any, accuracies: Array) -> None:
     """Draw how the slides of ours end, (n, 3) in percent: accepted and correct, accepted but wrong, label right."""
-    places = np.arange(len(shares))
-    right, wrong, label = shares.T
+    places = np.arange(len(accuracies))
+    right, wrong, label = accuracies.T
     strip.bar(places, right, 0.8, color=RIGHT, label=f'{OURS}: accepted and correct')
     strip.bar(places, 100 - right - wrong, 0.8, right, color=UNKNOWN, label='rejected')
     strip.bar(places, wrong, 0.8, 100 - wrong, color=WRONG, label='accepted but wrong')

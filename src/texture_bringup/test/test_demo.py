@@ -93,7 +93,7 @@ def test_it_accepts_trained_surfaces_and_rejects_others_and_leaves_models_answer
     }
     assert slides['glass']['decided']
     assert slides['over the edge']['outcome'].startswith('the contact with the surface was lost')
-    assert re.search(r'rejected, outside what was trained: speed 0\.0[12]\d* m/s', out.getvalue())
+    assert re.search(r'rejected, outside the training: speed 0\.0[12]\d* m/s', out.getvalue())
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 
 

@@ -25,7 +25,7 @@ from texture_features.correction import write_reference
 
 pytestmark = pytest.mark.ros
 
-OUTSIDE = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
+OUTSIDE = 'outside the training: speed 0.02 m/s, trained 0.05 m/s'
 ENDED = 'the exploration has ended: cancelled by the client'
 
 

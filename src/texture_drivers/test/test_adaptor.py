@@ -247,7 +247,7 @@ def test_samples_that_neither_count_nor_stamp_are_missed_by_time_half_a_second_l
 
 
 class Driver:
-    """The vendor's TSF-85 driver: a sample, and behind it its stamp, in messages of their own."""
+    """The vendor's TSF-85 driver: a sample, and after it its stamp, in separate messages."""
 
     def __init__(self, ticks: int = 1) -> None:
         self.ticks = ticks
@@ -319,9 +319,9 @@ def test_a_value_that_is_no_number_is_published_as_unknown_and_counted() -> None
         ('robotiq_tsf', 'signal_static', Message(taxels=[Message(values=[1] * 12)]), '12 numbers; 28'),
         ('robotiq_tsf', 'signal', Message(value=3), "no field 'data"),
         ('xela', 'signal', Message(sensors=[]), "no field 'sensors"),
-        ('float32_multi_array', 'signal', Message(data=['much']), 'no numbers'),
+        ('float32_multi_array', 'signal', Message(data=['much']), 'not numbers'),
         ('float32_multi_array', 'signal', Message(data=[]), '0 numbers'),
-        ('audio', 'signal', Message(header=header(START_NS), audio=Message(data=b'abc')), 'no numbers'),
+        ('audio', 'signal', Message(header=header(START_NS), audio=Message(data=b'abc')), 'not numbers'),
     ],
 )  # fmt: skip
 def test_a_message_that_does_not_fit_is_refused_in_one_sentence_and_counted(

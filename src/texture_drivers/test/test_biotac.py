@@ -69,7 +69,7 @@ def test_words_written_by_hand_give_their_values(value: int) -> None:
     assert not replies.damaged.any()
 
 
-def test_each_channel_and_finger_gets_its_own_word() -> None:
+def test_each_channel_and_finger_gets_a_separate_word() -> None:
     frame = [slot(0xA2, 0, 0, 0), slot(0x80, 1739, 1739, 1739)] * 22
     frame[0] = slot(0xA2, 1739, 2021, 4095)  # electrode 1
     frame[38] = slot(0x83, 4095, 0, 0)  # PDC
@@ -118,7 +118,7 @@ def word(value: int | None) -> bytes:
 
 
 def reply(layout: BioTacLayout = BIOTAC, *, fingers: Sequence[int | None] = (0,), step: int = 0) -> bytes:
-    """Each slot holds its number times `step`, plus a number that tells the finger."""
+    """Each slot holds its number times `step`, plus a number of the finger."""
     values = [
         [ABSENT if base is ABSENT else base + step * slot for base in fingers] for slot in range(len(layout.slots))
     ]
@@ -197,7 +197,7 @@ def test_a_lost_frame_is_a_jump_of_22_samples() -> None:
     assert sensor.counts['bogus'] == 3
 
 
-def test_a_damaged_word_is_nan_in_its_own_channel_and_finger() -> None:
+def test_a_damaged_word_is_nan_in_its_channel_and_finger() -> None:
     content = bytearray(reply(fingers=(100, 200)))
     content[6 * 38 + 4] ^= 1  # slot 38 is PDC; the second finger
     sensor = opened(FakeLink(numbered(range(40), bytes(content), fingers=2)), fingers=(0, 1))
@@ -259,7 +259,7 @@ SERIAL = b'BT2P0220B11E0004'
 
 
 class StandIn:
-    """A Cheetah with one BioTac at the first place, at the level of the calls of the vendor's module."""
+    """A Cheetah with one BioTac at the first place, emulated at the level of the vendor's module."""
 
     CH_PORT_NOT_FREE, CH_SPI_BITORDER_MSB, CH_TARGET_POWER_ON = 0x8000, 0, 1
 
@@ -359,7 +359,7 @@ def test_frames_hold_what_the_biotac_answered_to_each_command(api: StandIn) -> N
     ]
     replies = decode(frames[0].reply, BIOTAC, 3)
     assert replies.damaged.tolist() == [0, 44, 44]
-    # The stand-in answers with bits 6..1 of the command: twice the index, in the upper seven bits of the word.
+    # The mock answers with bits 6..1 of the command: twice the index, in the upper seven bits of the word.
     slow = dict(zip(BIOTAC.slow_channels, replies.slow[0, :, 0].tolist(), strict=True))
     assert (slow['tdc'], slow['pdc'], slow['electrode1']) == (3 * 32, 1 * 32, 17 * 32)
     assert (replies.pac[:, 0] == 0).all()
@@ -381,7 +381,7 @@ def test_after_a_pause_of_the_host_a_new_epoch_begins_behind_the_queue(api: Stan
     assert link.counts == {'pauses': 1}
 
 
-def test_without_the_vendors_module_the_sentence_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_vendors_module_the_message_states_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'cheetah_py', None)
     with pytest.raises(DeviceError, match=r"Total Phase's Python module 'cheetah_py'.*serial bridge"):
         Cheetah(BIOTAC).open()

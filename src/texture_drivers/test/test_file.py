@@ -30,7 +30,7 @@ def settle(params, config):
 
 
 class Clock:
-    """Goes on by `step_s` at each look."""
+    """Advances by `step_s` at each call."""
 
     def __init__(self, step_s):
         self.ns = 50 * SECOND

@@ -53,31 +53,31 @@ class Scripted:
 
 
 def run(script: str, batches: int) -> tuple[Scripted, SensorReader, list[str]]:
-    sensor, told, enough, came = Scripted(script), [], threading.Event(), []
+    sensor, logged, enough, came = Scripted(script), [], threading.Event(), []
 
     def deliver(topic: str, batch: TactileSignal) -> None:
         came.append(batch)
         if len(came) >= batches:
             enough.set()
 
-    reader = SensorReader(sensor, deliver, told.append, told.append)
+    reader = SensorReader(sensor, deliver, logged.append, logged.append)
     reader.start()
     assert enough.wait(DEADLINE_S)
     reader.stop()
-    return sensor, reader, told
+    return sensor, reader, logged
 
 
 def test_batches_are_handed_on_and_the_sensor_is_closed_in_the_end() -> None:
-    sensor, reader, told = run('', 3)
+    sensor, reader, logged = run('', 3)
     assert sensor.closed >= 1
     assert reader.published['signal'] == sensor.counts['samples']
-    assert told == ['the sensor delivers samples']
+    assert logged == ['the sensor delivers samples']
 
 
 def test_a_sensor_that_is_gone_is_opened_again_and_reported_of_once() -> None:
-    sensor, reader, told = run('..xXX..', 4)
+    sensor, reader, logged = run('..xXX..', 4)
     assert sensor.counts['reopened'] == 3
-    assert [sentence.split('.')[0] for sentence in told] == [
+    assert [sentence.split('.')[0] for sentence in logged] == [
         'the sensor delivers samples',
         'it is gone',
         'it is not there',
@@ -86,11 +86,11 @@ def test_a_sensor_that_is_gone_is_opened_again_and_reported_of_once() -> None:
     assert reader.fault == ''
 
 
-def test_a_sensor_that_raises_anything_else_is_told_of_with_its_line_and_opened_again() -> None:
-    sensor, reader, told = run('..v..', 4)
+def test_a_sensor_that_raises_anything_else_is_reported_with_its_line_and_opened_again() -> None:
+    sensor, reader, logged = run('..v..', 4)
     assert sensor.counts['reopened'] == 1
-    assert told[1].startswith('the sensor raised ValueError in test_health.py, line ')
-    assert told[1].endswith(': 4 bytes came. Trying again every 0.2 s')
+    assert logged[1].startswith('the sensor raised ValueError in test_health.py, line ')
+    assert logged[1].endswith(': 4 bytes came. Trying again every 0.2 s')
     assert reader.fault == ''
     assert run('..?..', 4)[2][1] == 'is the finger on? Trying again every 0.2 s'
 
@@ -98,15 +98,15 @@ def test_a_sensor_that_raises_anything_else_is_told_of_with_its_line_and_opened_
 def test_a_sensor_that_appears_soon_after_the_start_gives_no_warning(monkeypatch) -> None:
     monkeypatch.setattr(sensor_reader, 'RETRY_S', 0.001)
     monkeypatch.setattr(sensor_reader, 'QUIET_ATTEMPTS', 3)
-    _, _, told = run('XXX..xX..', 4)
-    assert [sentence.split('.')[0] for sentence in told] == [
+    _, _, logged = run('XXX..xX..', 4)
+    assert [sentence.split('.')[0] for sentence in logged] == [
         'the sensor delivers samples',
         'it is gone',
         'it is not there',
         'the sensor delivers samples',
     ]
-    _, reader, told = run('XXXXXX..', 2)
-    assert [sentence.split('.')[0] for sentence in told] == ['it is not there', 'the sensor delivers samples']
+    _, reader, logged = run('XXXXXX..', 2)
+    assert [sentence.split('.')[0] for sentence in logged] == ['it is not there', 'the sensor delivers samples']
     assert reader.fault == ''
 
 
@@ -155,7 +155,7 @@ class TwoFingers(Scripted):
 
 
 def two_fingers_after(*seconds: tuple[str, ...]) -> tuple[str, str]:
-    """Return the last of the reports, one for each second, in which so many topics streamed."""
+    """Return the last of the reports, one for each second, in which this many topics streamed."""
     reader = SensorReader(TwoFingers(''), lambda *_: None)
     reader.fault = ''
     health = SensorHealth(reader, 0.0)
@@ -172,7 +172,7 @@ BOTH = ('finger0/signal', 'finger0/signal_imu', 'finger1/signal')
 def test_a_finger_that_drops_out_is_an_error_with_its_name() -> None:
     assert two_fingers_after(BOTH, BOTH) == ('OK', 'streaming')
     dropped = two_fingers_after(BOTH, BOTH[:2], BOTH[:2])
-    assert dropped == ('ERROR', 'no sample comes any more of finger1; check its plug')
+    assert dropped == ('ERROR', 'no more samples from finger1; check its plug')
     assert two_fingers_after(BOTH, BOTH[:2], BOTH[:2], BOTH) == ('OK', 'streaming')
 
 
@@ -247,7 +247,7 @@ def unloaded() -> ChannelWatch:
 
 
 def feed(watched: ChannelWatch, stream: Stream, seconds: int, **added: float) -> list[str]:
-    """Feed so many seconds, with a review at the end of each; return the sentences of the last one."""
+    """Feed this many seconds, with a review at the end of each; return the sentences of the last one."""
     faults: list[str] = []
     for _ in range(seconds):
         for batch in stream.seconds(1.0, **added):

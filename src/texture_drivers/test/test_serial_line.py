@@ -91,7 +91,7 @@ def test_sequence_and_time_wrap_without_a_trace():
     np.testing.assert_allclose(steps_ns, 4e6, rtol=0.02)
 
 
-def test_two_streams_of_one_line_share_its_clock_and_lose_on_their_own():
+def test_two_streams_of_one_line_share_its_clock_and_lose_independently():
     fast, slow = stream(), stream(kind=2, rate_hz=50.0, channels=('f',), topic='signal_static')
     line = StreamDecoder([fast, slow])
     static = []

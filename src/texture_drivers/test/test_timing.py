@@ -116,8 +116,8 @@ class Line:
         self.sent = 0
         self.errors_s: list[float] = []
 
-    def run(self, seconds: float, lost: int = 0, told: int = 0) -> list[int]:
-        """Return the difference between index and true number of each block; first so many samples are lost."""
+    def run(self, seconds: float, lost: int = 0, reported: int = 0) -> list[int]:
+        """Return the difference between index and true number of each block; before it this many samples are lost."""
         self.sent += lost
         self.now_s = max(self.now_s, self.sent / RATE_HZ)
         offsets, until_s = [], self.now_s + seconds
@@ -127,8 +127,8 @@ class Line:
             if self.sent == first:
                 continue
             arrival_ns = START + round(self.now_s * SECOND)
-            indices = self.numbering.place([(told, self.sent - first)], arrival_ns)
-            told = 0
+            indices = self.numbering.place([(reported, self.sent - first)], arrival_ns)
+            reported = 0
             offsets += [index - first for index in indices]
             if indices:
                 time_s = (self.numbering.clock.time_ns(indices[0]) - START) / SECOND
@@ -148,7 +148,7 @@ def test_without_a_loss_the_index_is_the_number_of_the_sample_and_the_time_is_ri
 
 def test_what_the_protocol_tells_to_be_missing_is_left_out_at_once(line: Line) -> None:
     line.run(3.0)
-    assert set(line.run(3.0, lost=4, told=4)) == {0}
+    assert set(line.run(3.0, lost=4, reported=4)) == {0}
 
 
 def test_a_gap_that_nobody_tells_is_known_half_a_second_later(line: Line) -> None:
@@ -188,7 +188,7 @@ BOUND_S = 0.012
 def follow(seconds, lost, *, drift=0.0, stamped=False, seed=1, late_ms=0.0):
     """Return the finger, and (true time in s, error of the stamp in s) of each sample that came out.
 
-    `lost` tells of each true millisecond whether it is lost; arrivals jitter by up to some ms, as on USB.
+    `lost` holds for each true millisecond whether it is lost; arrivals jitter by up to some ms, as on USB.
     """
     rng = np.random.default_rng(seed)
     finger, errors = FingerStream(), []
@@ -364,7 +364,7 @@ def test_a_lost_frame_moves_the_index_by_exactly_its_samples():
     assert counter.overrun == 0
 
 
-def test_samples_that_the_device_left_out_are_reported_apart_from_lost_frames():
+def test_samples_that_the_device_left_out_are_reported_separately_from_lost_frames():
     counter = BlockCounter(BLOCKS_HZ, 'daq')
     assert [counter.place(0, 10, 0), counter.place(4000 + 5 * 400, 10, 0)] == [0, 15]
     assert counter.overrun == 5

@@ -69,7 +69,7 @@ class Wire:
         return os.write(self.device, bytes([0x9A, 0, 0x58, len(items)]) + items)
 
     def wait_until_there(self, count: int) -> None:
-        """Wait until so many bytes can be read: the kernel carries them over in its own time."""
+        """Wait until this many bytes can be read: the kernel transfers them asynchronously."""
         deadline_s = time.monotonic() + DEADLINE_S
         while struct.unpack('i', fcntl.ioctl(self.host, termios.FIONREAD, bytes(4)))[0] < count:
             assert time.monotonic() < deadline_s
@@ -119,13 +119,13 @@ class Feeder:
         self, milliseconds: int, missing: tuple[int, ...] = (), image: list[int] | None = None, more: bytes = b''
     ) -> None:
         for first in range(0, milliseconds, 10):
-            said = 0
+            sent = 0
             for ms in range(first, min(first + 10, milliseconds)):
                 if ms not in missing:
-                    said += self.wire.say(self.stamp_ms * self.ticks, ms % 1000, image, more)
+                    sent += self.wire.say(self.stamp_ms * self.ticks, ms % 1000, image, more)
                 self.stamp_ms += 1
                 self.clock.now_ns += NANOSECONDS // 1000
-            self.wire.wait_until_there(said)
+            self.wire.wait_until_there(sent)
             self.read()
 
     def read(self) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of any type made into signals, by a mapping file. Knows no ROS: any objects with the attributes will do."""
+"""Messages of any type made into signals, by a mapping file. Needs no ROS: any objects with the attributes will do."""
 
 from __future__ import annotations
 
@@ -44,16 +44,14 @@ class SignalMapping:
     rate_hz: float = param(
         0.0, 'Samples of a channel in a second; 0 measures it in the first 2 s.', unit='Hz', low=0.0, high=1e6
     )
-    consecutive: bool = param(False, 'Takes the numbers of a message for consecutive samples and not for one.')
+    consecutive: bool = param(False, 'Reads the numbers of a message as consecutive samples, not as one.')
     encoding: str = param(
         '', 'How the numbers are packed in a field of bytes; none takes them as they are.', choices=tuple(ENCODINGS)
     )
     stamp: str = param('', 'Path of the time of the last sample; none takes the time at which a message was sent.')
     stamp_after_s: float = param(0.0, 'How much later than the last sample that time is.', unit='s', low=-1.0, high=1.0)
-    number: str = param(
-        '', 'Path of the number of the sample, which tells losses exactly; none estimates them by time.'
-    )
-    number_topic: str = param('', 'Topic of that number, if it is sent in a message of its own behind the sample.')
+    number: str = param('', 'Path of the sample number, which shows losses exactly; none estimates them by time.')
+    number_topic: str = param('', 'Topic of that number, if it is sent in a separate message after the sample.')
     number_type: str = param('', 'Type of the messages on that topic.')
     sensor: str = param('', "Name of the sensor in the signal; none takes the mapping's name.")
 
@@ -127,7 +125,9 @@ def compile_path(path: str) -> Callable[[Any], list[Any]]:
         except (AttributeError, IndexError, TypeError) as error:
             raise InvalidData(f"the message has no field '{path}': {error}; correct the mapping or its type") from error
         if not found:
-            raise InvalidData(f"the message holds nothing at '{path}'; check the finger, and that the sensor is there")
+            raise InvalidData(
+                f"the message holds nothing at '{path}'; check the finger and the connection of the sensor"
+            )
         return found
 
     return read
@@ -246,8 +246,8 @@ class SignalAdaptor:
         self.invalid += int(np.count_nonzero(~np.isfinite(rows)))
         rows[~np.isfinite(rows)] = np.nan
         end_ns = sent_ns if self._stamp is None else read_time_ns(self._stamp(message)[0])
-        own = self._number is not None and not self.mapping.number_topic
-        number = self._read_number(message) if own else None
+        included = self._number is not None and not self.mapping.number_topic
+        number = self._read_number(message) if included else None
         return Sample(
             rows * self.mapping.gain, end_ns - round(self.mapping.stamp_after_s * NANOSECONDS), sent_ns, number
         )
@@ -262,7 +262,7 @@ class SignalAdaptor:
                 parts = [np.ravel(np.asarray(part, dtype=float)) for read in self._values for part in read(message)]
                 numbers = np.concatenate(parts)
         except (TypeError, ValueError) as error:
-            raise InvalidData(f'{self.mapping.values} are no numbers: {error}; correct the mapping') from error
+            raise InvalidData(f'{self.mapping.values} are not numbers: {error}; correct the mapping') from error
         if not 0 < len(numbers) <= MOST_NUMBERS:
             raise InvalidData(f'the message holds {len(numbers)} numbers; 1 to {MOST_NUMBERS} are allowed')
         if not self._channels:
@@ -281,7 +281,7 @@ class SignalAdaptor:
         try:
             return operator.index(self._number(message)[0])
         except TypeError as error:
-            raise InvalidData(f"'{self.mapping.number}' is no whole number: {error}; correct the mapping") from error
+            raise InvalidData(f"'{self.mapping.number}' is not a whole number: {error}; correct the mapping") from error
 
     # Samples with a number.
 
@@ -365,6 +365,6 @@ class SignalAdaptor:
 
 
 def losses(adaptors: Sequence[SignalAdaptor]) -> str:
-    """Return how sure the losses of some signals are."""
+    """Return how exact the losses of some signals are."""
     exact = all(adaptor.mapping.number for adaptor in adaptors)
     return 'by number' if exact else 'estimated by time; shorter ones unknown'

@@ -33,7 +33,7 @@ END = b'\r\n'
 LOWEST_TEMPERATURE_C, HIGHEST_TEMPERATURE_C = -20.0, 85.0  # MLX90393 data sheet: where it works
 LARGEST_FIELD_UT = 50_000.0  # MLX90393 data sheet: its measurement range
 # At the gain and resolution that the vendor's library sets (0.15 µT a count, inferred) 16 bits end here: an axis that
-# stands there is saturated.
+# at that value is saturated.
 RANGE_UT = 4_900.0
 # The finest steps of an MLX90393 are some tenths of a microtesla and 0.02 °C: what is smaller than this and not 0 is no
 # measurement.
@@ -57,10 +57,10 @@ def field_channels(magnetometers: int) -> tuple[str, ...]:
 
 
 # --------------------
-# The AnySkin's protocol: bytes to frames. Knows no port and no clock.
+# The AnySkin's protocol: bytes to frames. Independent of port and clock.
 
 Values = NDArray[np.float32]
-LOCK_FRAMES = 3  # so many in a row, and nothing between them, make sure where frames begin
+LOCK_FRAMES = 3  # consecutive frames, with nothing between them, that confirm where frames begin
 
 
 class FrameRun(NamedTuple):
@@ -71,10 +71,10 @@ class FrameRun(NamedTuple):
 
 
 class FrameParser:
-    """Turn a byte stream into frames, whatever is lost or added on the way.
+    """Turn a byte stream into frames, whatever is lost or added in transmission.
 
     A frame has no header, number or checksum: only its length, CR LF at its end and the range of its values show it,
-    and the values may hold CR LF, too. So a frame is believed only where three fit in a row, the first of them only
+    and the values may hold CR LF, too. So a frame is accepted only where three fit in a row, the first of them only
     behind CR LF (a byte more or less at its beginning would change a value and not its end), and, from there on, as
     long as each follows the one before without a byte between. A changed bit that leaves a value in its range cannot
     be seen.
@@ -82,7 +82,7 @@ class FrameParser:
 
     def __init__(self, magnetometers: int = MAGNETOMETERS) -> None:
         self.frames = 0
-        self.refused = 0  # frames that did not fit while it was certain where they begin
+        self.refused = 0  # frames that did not fit after their beginnings were known
         self.refused_bytes = 0
         self._size = frame_bytes(magnetometers)
         self._values_shape = (magnetometers, QUANTITIES)
@@ -242,7 +242,7 @@ class AnySkinDecoder(Decoder):
         return {SIGNAL: (-RANGE_UT, RANGE_UT)}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index that the host's clock will tell."""
+        """Resume after an interruption, with the index according to the host's clock."""
         self._parser.restart()
         self._meter.restart()
         if self._numbering:

@@ -38,13 +38,13 @@ class SpiFrame(NamedTuple):
 
 
 class SpiLink:
-    """The way to a board; `counts` are totals kept over reopening."""
+    """The link to a board; `counts` are totals kept over reopening."""
 
-    max_drift: float  # by what share its clock may be wrong
+    max_drift: float  # largest relative error of its clock
     serials: tuple[str, ...] = ()  # of the BioTac at each place, '' where there is none
 
     def open(self) -> None:
-        """Open the way and start sampling; DeviceError if it is not there."""
+        """Open the link and start sampling; DeviceError if it is missing."""
         raise NotImplementedError
 
     def read(self) -> Sequence[SpiFrame]:
@@ -57,7 +57,7 @@ class SpiLink:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Return what went wrong on the way."""
+        """Return the faults of the link."""
         raise NotImplementedError
 
 
@@ -150,7 +150,7 @@ class BioTacLayout:
         return SLOT_RATE_HZ / 2
 
     def frame_bytes(self, fingers: int) -> int:
-        """Return the length of the reply to one frame from a board with so many BioTacs."""
+        """Return the length of the reply to one frame from a board with this many BioTacs."""
         return len(self.slots) * (ECHO_BYTES + WORD_BYTES * fingers)
 
 
@@ -176,12 +176,12 @@ FINGERS = 5  # most that one board holds
 # --------------------
 # A microcontroller that samples a BioTac board over SPI and streams the replies over a serial line.
 #
-# Our own design, for whoever has no Cheetah adapter: see docs/sensors.md. It sends without being asked, framed as in
+# A design of this project, for users without a Cheetah adapter: see docs/sensors.md. It sends unrequested, framed as in
 # `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
 
 VERSION = 1
 REPLY, SERIALS = 0x42, 0x53  # kinds of frames: 'B' and 'S'
-POLLS = 5  # looks at the port per waiting time: a frame's arrival tells the time
+POLLS = 5  # looks at the port per waiting time: the arrival of a frame gives its time
 LATE_FRAMES = 0.5  # a frame further than this from where its number puts it: the bridge stopped or restarted
 RATE_CHECK_S = 1.0
 RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
@@ -297,11 +297,11 @@ class FrameTracker:
 
 
 # --------------------
-# The Total Phase Cheetah SPI adapter, through the vendor's own Python module `cheetah_py`.
+# The Total Phase Cheetah SPI adapter, through the vendor's Python module `cheetah_py`.
 #
-# That module and its library are not free and not part of this project; who owns the adapter has them from the vendor.
+# That module and its library are not free and not part of this project; they come with the adapter.
 # The calls and their values are those of kth-ros-pkg/biotac_driver @6fb8e33 `biotac_sensors/src/biotac.c`. This file
-# has never met the hardware; its tests run against a stand-in.
+# has never been run on the hardware; its tests run against a mock.
 
 MODULE = 'cheetah_py'
 BITRATE_KHZ = 4400
@@ -395,7 +395,7 @@ class Cheetah(SpiLink):
         free = [port for port in list(ports)[: max(0, found)] if not port & self._api.CH_PORT_NOT_FREE]
         if not free:
             raise DeviceError(
-                f'no free Cheetah adapter is there ({max(0, found)} found); plug it in, or close the program using it'
+                f'no free Cheetah adapter ({max(0, found)} found); plug it in, or close the program using it'
             )
         return int(self._checked(self._api.ch_open(free[0]), 'opening'))
 
@@ -453,7 +453,7 @@ class Cheetah(SpiLink):
 
 
 # --------------------
-# What BioTacs answer to the sampling commands of whole frames: bytes to counts. Knows no link and no clock.
+# What BioTacs answer to the sampling commands of whole frames: bytes to counts. Independent of link and clock.
 
 ODD_PARITY = np.array([byte.bit_count() % 2 == 1 for byte in range(256)])
 
@@ -509,7 +509,7 @@ class BioTac:
 
     The stamp of a PAC batch is the time of its first sample, one slot (227 µs) after the start of the frame; that of
     a static row is the start of its frame, and its channels were sampled up to a frame later
-    (`BioTacLayout.slow_slots`). The device's numbers tell losses exactly, its clock tells the times; over an
+    (`BioTacLayout.slow_slots`). The device's numbers show losses exactly, its clock gives the times; over an
     interruption the host's clock does. See `texture_core.types.Sensor`.
 
     Parameters
@@ -524,7 +524,7 @@ class BioTac:
     fingers
         Several places instead of `params.finger`; topics are then 'finger0/signal' and so on.
     link
-        Another way to the board than `params.device` names.
+        Another link to the board than `params.device` names.
     """
 
     def __init__(
@@ -600,7 +600,7 @@ class BioTac:
         return dict.fromkeys(self.expected_rates_hz, (0, FULL_SCALE))
 
     def _process(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
-        """Make batches of consecutive frames, once their times are certain."""
+        """Make batches of consecutive frames, once their times are known."""
         first_frame, last = run[0], run[-1]
         self._check_places(last.fingers)
         self._last_received_ns[-1] = now_ns
@@ -620,7 +620,7 @@ class BioTac:
             self._damaged += int(replies.damaged[finger])
             self._refused += int(replies.refused[finger])
             if replies.damaged[finger] == len(run) * len(self._layout.slots):
-                continue  # nobody there
+                continue  # no answer
             self._last_received_ns[finger] = now_ns
             pac, slow = self._signals
             stamp_ns, first = start_ns + round(SLOT_NS), index * self._layout.pac_per_frame
@@ -633,17 +633,17 @@ class BioTac:
         missing = [finger for finger in self._prefixes if finger >= places]
         if missing:
             raise DeviceError(
-                f"finger {missing[0]} is asked for, and the board at '{self._params.device}' has places 0 to "
+                f"finger {missing[0]} is requested, and the board at '{self._params.device}' has places 0 to "
                 f'{places - 1}; set the parameter finger to one of them'
             )
 
     def _watch_silence(self, now_ns: int) -> None:
-        """Raise DeviceError when the board, or every finger asked for, has not been heard for a while."""
+        """Raise DeviceError when the board, or every requested finger, has been silent for a while."""
         limit_ns = now_ns - SILENCE_S * NANOSECONDS
         if self._last_received_ns[-1] < limit_ns:
             raise DeviceError(
-                f"device '{self._params.device}' is open but sends no whole frames; check that it is a BioTac bridge "
-                'and runs, or replug it'
+                f"device '{self._params.device}' is open but sends no complete frames; check that it is a BioTac "
+                'bridge and runs, or replug it'
             )
         if all(self._last_received_ns[finger] < limit_ns for finger in self._prefixes):
             places = ' or '.join(str(finger) for finger in self._prefixes)

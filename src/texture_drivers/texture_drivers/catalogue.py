@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sensors by name; a user's own is 'module:Class'."""
+"""The sensors by name; a custom one is 'module:Class'."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecode
 # --------------------
 # Numbers of the data acquisition finger.
 #
-# The layout of the frames is our own (see `texture_core.framing`); rate and channels are of Jamali & Sammut 2010.
+# The frame layout is of this project (see `texture_core.framing`); rate and channels are of Jamali & Sammut 2010.
 
 TOPIC = 'signal'
 SENSOR = 'daq'
@@ -39,7 +39,7 @@ class DaqChannel:
 
     name: str = param('', 'Name of the channel, which must be unique in the file.')
     unit: str = param('V', 'Unit of the published samples.')
-    gain: float = param(1.0, 'Factor from counts to the unit; larger values give larger samples.')
+    gain: float = param(1.0, 'Factor from counts to the unit.')
     offset: float = param(0.0, 'Value of 0 counts in the unit, which is added to every sample.')
 
 
@@ -58,7 +58,7 @@ class DaqSettings:
 
 
 def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
-    """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` says otherwise."""
+    """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` names others."""
     settings, channels = load_daq(params.config or DEFAULT_SETTINGS)
     decoder = StreamDecoder([stream(settings.rate_hz, channels)], params.frame_id)
     return SerialSensor(params, now_ns, decoder, baud=settings.baud)
@@ -72,7 +72,7 @@ def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
         raise InvalidParameter(f'settings {config} have the `channels` {safe_repr(listed)}; list one for each input')
     channels = [from_mapping(DaqChannel, item, f'settings {config}, channel {i + 1}') for i, item in enumerate(listed)]
     if len({channel.name for channel in channels} - {''}) < len(channels):
-        raise InvalidParameter(f'settings {config}: give each channel a `name` of its own')
+        raise InvalidParameter(f'settings {config}: give each channel a unique `name`')
     return from_mapping(DaqSettings, content, f'settings {config}'), channels
 
 

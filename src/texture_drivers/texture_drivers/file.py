@@ -170,7 +170,7 @@ def load_npy(file: BinaryIO) -> FileRecording:
 
 
 def load_npz(file: BinaryIO) -> FileRecording:
-    """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there.
+    """Return the array `samples`; `rate_hz` and `channels` next to it are used if present.
 
     Raises
     ------
@@ -220,11 +220,11 @@ class FileSettings:
     )
     speed: float = param(
         1.0,
-        'How many times faster than real time the file is played; 0 plays it as fast as it can be read.',
+        'Playback rate relative to real time; 0: as fast as it can be read.',
         low=0.0,
         high=1000.0,
     )
-    loop: bool = param(False, 'Starts the file again from the beginning when its end is reached.')
+    loop: bool = param(False, 'Repeats the file from the beginning at its end.')
     topic: str = param('signal', 'Topic on which the samples are published.', choices=('signal', 'signal_static'))
     unit: str = param('', 'Unit of the published samples; the file does not state one.')
 
@@ -249,7 +249,7 @@ class FilePlayer:
         self._first_index = self._position = 0  # index of the first sample of this opening; samples since then
 
     def open(self) -> None:
-        """Load the file and begin; the index goes on, with a jump as long as the player was closed.
+        """Load the file and begin; the index continues, with a jump as long as the player was closed.
 
         Raises
         ------
@@ -316,9 +316,7 @@ class FilePlayer:
         except InvalidData as error:
             raise DeviceError(str(error)) from error
         if not (self._settings.rate_hz or recording.rate_hz):
-            raise DeviceError(
-                f"recording '{self._params.device}' does not tell its rate; set `rate_hz` in the settings"
-            )
+            raise DeviceError(f"recording '{self._params.device}' has no rate; set `rate_hz` in the settings")
         return recording
 
     def _has_more(self, samples: NDArray[np.float32]) -> bool:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Is a stream as it should be: rate, dead or clipping channels, baseline, and what is said on /diagnostics."""
+"""Health of a stream: rate, dead or clipping channels, baseline, and the status on /diagnostics."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from texture_drivers.sensor import SensorReader
 # of a half is right to a small part of one.
 MOST_MOVED = 3.0
 LEAST_SAMPLES = 4
-RELATIVE_FLOOR = 1e-4  # the noise of a channel is taken for at least this share of its baseline: some have none
+RELATIVE_FLOOR = 1e-4  # smallest noise of a channel, as a fraction of its baseline: some have none
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class Tare:
 def saturated(
     samples: NDArray[np.float32], lowest: Array, highest: Array, least_fraction: float = 0.01
 ) -> NDArray[np.bool_]:
-    """Return which channels stand at an end of their range in more than a share of the samples."""
+    """Return which channels are at an end of their range in more than a fraction of the samples."""
     at_end = (samples <= lowest) | (samples >= highest)
     return at_end.mean(axis=0) > least_fraction
 
@@ -107,7 +107,7 @@ MOST_KEPT_S = 5.0  # of samples between two reviews
 NAMED = 3  # channels in a sentence
 # Of an unloaded channel, in standard deviations of its noise: farther off is a drift.
 DRIFT_LIMIT = 10.0
-DRIFT_REVIEWS = 3  # so many in a row show a drift: one may be a touch
+DRIFT_REVIEWS = 3  # consecutive reviews that show a drift: one may be a touch
 
 
 Flags = NDArray[np.bool_]
@@ -119,7 +119,7 @@ class TareParams:
 
     tare_s: float = param(
         1.0,
-        "Over how long the service '~/tare' averages; a longer time gives a more exact baseline.",
+        "Averaging time of the service '~/tare'.",
         unit='s',
         low=0.1,
         high=60.0,
@@ -131,8 +131,8 @@ class TareParams:
     )
     auto_tare: bool = param(
         False,
-        'Tares by itself while no exploration touches anything, at the start and whenever the level has drifted; it '
-        "needs the topic 'exploration'.",
+        'Tares automatically while no exploration touches anything, at the start and whenever the level has drifted; '
+        "it needs the topic 'exploration'.",
     )
 
 
@@ -152,7 +152,7 @@ class StreamWatch:
 
     @property
     def taring(self) -> bool:
-        """Whether a tare is under way."""
+        """Whether a tare is in progress."""
         return self._tare is not None
 
     def start_tare(self, tare: Tare | None) -> None:
@@ -165,7 +165,7 @@ class StreamWatch:
             self._batches.append(batch)
         tare, found = self._tare, None
         if tare is not None:
-            self._tare = None  # unless it goes on
+            self._tare = None  # unless it continues
             found = tare.add(batch)
             self._tare = None if found else tare
         if found:
@@ -225,10 +225,10 @@ Limits = Mapping[str, tuple[Any, Any]]  # by topic: lowest and highest sample, o
 
 
 class ChannelWatch:
-    """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are asked for in another."""
+    """Watch all streams of a sensor. Batches come from the thread that reads it, reviews are called from another."""
 
     def __init__(self, params: TareParams, topics: Sequence[str], limits: Limits) -> None:
-        self.unloaded: bool | None = None  # whether nothing touches the finger; None if nobody tells
+        self.unloaded: bool | None = None  # whether nothing touches the finger; None if unknown
         self.refusal = ''  # why the last tare was refused
         self._params = params
         self._streams = {topic: StreamWatch(limits.get(topic)) for topic in topics}
@@ -243,7 +243,7 @@ class ChannelWatch:
 
     @property
     def taring(self) -> bool:
-        """Whether a tare is under way."""
+        """Whether a tare is in progress."""
         return any(stream.taring for stream in self._streams.values())
 
     @property
@@ -306,9 +306,9 @@ RATE_TOLERANCE = 0.05  # WARN: a rate this far off
 MAX_BAD_PACKETS_PER_S = 5.0  # WARN: a damaged line; single refusals come with every opening
 
 HealthReport = tuple[str, str, Mapping[str, Any]]
-# Who is started again numbers anew: nobody can tell what its stream lost until then, least of all in a flood.
+# A restarted driver numbers from 0: what its stream lost before is unknown, above all at high rates.
 BEFORE_THE_START = {'lost before the start': 'unknown'}
-# A bridge that starts again numbers anew, too: what was lost between is told by the time, to about a packet.
+# A restarted bridge also numbers from 0: what was lost in between is estimated by time, to about a packet.
 INTERRUPTIONS = ('restarts', 'reopened')
 AT_INTERRUPTIONS = {'lost at restarts': 'estimated by time; less than a packet is unknown'}
 
@@ -319,7 +319,7 @@ class SensorHealth:
     ERROR: the sensor cannot be reached, no sample came for 1 s, or none of a finger that came before. WARN: samples
     were lost or the sensor was opened again since the last report, a rate is more than 5 % off, more than 5 packets a
     second are refused, a channel is saturated, dead or has drifted, or a tare was refused. All that is assessed over
-    the time since the last report, so the level falls back by itself.
+    the time since the last report, so the level recovers automatically.
     """
 
     def __init__(self, reader: SensorReader, now_s: float, watch: ChannelWatch | None = None) -> None:
@@ -333,7 +333,7 @@ class SensorHealth:
 
     @property
     def details(self) -> Mapping[str, Any]:
-        """What the sensor reports about itself, such as its 'serial number'; a user's own need not."""
+        """What the sensor reports about itself, such as its 'serial number'; optional in custom sensors."""
         return getattr(self._reader.sensor, 'details', {})
 
     def report(self, now_s: float) -> HealthReport:
@@ -379,8 +379,8 @@ class SensorHealth:
         conditions = (
             (bool(self._reader.fault), 'ERROR', self._reader.fault),
             (age_s > NO_SAMPLE_TIMEOUT_S, 'ERROR', f'no sample for {age_s:.1f} s; check the sensor'),
-            (bool(dropped), 'ERROR', f'no sample comes any more of {" and ".join(dropped)}; check its plug'),
-            (new.get('reopened', 0) > 0, 'WARN', 'the sensor was gone and has been opened again'),
+            (bool(dropped), 'ERROR', f'no more samples from {" and ".join(dropped)}; check its plug'),
+            (new.get('reopened', 0) > 0, 'WARN', 'the sensor was disconnected and has been opened again'),
             (new.get('lost', 0) > 0, 'WARN', f'{new.get("lost", 0)} samples lost since the last report'),
             (
                 new.get('bogus', 0) > MAX_BAD_PACKETS_PER_S * period_s,

@@ -17,15 +17,15 @@ from texture_drivers.serial_line import FramedStream, SerialSensor, StreamDecode
 # --------------------
 # Numbers of the PVDF finger and of the line to its microcontroller.
 #
-# Film, force sensor and machine are those of Hu et al. 2014; the frames are our own (see `texture_core.framing`). The
-# paper tells neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz that
+# Film, force sensor and machine are those of Hu et al. 2014; frames of this project (see `texture_core.framing`). The
+# paper gives neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz that
 # are 3 s, or 76 mm of fabric at its 25.5 mm/s.
 
 FILM_TOPIC, FORCE_TOPIC = 'signal', 'signal_static'
 FILM_SENSOR, FORCE_SENSOR = 'pvdf/film', 'pvdf/force'
 FILM_CHANNELS, FORCE_CHANNELS = ('film',), ('force',)
 # Kinds of frames on the line. 0x10 to 0x1F are the finger's, 0x20 to 0x2F the rails' answers, 0xA0 to 0xAF orders to
-# the rails: either side passes over what is not its own.
+# the rails: either side ignores the frames of the other.
 FILM_KIND, FORCE_KIND = 0x10, 0x11
 
 FILM_RATE_HZ = 4096.0
@@ -49,12 +49,10 @@ class PvdfSettings:
     """Parameters of the PVDF film, its amplifier and the force sensor."""
 
     baud: int = baud_param(BAUD)
-    film_gain_pc: float = param(
-        FILM_PC_PER_COUNT, 'Charge of one count of the film; larger values give larger samples.', unit='pC'
-    )
+    film_gain_pc: float = param(FILM_PC_PER_COUNT, 'Charge of one count of the film.', unit='pC')
     force_gain_n: float = param(
         FORCE_N_PER_COUNT,
-        'Force of one count of the force sensor; larger values give larger samples.',
+        'Force of one count of the force sensor.',
         unit='N',
     )
 

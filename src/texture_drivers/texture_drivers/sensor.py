@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every sensor shares: its parameters, and the thread that reads it."""
+"""Common parts of all sensors: parameters, and the thread that reads."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class SensorReader:
             self._warn(f'{fault}{stop} Trying again every {RETRY_S} s')
 
     def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
-        if batches and self.fault:  # before the first batch is out: who has it may ask for a tare at once
+        if batches and self.fault:  # before the first batch is out: its receiver may request a tare at once
             self.fault = self._warned = ''
             self._inform('the sensor delivers samples')
         for batch in batches:
@@ -146,7 +146,7 @@ class SensorReader:
 
 
 # --------------------
-# Settings of one kind of sensor, beside those of every sensor: from a YAML file, or written in place.
+# Settings of one kind of sensor, in addition to those of every sensor: from a YAML file, or written in place.
 
 
 def load_settings(cls: type[T], config: str) -> T:

@@ -63,7 +63,7 @@ class FramedStream:
 
 
 # --------------------
-# A serial port that fails in one way: DeviceError, whatever pyserial, the kernel or termios raise.
+# A serial port with one kind of error: DeviceError, whatever pyserial, the kernel or termios raise.
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
 PORT_ERRORS = (serial.SerialException, OSError, termios.error)
@@ -105,7 +105,7 @@ class SerialPort:
         """Return what has arrived, without waiting."""
         data = b''
         with self._faults():
-            # The kernel hands over 4 kB at once and holds more behind them; what comes meanwhile is for the next time.
+            # The kernel returns 4 kB at once and holds more; what comes meanwhile is read next time.
             while (waiting := self._serial.in_waiting) and len(data) < MAX_BYTES:
                 data += self._serial.read(waiting)
         return data
@@ -132,7 +132,7 @@ class SerialPort:
 
 
 def reason_of(error: Exception) -> str:
-    """Return what the operating system says of a fault, without the path that pyserial repeats in its own text."""
+    """Return the message of the operating system about a fault, without the path that pyserial repeats."""
     code = error.args[0] if len(error.args) > 1 else None  # termios.error has no errno
     return os.strerror(code) if isinstance(code, int) else str(error)
 
@@ -140,11 +140,11 @@ def reason_of(error: Exception) -> str:
 # --------------------
 # A sensor that streams samples over a serial port, whatever its protocol: a decoder turns the bytes into batches.
 
-SILENCE_S = 1.0  # the device sends without being asked; opening the port again has woken many a one
+SILENCE_S = 1.0  # the device sends unrequested; opening the port again often restarts it
 
 
 class Decoder:
-    """Turns the bytes of one protocol into batches; knows no port and no clock of its own."""
+    """Turns the bytes of one protocol into batches; independent of port and clock."""
 
     @property
     def valid_frames(self) -> int:
@@ -158,7 +158,7 @@ class Decoder:
 
     @property
     def details(self) -> Mapping[str, float]:
-        """What the device's stream shows beside the samples, by name."""
+        """What the device's stream shows in addition to the samples, by name."""
         raise NotImplementedError
 
     @property
@@ -172,7 +172,7 @@ class Decoder:
         return {}
 
     def restart(self) -> None:
-        """Go on after an interruption."""
+        """Resume after an interruption."""
         raise NotImplementedError
 
     def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
@@ -249,7 +249,7 @@ class SerialSensor:
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """What the decoder knows beside the samples, such as how much the device's clock is slow."""
+        """What the decoder reports in addition to the samples, such as the drift of the device's clock."""
         return self._decoder.details
 
     @property
@@ -349,12 +349,12 @@ class StreamTracker:
 
 
 # --------------------
-# Streams of samples on a framed serial line: numbered, timed, in physical units. Knows no port.
+# Streams of samples on a framed serial line: numbered, timed, in physical units. Independent of the port.
 #
 # Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
-# endian, row after row; its kind tells the stream, its time is that of the first row.
+# endian, row after row; its kind identifies the stream, its time is that of the first row.
 
-LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
+LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that jumps further is another one; the host's clock gives the gap
 
 
 class StreamDecoder(Decoder):
@@ -364,7 +364,7 @@ class StreamDecoder(Decoder):
     """
 
     def __init__(self, streams: Sequence[FramedStream], frame_id: str = '') -> None:
-        self.malformed = 0  # frames that passed the checksum and hold another number of bytes than they say
+        self.malformed = 0  # frames that passed the checksum and hold another number of bytes than declared
         self.other_frames = 0  # frames of other kinds
         self.restarts = 0  # of the device's clock
         self.deframer = FrameDecoder()
@@ -410,7 +410,7 @@ class StreamDecoder(Decoder):
         return {tracker.stream.topic: tracker.stream.limits for tracker in self.trackers.values()}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index that the host's clock will tell."""
+        """Resume after an interruption, with the index according to the host's clock."""
         self.deframer.restart()
         self._restart_streams()
 
@@ -420,7 +420,7 @@ class StreamDecoder(Decoder):
         if not blocks:
             return {}
         newest_us = max(self.trackers[kind].end_us(found[-1]) for kind, found in blocks.items())
-        if newest_us >= self._newest_us:  # an older block of a slower stream tells nothing new
+        if newest_us >= self._newest_us:  # an older block of a slower stream adds nothing new
             self.clock.observe(newest_us, arrival_ns)
             self._newest_us = newest_us
         if not self.clock.settled:
@@ -439,7 +439,7 @@ class StreamDecoder(Decoder):
         self._newest_us = 0
 
     def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[StreamBlock]]:
-        """Return the blocks of each stream; those before a restart of the device's clock are given up."""
+        """Return the blocks of each stream; those before a restart of the device's clock are dropped."""
         blocks: dict[int, list[StreamBlock]] = {}
         for frame in frames:
             if not self._fits(frame):
@@ -514,7 +514,7 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts =
 
 
 def serial_number(device: str, ports: ListPorts = list_ports.comports) -> str:
-    """Return the serial number of the USB device behind a path, '' if it tells none."""
+    """Return the serial number of the USB device behind a path, '' if it has none."""
     path = str(Path(device).resolve())
     return next((port.serial_number or '' for port in ports() if port.device == path), '')
 

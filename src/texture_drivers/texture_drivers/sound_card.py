@@ -33,7 +33,7 @@ FULL_SCALE = 'FS'  # unit of uncalibrated samples: 1 is the largest
 
 
 # --------------------
-# Blocks of samples from a sound card, through miniaudio: captured in its thread, handed over in order.
+# Blocks of samples from a sound card, through miniaudio: captured in its thread, delivered in order.
 
 CAPTURE_FULL_SCALE = 2.0**15
 NULL = 'null'  # the name of a card that is always there and delivers zeros
@@ -87,7 +87,7 @@ class Capture:
 
     def close(self) -> None:
         """Stop and close; never raises."""
-        with contextlib.suppress(Exception):  # a device may be gone in many ways
+        with contextlib.suppress(Exception):  # a lost device raises many kinds of errors
             self._stream.close()
 
     def _receive(self) -> Generator[None, bytes, None]:
@@ -134,7 +134,7 @@ class SoundCardSettings:
     channels: int = param(1, 'Number of channels that are read, from the first on.', low=1, high=8)
     decimation: int = param(
         3,  # 16 kHz: docs/sensors.md has what it gains over 4 and 8 kHz
-        'By what factor the rate is lowered behind a low-pass; a larger factor costs less computing time and '
+        'Factor by which the rate is lowered behind a low-pass; a larger one costs less computing time and '
         'keeps a smaller band, up to 0.34 of the lower rate.',
         low=1,
         high=64,

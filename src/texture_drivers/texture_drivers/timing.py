@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The host time and the running index of each sample, whatever the device tells of either."""
+"""The host time and the running index of each sample, whatever the device reports of either."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from texture_core.errors import DeviceError
 from texture_core.types import NANOSECONDS, Array
 
 # --------------------
-# How long samples of a device were on the way, against its own clock.
+# Transport delay of samples of a device, against its clock.
 
 
 @dataclass
@@ -110,7 +110,7 @@ class StreamClock:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the stream: another one begins, with another index and another delay. Its drift is still believed."""
+        """Reset for a new stream, with another index and another delay. The drift is kept."""
         self.settled = False
         self._origin: tuple[int, int] | None = None  # index and host time of the first arrival
         self._bins: deque[Arrival] = deque()  # the least late of each bin; the last bin is still open
@@ -120,7 +120,7 @@ class StreamClock:
         self._before = self._now = DelayModel(drift=self._drift)
 
     def skip(self, samples: int) -> None:
-        """Take the samples of this stream for later ones by so many: their times stay, their indices do not."""
+        """Shift the indices of the samples of this stream by this many; their times stay."""
         if self._origin is not None:
             first_index, first_ns = self._origin
             self._origin = first_index + samples, first_ns
@@ -141,7 +141,7 @@ class StreamClock:
             arrival = Arrival(0.0, 0.0)
         self._last_index = index
         self._store(arrival)
-        # By both clocks: what was kept back arrives in one burst, and tells nothing of when it was taken.
+        # By both clocks: delayed samples arrive in one burst, which does not show when they were taken.
         watched_ns = min(arrival.elapsed_ns, arrival_ns - self._origin[1])
         self.settled = self.settled or watched_ns >= self._settle_ns
 
@@ -161,7 +161,7 @@ class StreamClock:
         return first_index + (elapsed_ns - remaining_ns) / self._period_ns
 
     def _follow_step(self, origin: tuple[int, int]) -> None:
-        """Begin anew where the host's clock was set to another time."""
+        """Restart where the host's clock was set to another time."""
         self.steps += 1
         self.restart()
         self._origin = origin
@@ -176,7 +176,7 @@ class StreamClock:
         """Return whether the stream or the host's clock cannot be the one of before."""
         if not self._bins:
             return False
-        # No sample arrives before it was taken: times that say so are those of a stream at another rate.
+        # No sample arrives before it was taken: such times are those of a stream at another rate.
         if self._now.delay_ns_at(arrival.elapsed_ns, self._slew_rate) - arrival.delay_ns > self._step_ns:
             return True
         late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
@@ -270,9 +270,9 @@ class StampStatus(enum.Enum):
 
 
 class SampleCounter:
-    """Count samples through the device's own stamps, `ticks` of them a sample; 0 measures by the first four stamps.
+    """Count samples by the device's stamps, `ticks` of them a sample; 0 measures by the first four stamps.
 
-    A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
+    A stamp not following its predecessor is a loss if the next stamp continues from there, and a damaged stamp if
     not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
     trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
     """
@@ -359,7 +359,7 @@ class PacketNumbering:
     """Give each packet its index: a jump is what was lost, over an interruption by the time that passed.
 
     A stream that begins again need not begin on the beat of packets: what is less than a packet is carried on to the
-    next interruption, so that many of them do not add up to a loss that nobody counts.
+    next interruption, so that many of them do not add up to an uncounted loss.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -395,14 +395,14 @@ class PacketNumbering:
 # Give blocks of samples their running index, so that a jump of the index is exactly what was lost.
 
 RATE_CHECK_S = 1.0
-MAX_FAILED_CHECKS = 3  # so many in a row are no hiccup
+MAX_FAILED_CHECKS = 3  # consecutive failures that are no transient
 RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than a wrong setting
 
 
 class BlockCounter:
     """Count samples by the device's time of each block, cross-checked with the numbers of the frames they came in.
 
-    The time says how many samples are missing, whoever lost them: frames lost on the line show in their numbers too,
+    The time shows how many samples are missing, wherever they were lost: lost frames of the line show in their numbers,
     what is missing beyond them was left out by the device itself and counts as `overrun`.
     """
 
@@ -420,7 +420,7 @@ class BlockCounter:
         return self._next_us
 
     def resume(self, missing: int) -> None:
-        """Go on after an interruption with another time; `missing` samples are lost."""
+        """Resume after an interruption with another time; `missing` samples are lost."""
         self.next_index += missing
         self._next_us = None
         self._restart_check()
@@ -491,7 +491,7 @@ class ArrivalNumbering:
         self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
 
     def interrupt(self) -> None:
-        """Forget what belongs to the stream so far: another one begins."""
+        """Reset the state for a new stream."""
         self._interrupted = True
 
     def place(self, blocks: Sequence[tuple[int, int]], arrival_ns: int) -> list[int]:
@@ -539,7 +539,7 @@ class ArrivalNumbering:
     def _skipped(self, index: int) -> int:
         """Return how many samples an interruption has cost that is over now.
 
-        That is known when the clock is settled again and not before: what arrives first may be long on its way.
+        That is known when the clock is settled again and not before: the first arrivals may be long delayed.
         """
         if self._clock_before is None or not self.clock.settled:
             return 0
@@ -550,14 +550,14 @@ class ArrivalNumbering:
 
 
 # --------------------
-# Measure the rate of a stream that does not tell it, by when its samples arrive.
+# Measure the rate of a stream that does not report it, by the arrival of its samples.
 
 MEASURED_S = 2.0  # with arrivals seen each 10 ms, the error of a rate of 100 Hz is some 0.1 Hz
 LEAST_ARRIVALS = 20
 
 
 class RateMeter:
-    """Count samples until their rate is certain.
+    """Count samples until their rate is known.
 
     A sample arrives late by a varying delay but never early, so the period is the slope of the line just below all
     arrivals (see `clock.StreamClock`).
@@ -572,7 +572,7 @@ class RateMeter:
         self._arrivals: list[Arrival] = []  # samples so far, and when the last of them was there
 
     def update(self, samples: int, arrival_ns: int) -> float:
-        """Take note of samples that have just arrived; return the rate, Hz, or 0.0 while it is not certain."""
+        """Add samples that have just arrived; return the rate, Hz, or 0.0 while it is unknown."""
         self._samples += samples
         if not self._arrivals:
             self._start_ns = arrival_ns

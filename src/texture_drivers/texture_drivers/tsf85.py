@@ -31,7 +31,7 @@ from texture_drivers.timing import BLOCKS_LATE, PPM, SLOW_CLOCK, ArrivalNumberin
 # robotiq/ros @18335fa (`robotiq_tsf/src/PollData.cpp`). Both agree.
 
 START_BYTE = 0x9A
-HEADER_BYTES = 4  # start, checksum (sent as 0, checked by nobody), command, payload length
+HEADER_BYTES = 4  # start, checksum (sent as 0, never checked), command, payload length
 
 READ_SENSORS = 0x61
 AUTOSEND = 0x58
@@ -51,7 +51,7 @@ ITEMS: Mapping[int, Struct] = {
     MAGNETOMETER: Struct('>3h'),
     TEMPERATURE: Struct('>h'),
 }
-# Firmware up to 1.0.6 sends 16 bits, from 1.1.7 on 64 bits; the packet does not say which. The short one is tried
+# Firmware up to 1.0.6 sends 16 bits, from 1.1.7 on 64 bits; the packet does not show which. The short one is tried
 # first: it never fits a long stamp, whose third byte, taken as the next item, is below 0x10 and no type (for 200 days
 # of microseconds). The vendor's sources called the long one milliseconds (robotiq/ros @2347d23) and since call it
 # microseconds (@73cb1b5); so the stamps themselves decide.
@@ -97,7 +97,7 @@ USB_IDS = ((0x16D0, 0x14CC), (0x04B4, 0xF232))  # the present one; an older one,
 
 
 # --------------------
-# The TSF-85's protocol: bytes to packets, commands to bytes. Knows no port and no clock.
+# The TSF-85's protocol: bytes to packets, commands to bytes. Independent of port and clock.
 
 
 class Item(NamedTuple):
@@ -116,9 +116,9 @@ class Packet(NamedTuple):
 
 
 class Tsf85Parser:
-    """Turn a byte stream into packets, whatever is lost or added on the way.
+    """Turn a byte stream into packets, whatever is lost or added in transmission.
 
-    The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item
+    The protocol has no checksum, so a packet is accepted only if everything about it fits: a data command, known item
     types, index bits 0, a finger that exists, no item twice (a flipped type or finger would make a sample that never
     was), items that end exactly with the payload, and a start byte after it as far as one has come. A flipped value
     byte inside such a packet cannot be seen.
@@ -266,7 +266,7 @@ class SampleFrameSplitter:
 
 
 # --------------------
-# Settings of the TSF-85 beside those of every sensor: its inertial sensors.
+# Settings of the TSF-85 in addition to those of every sensor: its inertial sensors.
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 TESLA_PER_UT = 1e-6
@@ -278,18 +278,18 @@ class Tsf85Settings:
     """Whether and how the inertial sensors of the finger are published, as topic 'signal_imu'."""
 
     imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'signal_imu'.")
-    magnetometer: bool = param(False, 'Publishes the magnetic field too, which only few firmware versions send.')
+    magnetometer: bool = param(False, 'Also publishes the magnetic field, which few firmware versions send.')
     # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
     acceleration_count_g: float = param(
         16384.0,
-        'Accelerometer counts of one g; larger values give smaller accelerations.',
+        'Accelerometer counts of one g.',
         unit='1/g',
         low=1.0,
         high=1e6,
     )
     rotation_count_dps: float = param(
         131.072,
-        'Gyroscope counts of one degree per second; larger values give smaller angular rates.',
+        'Gyroscope counts of one degree per second.',
         unit='s/deg',
         low=1e-3,
         high=1e6,
@@ -297,7 +297,7 @@ class Tsf85Settings:
     # Data sheet of the ICM-20948: 0.15 microtesla a count.
     field_count_ut: float = param(
         1 / 0.15,
-        'Magnetometer counts of one microtesla; larger values give smaller fields.',
+        'Magnetometer counts of one microtesla.',
         unit='1/µT',
         low=1e-3,
         high=1e6,
@@ -428,7 +428,7 @@ SHORTEST_LOSS_S = 0.01  # what is late by less is no loss, where the firmware se
 class FingerStream:
     """Number the sample frames of one finger by the device's stamps, time them by the host's clock, cut batches.
 
-    Where the firmware sends no stamps, the host's clock also tells what was lost, half a second later.
+    Where the firmware sends no stamps, the host's clock also shows what was lost, half a second later.
     """
 
     def __init__(
@@ -447,7 +447,7 @@ class FingerStream:
         return {**rates, IMU: RATE_HZ} if self.cutter.has_motion else rates
 
     def interrupt(self) -> None:
-        """Forget what belongs to the stream so far: another one begins."""
+        """Reset the state for a new stream."""
         self._numbering.interrupt()
         self.counter.interrupt()
         self._waiting = []
@@ -473,7 +473,7 @@ class FingerStream:
 # The TSF-85 fingertip as a sensor of the suite.
 
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
-REVIVALS = 3  # so many times, as the vendor does, before the port is given up
+REVIVALS = 3  # restarts, as the vendor does, before the port is closed
 REVIVAL_PAUSE_S = 0.05  # between stop and start
 
 
@@ -530,7 +530,7 @@ class Tsf85Decoder(Decoder):
         return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in LIMITS.items()}
 
     def restart(self) -> None:
-        """Go on after an interruption, with the index that the host's clock will tell."""
+        """Resume after an interruption, with the index according to the host's clock."""
         for finger in self._fingers.values():
             finger.interrupt()
 
@@ -560,7 +560,7 @@ class Tsf85Decoder(Decoder):
 class Tsf85(SerialSensor):
     """Read a TSF-85: 'signal' at 1 kHz, 'signal_static' (7 rows of 4 taxels) at a constant rate, 'signal_imu' at 1 kHz.
 
-    The device's own stamps number the samples, so losses are known exactly; over an interruption the host's clock
+    The device's stamps number the samples, so losses are known exactly; over an interruption the host's clock
     does. Taxel images come irregularly (or, from old firmware, repeated each millisecond): the newest one is published
     at each tick of the static rate. See `texture_core.types.Sensor`.
 
@@ -608,12 +608,12 @@ class Tsf85(SerialSensor):
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals of the decoder, and how often the device was opened again and woken."""
+        """Totals of the decoder, and how often the device was reopened and restarted."""
         return {**super().counts, 'revived': self._revived}
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """Serial number of the USB device if it tells one, and how much its clock is slow."""
+        """Serial number of the USB device if it has one, and the drift of its clock."""
         serial = {'serial number': self._serial} if self._serial else {}
         return {**serial, **super().details}
 
@@ -637,7 +637,7 @@ class Tsf85(SerialSensor):
         if self._babbles:
             fingers = ' or '.join(str(finger) for finger in self._published)
             return (
-                f"device '{self._params.device}' sends bytes, and nothing of finger {fingers} in them that this driver "
-                'knows; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'
+                f"device '{self._params.device}' sends bytes, but no known packet of finger "
+                f'{fingers}; check the finger, that it is a TSF-85, and its firmware (1.0.6 to 1.1.8 are known)'
             )
         return f"device '{self._params.device}' is open and sends nothing, started {1 + REVIVALS} times; replug it"

@@ -23,5 +23,5 @@ def slide_of():
 
 @pytest.fixture(scope='session')
 def estimates_of(slide_of):
-    """Return a function that gives what a model says after each window of a slide, and at its end."""
+    """Return a function that gives the estimates of a model after each window of a slide, and at its end."""
     return lambda model, values, **more: list(map(EvidenceAccumulator(model).update, slide_of(model, values, **more)))

@@ -35,13 +35,13 @@ RATES = Rates(max_accepted_wrong=0.03, false_rejection_rate=0.1)
 DISTANCE = ClassDistance.fit(np.random.default_rng(0).normal(size=(12, 2)), np.repeat([0, 1], 6))
 
 
-def held_out(rng, count, *, separation=3.0, away=0.0, others=3.0):
+def held_out(rng, count, *, separation=3.0, offset=0.0, others=3.0):
     """Return slides whose evidence is Gaussian, and whose distance is larger to labels that are not theirs."""
     slides = []
     for truth in rng.integers(LABELS, size=count).tolist():
         scores = rng.normal(size=(len(COUNTS), LABELS)) + separation * np.eye(LABELS)[truth]
         means = log_softmax(scores)
-        distances = rng.exponential(size=LABELS) + away + others * (np.arange(LABELS) != truth)
+        distances = rng.exponential(size=LABELS) + offset + others * (np.arange(LABELS) != truth)
         without = np.where(np.arange(LABELS) == truth, -np.inf, means)
         scored, unknown = (_margins_and_distances(rows, distances) for rows in (means, without))
         slides.append(HeldOutSlide(truth, means, COUNTS, scored, unknown))
@@ -62,8 +62,8 @@ def accepted(acceptance, slides, *, unknown=False):
     """Return whether slides are accepted at each length of evidence, (n_slides, n_levels)."""
     rows = [slide.unknown if unknown else slide.scored for slide in slides]
     return np.array([
-        [acceptance.assess(*pair, length).rejection is Rejection.NONE for pair, length in zip(own, LEVELS, strict=True)]
-        for own in rows
+        [acceptance.assess(*pair, length).rejection is Rejection.NONE for pair, length in zip(row, LEVELS, strict=True)]
+        for row in rows
     ])  # fmt: skip
 
 
@@ -91,7 +91,7 @@ def test_as_many_right_labels_are_rejected_as_allowed_where_none_is_confused():
 def test_slides_of_left_out_places_take_no_acceptance_away_from_slides_as_near_as_those_of_the_training():
     rng = np.random.default_rng(0)
     near = held_out(rng, 400)
-    alone, with_places = fitted(near), fitted(near, held_out(rng, 400, separation=0.5, away=4.0))
+    alone, with_places = fitted(near), fitted(near, held_out(rng, 400, separation=0.5, offset=4.0))
     new = held_out(rng, 200)
     as_near = np.array(
         [
@@ -104,8 +104,8 @@ def test_slides_of_left_out_places_take_no_acceptance_away_from_slides_as_near_a
 
 def test_few_slides_of_left_out_places_are_accepted_and_wrong():
     rng = np.random.default_rng(0)
-    found = fitted(held_out(rng, 1000), held_out(rng, 1000, separation=0.5, away=4.0))
-    new = held_out(rng, 1000, separation=0.5, away=4.0)
+    found = fitted(held_out(rng, 1000), held_out(rng, 1000, separation=0.5, offset=4.0))
+    new = held_out(rng, 1000, separation=0.5, offset=4.0)
     wrong = accepted(found, new) & ~np.array([slide.right for slide in new])
     assert wrong.mean(axis=0).max() < 0.05
 
@@ -147,7 +147,7 @@ def test_slides_end_early_with_as_few_wrong_labels_as_allowed():
 
 
 @pytest.mark.parametrize('coverage', [0.8, 0.95])
-def test_the_true_label_is_in_the_prediction_set_as_often_as_asked(coverage):
+def test_the_true_label_is_in_the_prediction_set_as_often_as_requested(coverage):
     rng = np.random.default_rng(0)
     found = fitted(held_out(rng, 2000, separation=1.5), rates=dataclasses.replace(RATES, coverage=coverage))
     inside = [
@@ -174,11 +174,11 @@ def test_a_slide_of_the_training_scores_as_it_does_window_by_window():
 
 
 # --------------------
-# What so many slides show.
+# What a number of slides can show.
 
 
 @pytest.mark.parametrize('slides', [1, 12, 149, 600])
-def test_a_classifier_that_errs_as_often_as_the_bound_passes_so_many_slides_once_in_twenty(slides):
+def test_a_classifier_that_errs_as_often_as_the_bound_passes_this_many_slides_once_in_twenty(slides):
     error_rate = 1.0 - Acceptance(slides).highest_confidence
     assert binom.pmf(0, slides, error_rate) == pytest.approx(0.05)
 
@@ -280,13 +280,13 @@ def test_added_slides_pass_the_same_acceptance_and_fewer_than_needed_none(make_e
 def test_code_card_and_page_name_the_same_numbers_of_slides(make_examples, tmp_path):
     needed = math.ceil(slides_needed(DecisionParams().max_accepted_wrong) / TRIALS)
     assert (needed, LEAST_SLIDES_A_LABEL) == (45, 5)
-    asked = f'to accept a label {needed} are needed, and {LEAST_SLIDES_A_LABEL} of each surface'
+    needed_text = f'to accept a label {needed} are needed, and {LEAST_SLIDES_A_LABEL} of each surface'
     path = train(load_recipe('default'), make_examples(slides=4)).save(tmp_path / 'few')
-    assert asked in load_model(path).acceptance.reason
+    assert needed_text in load_model(path).acceptance.reason
     pages = Path(__file__).parents[3] / 'docs'
-    said = f'fewer than {needed} held-out slides, or fewer than {LEAST_SLIDES_A_LABEL} of a surface'
-    assert said in (pages / 'recipes.md').read_text(encoding='utf-8')
-    assert asked in (pages / 'integrate.md').read_text(encoding='utf-8')
+    documented = f'fewer than {needed} held-out slides, or fewer than {LEAST_SLIDES_A_LABEL} of a surface'
+    assert documented in (pages / 'recipes.md').read_text(encoding='utf-8')
+    assert needed_text in (pages / 'integrate.md').read_text(encoding='utf-8')
 
 
 def test_a_label_with_fewer_slides_than_needed_is_named(make_examples):

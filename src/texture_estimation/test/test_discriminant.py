@@ -27,7 +27,7 @@ RECIPE = Recipe.from_mapping(CONTENT, 'lines')
 
 
 def of_days(examples, days=2):
-    """Return examples whose slides come from so many days: 'cork/0' from the first, 'cork/1' from the second."""
+    """Return examples whose slides come from this many days: 'cork/0' from the first, 'cork/1' from the second."""
     slides = np.unique(examples.groups).tolist()
     made = {slide: SlideConditions(session=f'day {int(slide.rpartition("/")[2]) % days}') for slide in slides}
     return replace(examples, conditions=made)
@@ -58,7 +58,7 @@ def test_without_days_slides_are_held_out_by_themselves(examples):
     assert held_out_parts(replace(examples, conditions=by_slide)) is None
 
 
-def test_places_are_held_out_in_turn_where_each_slide_has_a_bag_of_its_own(examples):
+def test_places_are_held_out_in_turn_where_each_slide_has_a_separate_bag(examples):
     slides = np.unique(examples.groups).tolist()
     made = {slide: SlideConditions(session=slide, place=str(int(slide[-1]) % 2)) for slide in slides}
     parts = held_out_parts(replace(examples, conditions=made))
@@ -82,12 +82,12 @@ def test_confidence_falls_where_days_differ(make_examples):
     shift = 3.0 * np.random.default_rng(3).standard_normal((4, 2, 6))
     codes = np.unique(examples.labels, return_inverse=True)[1]
     shifted = replace(examples, values=examples.values + shift[codes, days])
-    apart, together = (train(RECIPE, of) for of in (shifted, replace(shifted, conditions={})))
-    assert 'sessions held out in turn, 2 parts' in apart.training['calibration']
-    assert apart.training['held_out_window_accuracy'] < together.training['held_out_window_accuracy'] - 0.1
+    separated, together = (train(RECIPE, of) for of in (shifted, replace(shifted, conditions={})))
+    assert 'sessions held out in turn, 2 parts' in separated.training['calibration']
+    assert separated.training['held_out_window_accuracy'] < together.training['held_out_window_accuracy'] - 0.1
 
 
-def test_a_model_of_one_place_says_so_where_it_rejects(make_examples):
+def test_a_model_of_one_place_reports_it_where_it_rejects(make_examples):
     examples = make_examples(slides=8)
     model = train(RECIPE, examples)
     assert model.acceptance.domain.reach['cork'] == {'sessions': 1, 'places': 1, 'fingers': 1}
@@ -109,7 +109,7 @@ def test_the_load_is_no_part_of_the_discriminant_and_a_load_never_seen_is_outsid
     )
     vectors = {slide: examples.vectors(slide)[:-1] for slide in np.unique(examples.groups).tolist()}
     surfaces = {slide: slide.split('/')[0] for slide in vectors}
-    examples = type(examples).from_vectors([vector for own in vectors.values() for vector in own], surfaces)
+    examples = type(examples).from_vectors([vector for each in vectors.values() for vector in each], surfaces)
     model = train(RECIPE, examples)
     assert not model.parameters['weights'][-1].any()
     light = replace(examples, values=examples.values - np.append(np.zeros(6), np.log(225.0)))  # 300 / 15
@@ -121,7 +121,7 @@ def test_the_load_is_no_part_of_the_discriminant_and_a_load_never_seen_is_outsid
 
 
 def of_forces(rng, slides=8, windows=12):
-    """Return windows whose one feature tells cork from felt by its sign, which turns where the force is above 2 N."""
+    """Return windows whose one feature distinguishes cork from felt by its sign, inverted above 2 N."""
     forces = np.tile(np.where(np.arange(windows) < windows // 2, 1.0, 4.0), 2 * slides)
     forces = forces * np.exp(0.02 * rng.standard_normal(len(forces)))
     codes = np.repeat([0, 1], slides * windows)
@@ -218,12 +218,12 @@ def test_a_difference_between_places_counts_less_the_more_weight_its_covariance_
     X = np.tile(np.concatenate([noise, -noise]), (4, 1)) + np.stack(
         [codes, codes + 3.0 * stretches], axis=1
     )  # the second one drifts
-    share = []
+    ratios = []
     for weight in (0.0, 10.0):
         layer, _ = linear_discriminant(X, codes, 2, 0.0, stretches=stretches, stretch_weight=weight)
-        share.append(layer[1, 1] / layer[0, 1])
+        ratios.append(layer[1, 1] / layer[0, 1])
     # of class means 1 apart, variance 1 and 1 + 2.25 (1 + weight): the ratio of the weights is that of the variances
-    assert share == pytest.approx([1 / 3.25, 1 / 25.75], rel=0.15)
+    assert ratios == pytest.approx([1 / 3.25, 1 / 25.75], rel=0.15)
 
 
 def test_one_track_is_cut_into_parts_that_are_held_out_as_places(make_examples):

@@ -35,7 +35,7 @@ def test_slides_like_those_of_the_training_are_within_the_domain():
     ],
 )
 def test_each_condition_that_was_not_trained_is_named_with_what_was(came, sentence):
-    assert TRAINED.deviation(came) == f'outside what was trained: {sentence}'
+    assert TRAINED.deviation(came) == f'outside the training: {sentence}'
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_arcs_bridge_small_gaps_also_across_the_back(directions, arcs):
 def test_to_and_fro_is_trained_if_both_directions_are():
     both = conditions(directions_rad=(0.0, 3.14))
     assert trained_on(conditions(), conditions(directions_rad=(math.pi,))).deviation(both) == ''
-    assert TRAINED.deviation(both) == 'outside what was trained: direction 3.14 rad, trained 0 rad'
+    assert TRAINED.deviation(both) == 'outside the training: direction 3.14 rad, trained 0 rad'
 
 
 def at_level(rms, channel='signal/pac', **known):
@@ -86,7 +86,7 @@ def at_level(rms, channel='signal/pac', **known):
 @pytest.mark.parametrize(('rms', 'within'), [(2.1, True), (1.9, False), (15.9, True), (16.1, False)])
 def test_a_signal_far_stronger_or_weaker_than_any_trained_is_outside(rms, within):
     domain = trained_on(at_level(4.0), at_level(8.0), level=1.0)
-    sentence = f'outside what was trained: signal level {rms:.3g} of signal/pac, trained 4 to 8'
+    sentence = f'outside the training: signal level {rms:.3g} of signal/pac, trained 4 to 8'
     assert domain.deviation(at_level(rms)) == ('' if within else sentence)
     assert domain.deviation(at_level(rms, 'signal/other')) == ''
 
@@ -97,7 +97,7 @@ def test_added_slides_widen_the_domain():
     wider = TRAINED.widened([added], ['oak'])
     assert wider.deviation(added) == ''
     assert wider.deviation(conditions()) == ''
-    assert wider.deviation(conditions(0.2)) == 'outside what was trained: speed 0.2 m/s, trained 0.045 to 0.1 m/s'
+    assert wider.deviation(conditions(0.2)) == 'outside the training: speed 0.2 m/s, trained 0.045 to 0.1 m/s'
     assert wider.slides == {'cork': 2, 'oak': 1}
     louder = trained_on(at_level(4.0)).widened([at_level(40.0)], ['oak'])
     assert louder.levels == {'signal/pac': (4.0, 40.0)}

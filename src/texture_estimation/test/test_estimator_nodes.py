@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes that answer feature vectors: what they share, and what each does besides."""
+"""The nodes that answer feature vectors: what they have in common, and what each adds."""
 
 import dataclasses
 
@@ -99,7 +99,7 @@ def trees_model(examples):
 
 @pytest.fixture(scope='module')
 def pairs_model(examples):
-    """Return a model in which two pairs have features and learners of their own."""
+    """Return a model in which two pairs have separate features and learners."""
     pairs = [
         {
             'pair': ['cork', 'felt'],
@@ -142,7 +142,7 @@ def grade_2(roughness_model):
 
 @pytest.fixture(params=NODES)
 def case(request, tmp_path):
-    """Return a node, the path of a model for it, and the vectors of a slide over a surface that the model knows."""
+    """Return a node, the path of a model for it, and the vectors of a slide over a trained surface."""
     kind, model, vectors = NODES[request.param]
     return kind, request.getfixturevalue(model).save(tmp_path / 'm'), request.getfixturevalue(vectors)
 
@@ -200,7 +200,7 @@ def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
         NodeUnderTest(graph, case[0], tmp_path / 'none.npz')
 
 
-def test_a_node_says_what_the_same_vectors_give_offline(graph, case):
+def test_a_node_publishes_what_the_same_vectors_give_offline(graph, case):
     kind, path, vectors = case
     received = NodeUnderTest(graph, kind, path).ask(vectors)
     evidence = (
@@ -217,7 +217,7 @@ def test_a_node_says_what_the_same_vectors_give_offline(graph, case):
     assert received[-1].processing_s > 0.0
 
 
-def test_a_grade_of_a_known_surface_is_its_own(roughness_model, grade_2):
+def test_a_grade_of_a_known_surface_is_that_of_its_training(roughness_model, grade_2):
     evidence = RoughnessAccumulator(roughness_model)
     assert [evidence.update(vector) for vector in grade_2][-1].grade == pytest.approx(2.0, abs=0.3)
 

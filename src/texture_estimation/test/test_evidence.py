@@ -66,7 +66,7 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert len(estimates[-1].probabilities) == len(model.labels)
 
 
-def test_the_final_estimate_says_how_many_windows_are_missing_from_it(make_examples):
+def test_the_final_estimate_states_how_many_windows_are_missing_from_it(make_examples):
     examples = make_examples(slides=12)
     model = unlimited(train(load_recipe('default'), examples))
     *windows, last = vectors(examples)
@@ -79,8 +79,8 @@ def test_overlapping_windows_count_the_sliding_time_once(model, examples):
     estimates = predict(model, vectors(examples, hop_s=0.1))
     assert [round(estimate.evidence_s, 3) for estimate in estimates[:4]] == [0.5, 0.6, 0.7, 0.8]
     assert estimates[0].stamp_ns == 1_500_000_000
-    apart = predict(model, vectors(examples, hop_s=1.0))
-    assert apart[2].evidence_s == pytest.approx(1.5)
+    separate = predict(model, vectors(examples, hop_s=1.0))
+    assert separate[2].evidence_s == pytest.approx(1.5)
 
 
 def under(stream, **conditions):
@@ -93,9 +93,9 @@ def trained_at(model, speed_m_s):
     return with_acceptance(model, domain=domain)
 
 
-def test_outside_what_was_trained_nothing_is_known_or_decided_and_every_estimate_says_why(model, examples):
+def test_outside_the_training_nothing_is_accepted_or_decided_and_every_estimate_states_why(model, examples):
     slow = under(vectors(examples), speed_m_s=0.02, motion='linear_slide')
-    sentence = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
+    sentence = 'outside the training: speed 0.02 m/s, trained 0.05 m/s'
     assert any(estimate.decided for estimate in predict(unlimited(model), slow))
     for estimate in predict(trained_at(unlimited(model), 0.05), slow):
         assert (estimate.accepted, estimate.decided, estimate.prediction_set) == (False, False, ())
@@ -145,7 +145,7 @@ def test_a_slide_without_windows_ends_with_a_reason(model, examples):
     )
 
 
-def test_without_a_model_the_final_estimate_says_so(examples):
+def test_without_a_model_the_final_estimate_reports_it(examples):
     estimate = predict(None, vectors(examples))[-1]
     assert estimate.final
     assert estimate.label == ''
@@ -246,7 +246,7 @@ def test_many_slides_at_once_are_joined_as_one_by_one(name):
         np.testing.assert_allclose(alone, expected, rtol=1e-12)  # sums may be ordered otherwise
 
 
-def test_windows_late_in_a_slide_count_as_much_as_the_rule_says():
+def test_windows_late_in_a_slide_count_as_much_as_the_rule_defines():
     evidence = np.array([[0.0, -1.0]] * 5 + [[-1.0, 0.0]] * 8)
     counts = np.arange(1.0, 14.0)
     equal, less = (running_means(SoftVote(late_weight=weight), evidence, counts) for weight in (1.0, 0.25))

@@ -19,12 +19,12 @@ def trained(centres=((0.0, 0.0, 0.0), (6.0, 0.0, 0.0)), spread=1.0):
         [slide(centre, 100 * code + number, spread) for code, centre in enumerate(centres) for number in range(SLIDES)]
     )
     slides = np.repeat(np.arange(SLIDES * len(centres)), WINDOWS)
-    return SlideGaussians.fit(values, slides // SLIDES, slides, hop_share=1.0)
+    return SlideGaussians.fit(values, slides // SLIDES, slides, hop_ratio=1.0)
 
 
 def best(gaussians, values, effective_windows=float(WINDOWS)):
-    shares = gaussians.shares(values.mean(axis=0), values.var(axis=0), effective_windows)
-    return int(gaussians.combined(np.full(gaussians.n_trained, 1.0 / gaussians.n_trained), shares).argmax())
+    log_proba = gaussians.log_proba(values.mean(axis=0), values.var(axis=0), effective_windows)
+    return int(gaussians.combined(np.full(gaussians.n_trained, 1.0 / gaussians.n_trained), log_proba).argmax())
 
 
 @pytest.mark.parametrize('length', LENGTHS)
@@ -36,7 +36,7 @@ def test_a_texture_of_one_slide_is_recognised_at_every_length_and_the_trained_on
     assert best(gaussians, slide([6.0, 0.0, 0.0], 4)[part], length) != 2
 
 
-def test_textures_that_differ_in_their_variation_alone_are_told_apart_in_a_long_slide():
+def test_textures_that_differ_in_their_variation_alone_are_distinguished_in_a_long_slide():
     gaussians = trained(spread=0.5).with_added([slide([0.0, 0.0, 0.0], 1, spread=3.0)], np.array([2]))
     still, varied = slide([0.0, 0.0, 0.0], 2, spread=0.5), slide([0.0, 0.0, 0.0], 3, spread=3.0)
     assert best(gaussians, varied) == 2
@@ -46,8 +46,8 @@ def test_textures_that_differ_in_their_variation_alone_are_told_apart_in_a_long_
 def test_trained_textures_share_what_they_have_together_as_they_were():
     gaussians = trained().with_added([slide([0.0, 8.0, 0.0], 1)], np.array([2]))
     values = slide([0.0, 3.0, 0.0], 2)
-    shares = gaussians.shares(values.mean(axis=0), values.var(axis=0), float(WINDOWS))
-    probabilities = gaussians.combined(np.array([0.9, 0.1]), shares)
+    log_proba = gaussians.log_proba(values.mean(axis=0), values.var(axis=0), float(WINDOWS))
+    probabilities = gaussians.combined(np.array([0.9, 0.1]), log_proba)
     assert probabilities.sum() == pytest.approx(1.0)
     assert probabilities[0] / probabilities[1] == pytest.approx(9.0)
 
@@ -56,8 +56,8 @@ def test_added_slides_take_the_place_of_those_added_before_and_none_is_left_of_t
     first, second = slide([0.0, 8.0, 0.0], 1), slide([0.0, 0.0, 8.0], 2)
     again = trained().with_added([first], np.array([2])).with_added([second], np.array([2]))
     direct = trained().with_added([second], np.array([2]))
-    asked = slide([1.0, 2.0, 3.0], 3)
-    np.testing.assert_array_equal(*(one.shares(asked.mean(axis=0), asked.var(axis=0), 3.0) for one in (again, direct)))
+    x = slide([1.0, 2.0, 3.0], 3)
+    np.testing.assert_array_equal(*(one.log_proba(x.mean(axis=0), x.var(axis=0), 3.0) for one in (again, direct)))
 
 
 def normal(centre, count, seed):
@@ -70,7 +70,7 @@ def fitted(*centres, count=4000):
 
 
 @pytest.mark.parametrize('distance', [1.0, 2.0, 3.0])
-def test_two_gaussians_are_confused_as_often_as_their_distance_says(distance):
+def test_two_gaussians_are_confused_as_often_as_their_distance_predicts(distance):
     classes = fitted([0.0, 0.0], [distance, 0.0])
     wrong = classes.log_probabilities(normal([0.0, 0.0], 40_000, seed=9)).argmax(axis=1).mean()
     assert wrong == pytest.approx(norm.cdf(-distance / 2.0), abs=0.01)
@@ -80,10 +80,10 @@ def test_a_class_of_few_slides_is_wider_and_as_sharp_as_the_others_with_many():
     classes = fitted([0.0], [10.0])
     at = np.array([20.0])
     for slides in (1, 5, 10_000):
-        shares = classes.with_classes(np.array([[22.0]]), np.array([slides])).log_probabilities(at)
+        log_proba = classes.with_classes(np.array([[22.0]]), np.array([slides])).log_probabilities(at)
         variance = (1.0 + 1.0 / slides) ** classes.uncertainty_exponent
         log_odds = 0.5 * classes.inverse_temperature * (100.0 - 4.0 / variance)
-        assert shares[2] - shares[1] == pytest.approx(log_odds, rel=0.1)
+        assert log_proba[2] - log_proba[1] == pytest.approx(log_odds, rel=0.1)
 
 
 def test_more_features_than_a_covariance_could_hold_still_tell_the_classes():
@@ -128,8 +128,8 @@ def test_the_distance_is_that_to_the_three_nearest_slides_less_that_to_the_centr
     distance, centres, _ = distance_of_slides
     projected = centres[2] @ distance.projection
     squares = ((distance.references[distance.classes == 2] - projected) ** 2).sum(axis=1)
-    away = (projected - distance.centre) ** 2
-    expected = np.sort(squares)[:3].mean() - away @ distance.weights
+    squared = (projected - distance.centre) ** 2
+    expected = np.sort(squares)[:3].mean() - squared @ distance.weights
     assert distance.score(centres[2], 2) == pytest.approx(expected)
 
 

@@ -27,7 +27,7 @@ def measured(slide_of):
 
 @pytest.fixture
 def silk():
-    """Return windows of a texture that the model does not know."""
+    """Return windows of a texture that is not trained."""
     rng = np.random.default_rng(7)
     return 4.0 + rng.normal(size=(12, 6))
 
@@ -224,7 +224,7 @@ def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, 
 
 
 def with_slides(measured, model, values, count):
-    """Return the model after so many slides with these windows were added as silk."""
+    """Return the model after this many slides with these windows were added as silk."""
     classifier = IncrementalClassifier(model)
     for number in range(count):
         measured(classifier, values, f'e{number}')

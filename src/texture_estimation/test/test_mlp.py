@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The multilayer perceptron against what mathematics says of it."""
+"""The multilayer perceptron against analytical results."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_slopes_are_the_derivatives_of_the_cross_entropy():
         assert slope[place] == pytest.approx((above - below) / 2e-6, abs=1e-7)
 
 
-def test_two_overlapping_clouds_are_reported_apart_as_well_as_can_be_and_no_better_is_claimed():
+def test_two_overlapping_clouds_are_separated_as_well_as_possible_and_no_better_is_claimed():
     rng = np.random.default_rng(1)
     codes = np.tile([0, 1], 1000)
     values = rng.standard_normal((2000, 2)) + codes[:, None] * [1.0, 0.0]

@@ -22,8 +22,8 @@ from texture_estimation.roughness import Grades, load_roughness_recipe, train_gr
 from texture_estimation.training import train
 from texture_features.feature_set import SlideConditions
 
-OWN = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
-# Loads the models named first and asks each for an answer, in a Python without these libraries.
+RECIPES = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+# Loads the models named first and predicts with each, in a Python without these libraries.
 ALONE = """
 import sys
 class Absent:
@@ -57,15 +57,15 @@ def test_a_model_predicts_the_same_after_it_was_saved(saved, model, examples, en
     np.testing.assert_equal(loaded.tree, model.tree)
 
 
-def test_models_of_all_own_recipes_answer_without_scikit_learn_and_skops(examples, make_examples, tmp_path):
-    paths = [f'{name}={train(load_recipe(name), examples).save(tmp_path / name)}' for name in OWN]
+def test_models_of_all_shipped_recipes_answer_without_scikit_learn_and_skops(examples, make_examples, tmp_path):
+    paths = [f'{name}={train(load_recipe(name), examples).save(tmp_path / name)}' for name in RECIPES]
     grades = Grades({label: 1.0 + number for number, label in enumerate(('cork', 'felt', 'slate', 'wood'))})
     rough = train_grades(load_roughness_recipe('roughness'), examples, grades).save(tmp_path / 'rough')
     reported = subprocess.run(
         [sys.executable, '-c', ALONE, *paths, f'roughness={rough}'], check=False, capture_output=True, text=True
     )
     assert reported.stderr == ''
-    assert reported.stdout.split('\n')[:-1] == [f'{name} 1' for name in (*OWN, 'roughness')]
+    assert reported.stdout.split('\n')[:-1] == [f'{name} 1' for name in (*RECIPES, 'roughness')]
 
 
 def test_the_card_holds_recipe_labels_and_facts(saved):

@@ -54,12 +54,12 @@ def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
     assert odds == pytest.approx(2.0 * 0.3)
 
 
-@pytest.mark.parametrize(('apart', 'nats'), [(0.0, 0.0), (2.0, 0.3368), (4.0, 0.6327), (100.0, np.log(2))])
-def test_information_of_two_gaussians_is_at_most_that_of_a_channel_with_two_signals(apart: float, nats: float) -> None:
+@pytest.mark.parametrize(('delta', 'nats'), [(0.0, 0.0), (2.0, 0.3368), (4.0, 0.6327), (100.0, np.log(2))])
+def test_information_of_two_gaussians_is_at_most_that_of_a_channel_with_two_signals(delta: float, nats: float) -> None:
     """Capacity of the binary-input Gaussian channel, by numerical integration."""
-    means = np.array([[-apart / 2], [apart / 2]])
+    means = np.array([[-delta / 2], [delta / 2]])
     prior = np.log([0.5, 0.5])
-    bound = np.log(2) - np.log1p(np.exp(-(apart**2) / 8))
+    bound = np.log(2) - np.log1p(np.exp(-(delta**2) / 8))
     assert least_information(means, prior) == pytest.approx(bound)
     assert bound <= nats + 1e-9
 
@@ -77,7 +77,7 @@ def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> N
 
 
 @pytest.mark.parametrize(
-    ('values', 'textures', 'motions', 'said'),
+    ('values', 'textures', 'motions', 'message'),
     [
         (np.zeros((2, 1)), ['a'], [ACROSS], 'one texture and one motion'),
         (np.full((2, 1), np.nan), ['a', 'a'], [ACROSS] * 2, 'one row of finite values'),
@@ -87,14 +87,14 @@ def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> N
     ],
 )
 def test_slides_unfit_for_training_are_refused(
-    values: np.ndarray, textures: list[str], motions: list[SlideMotion], said: str
+    values: np.ndarray, textures: list[str], motions: list[SlideMotion], message: str
 ) -> None:
-    with pytest.raises(InvalidData, match=said):
+    with pytest.raises(InvalidData, match=message):
         NextTouchModel.fit(values, textures, motions)
 
 
 @pytest.mark.parametrize('seed', range(3))
-def test_what_lies_apart_by_chance_reports_nothing(seed: int) -> None:
+def test_differences_by_chance_carry_no_information(seed: int) -> None:
     """Three slides of each texture on 40 features: their means are far apart, their distributions the same."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal((60, 40))

@@ -25,7 +25,7 @@ RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
 
 
 def nearly_dependent(values):
-    """Six features of which any two are the same but for 1e-9: a covariance of rank one for all that can be told."""
+    """Six features of which any two are the same but for 1e-9: a covariance of rank one within numerical precision."""
     return values[:, :1] + 1e-9 * values
 
 
@@ -83,10 +83,10 @@ def test_what_is_far_from_all_is_further_than_any_slide_of_the_training(change, 
     means = np.stack([values[groups == group].mean(axis=0) for group in np.unique(groups)])
     classes = codes[np.unique(groups, return_index=True)[1]]
     distance = ClassDistance.fit(means, classes)
-    own = np.array([distance.score(mean, code) for mean, code in zip(means, classes.tolist(), strict=True)])
+    distances = np.array([distance.score(mean, code) for mean, code in zip(means, classes.tolist(), strict=True)])
     far = distance.score(means[0] + 100.0 * np.ptp(values, axis=0), int(classes[0]))
-    assert np.isfinite(own).all()
-    assert far > own.max() + 10.0 * np.ptp(own)
+    assert np.isfinite(distances).all()
+    assert far > distances.max() + 10.0 * np.ptp(distances)
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')
@@ -98,8 +98,8 @@ def test_grades_are_near_the_scale_or_none_at_all(regressor, change):
     grades = 1.0 + textures % 5.0
     values = change(grades[:, None] * [3.0, 0.0, 1.0] + 0.3 * rng.normal(size=(60, 3)))
     predictor = REGRESSORS[regressor]().predictor(REGRESSORS[regressor]().fit(values, grades, textures))
-    for asked in (values, np.zeros((1, values.shape[1]))):
-        found, std = predictor(asked)
+    for inputs in (values, np.zeros((1, values.shape[1]))):
+        found, std = predictor(inputs)
         assert (((found > SMOOTH - 0.5) & (found < ROUGH + 0.5)) | np.isnan(found)).all()
         assert np.isfinite(std).all()
 

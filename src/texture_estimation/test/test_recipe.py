@@ -44,7 +44,7 @@ def test_training_windows_have_the_hop_of_the_training():
         ({'training': 3}, 'a mapping'),
     ],
 )
-def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence):
+def test_a_wrong_recipe_gets_one_sentence_that_states_where(more, sentence):
     with pytest.raises(TextureError, match=sentence) as caught:
         Recipe.from_mapping({**INPUTS, **more}, 'mine')
     assert "recipe 'mine'" in str(caught.value)

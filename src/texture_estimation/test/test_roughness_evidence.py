@@ -92,9 +92,9 @@ def test_more_sliding_never_makes_surer_than_people_agree(model) -> None:
 def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(model) -> None:
     evidence = RoughnessAccumulator(model)
     received = [evidence.update(vector(sequence=5 * k)) for k in range(50)] + [evidence.update(last())]
-    said = [estimate for estimate in received if estimate]
-    assert 3 <= len(said) < 50
-    assert [estimate.final for estimate in said] == [False] * (len(said) - 1) + [True]
+    estimates = [estimate for estimate in received if estimate]
+    assert 3 <= len(estimates) < 50
+    assert [estimate.final for estimate in estimates] == [False] * (len(estimates) - 1) + [True]
     assert evidence.update(vector(identity='e2')).windows == 1
 
 
@@ -109,7 +109,7 @@ def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(mod
         (vector(feature_set='abcd1234 signal=2000Hz*1'), 'the sampling rate'),
     ],
 )
-def test_unusable_input_gives_no_grade_and_says_why(model, window, sentence) -> None:
+def test_unusable_input_gives_no_grade_and_a_reason(model, window, sentence) -> None:
     evidence = RoughnessAccumulator(model)
     for estimate in (evidence.update(window), evidence.update(last())):
         assert not estimate.valid
@@ -177,7 +177,7 @@ def test_a_saved_model_grades_alike_and_holds_no_code(model, tmp_path) -> None:
     assert card['grades'].keys() == model.grades.keys()
 
 
-def test_models_of_the_other_kind_are_reported_apart(model, examples, tmp_path) -> None:
+def test_models_of_the_other_kind_are_reported_separately(model, examples, tmp_path) -> None:
     model.save(tmp_path / 'rough')
     train(load_recipe('default'), examples).save(tmp_path / 'names')
     with pytest.raises(ModelMismatch, match='load it in the roughness_estimator'):

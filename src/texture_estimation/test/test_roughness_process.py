@@ -41,7 +41,7 @@ def test_a_single_texture_cannot_be_trained_on(graded_windows) -> None:
         ({'training': {'fold': 5}}, "did you mean 'folds'"),
     ],
 )
-def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence) -> None:
+def test_a_wrong_recipe_gets_one_sentence_that_states_where(more, sentence) -> None:
     with pytest.raises(TextureError, match=sentence) as caught:
         RoughnessRecipe.from_mapping({**INPUTS, **more}, 'mine')
     assert "roughness recipe 'mine'" in str(caught.value)

@@ -93,7 +93,7 @@ def test_a_recipe_that_names_no_usable_classifier_is_refused(entry, sentence):
         recipe_of(entry)
 
 
-def test_a_value_that_the_estimator_refuses_is_told_when_it_is_trained(examples):
+def test_a_value_that_the_estimator_refuses_is_reported_in_training(examples):
     with pytest.raises(InvalidParameter, match='cannot be trained'):
         train(recipe_of({**TREES, 'n_estimators': -1}), examples)
 

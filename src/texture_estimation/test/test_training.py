@@ -43,7 +43,7 @@ def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
 @pytest.mark.parametrize(
     ('slides', 'windows', 'note'), [(1, 8, 'single slide'), (1, 1, 'single window'), (2, 1, 'slides')]
 )
-def test_few_examples_make_a_model_whose_card_says_how_it_is_calibrated(make_examples, slides, windows, note):
+def test_few_examples_make_a_model_whose_card_states_how_it_is_calibrated(make_examples, slides, windows, note):
     examples = make_examples(slides=slides, windows=windows)
     model = train(RECIPE, examples)
     assert note in model.training['calibration']
@@ -112,8 +112,8 @@ def test_a_classifier_trained_with_gains_recognises_what_is_amplified(make_examp
     plain = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
     params = Augmentation(copies=2, gain_range=5.0, slide_jitter=0.0)
     trained = {
-        name: train(dataclasses.replace(plain, augmentation=own), augmented(examples, response))
-        for name, own in {'plain': Augmentation(), 'augmented': params}.items()
+        name: train(dataclasses.replace(plain, augmentation=params_of_model), augmented(examples, response))
+        for name, params_of_model in {'plain': Augmentation(), 'augmented': params}.items()
     }
     louder = make_examples(slides=6, features=6, seed=9)
     values = louder.values + np.log(4.0) * response
@@ -138,7 +138,7 @@ def test_windows_of_other_lengths_train_the_learner_and_decide_nothing_else(make
     assert accuracy(wider, moved) > 0.9 > accuracy(alone, moved)
     assert wider.training['windows'] == alone.training['windows'] == len(examples.labels)
     kept = dataclasses.replace(both.of_slides(sorted(set(examples.groups) - {'cork/0'})))
-    assert train(ANY_SPEED, kept).training['slides'] == 15  # those of the slide left out are left out, too
+    assert train(ANY_SPEED, kept).training['slides'] == 15  # those of the omitted slide are also omitted
 
 
 def test_no_slide_is_on_both_sides_and_parts_are_stretches_of_time():
@@ -161,7 +161,7 @@ def test_every_label_is_always_trained_on():
         assert set(codes[parameters != part]) == {0, 1}
 
 
-def test_a_label_with_one_slide_is_divided_by_windows_and_the_note_says_so():
+def test_a_label_with_one_slide_is_split_by_windows_and_the_note_states_it():
     parameters, note = assign_folds(np.repeat([0, 1], 4), np.repeat([0, 1], 4), 2)
     assert parameters.tolist() == [0, 0, 1, 1, 0, 0, 1, 1]
     assert 'single slide' in note

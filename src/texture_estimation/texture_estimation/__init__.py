@@ -12,7 +12,7 @@ accumulator = evidence.EvidenceAccumulator(model.load_model('my-surfaces'))
 estimates = [accumulator.update(vector) for vector in vectors_of_a_slide]
 ```
 
-With ROS: `ros2 run texture_estimation classifier --ros-args -p model:=/path/to/my-surfaces.npz`, beside a
+With ROS: `ros2 run texture_estimation classifier --ros-args -p model:=/path/to/my-surfaces.npz`, together with a
 `feature_extractor` with `recipe:=/path/to/my-surfaces.json`.
 
 Limits: confidence is calibrated for slides like those of the training ([decisions](../../docs/recipes.md#decisions)).

@@ -3,12 +3,12 @@
 """Accepted or rejected and why, decided, and the prediction set: one object, fitted to slides held out of the training.
 
 A label is accepted if its slide scores above a limit. The score is the log-odds, by logistic regression, that the slide
-is one of its label's rather than one of a surface that the model does not know. It has two inputs: the margin by which
+is one of its label's rather than one of an unknown surface. It has two inputs: the margin by which
 the evidence for the label exceeds that for the next one, and the distance of the slide to the training slides of the
-label. As unknown surfaces serve the held-out slides themselves, with their label taken away.
+label. As unknown surfaces serve the held-out slides themselves, with their label removed.
 
 Sources: Cox 1958 for the regression; Vovk, Gammerman & Shafer 2005 for limits by rank; Clopper & Pearson 1934 and
-Hanley & Lippman-Hand 1983 for what so many slides can show; Ioffe 2006 for the distance;
+Hanley & Lippman-Hand 1983 for what a number of slides can show; Ioffe 2006 for the distance;
 Wald 1945 for the end of a slide.
 """
 
@@ -33,11 +33,11 @@ from texture_estimation.learners.learner import Codes, is_tied
 from texture_features.feature_set import SlideConditions
 
 # --------------------
-# What so many slides held out of the training can show.
+# What a number of held-out slides can show.
 
-SIGNIFICANCE = 0.05  # the error rate exceeds its upper bound in so many of all trainings
-LEAST_SLIDES_A_LABEL = 5  # with one held out, four tell how much slides differ
-TRIALS = 2  # of each held-out slide: with its label in the model, and with that taken away
+SIGNIFICANCE = 0.05  # fraction of all trainings in which the error rate exceeds its upper bound
+LEAST_SLIDES_A_LABEL = 5  # with one held out, four show how much slides differ
+TRIALS = 2  # of each held-out slide: with its label in the model, and with that removed
 MAX_SLIDES = 1_000_000
 
 
@@ -170,7 +170,7 @@ STEPS = 50
 
 
 def _regression(positive: Array, negative: Array) -> tuple[float, float, float]:
-    """Return offset and factors of the log-odds that tell two sets of margins and distances, (n, 2), equally likely."""
+    """Return offset and factors of the log-odds between two equally likely sets of margins and distances, (n, 2)."""
     both = np.concatenate([positive, negative])
     centre, scale = both.mean(axis=0), both.std(axis=0) + 1e-9
     inputs = np.column_stack([np.ones(len(both)), (both - centre) / scale])
@@ -200,9 +200,9 @@ def _least_score(fitted: tuple[float, float, float], wrong: Array, unknown: Arra
 
     `unknown` are the slides without their label, one for each, and `wrong` those that are wrong with it.
     """
-    own, every = _score(fitted, wrong), np.concatenate([_score(fitted, wrong), _score(fitted, unknown)])
+    scores_of_wrong, every = _score(fitted, wrong), np.concatenate([_score(fitted, wrong), _score(fitted, unknown)])
     limits = [-NEVER]
-    for scores, most in ((own, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
+    for scores, most in ((scores_of_wrong, rate * len(unknown) / TRIALS), (every, rate * TRIALS * len(unknown))):
         kept = int(most + ROUNDING)
         if kept < len(scores):
             limits.append(math.nextafter(float(np.sort(scores)[::-1][kept]), math.inf))
@@ -263,7 +263,7 @@ def _score(fitted: tuple[float, float, float], rows: Array) -> Array:
 
 @dataclass(frozen=True)
 class Rates:
-    """How often what may go wrong: what the recipe says."""
+    """Error rates that the recipe allows."""
 
     max_accepted_wrong: float = 0.033
     false_rejection_rate: float = 0.04
@@ -272,7 +272,7 @@ class Rates:
 
 
 class Assessment(NamedTuple):
-    """What is said of a slide so far."""
+    """Decision about a slide so far."""
 
     rejection: Rejection
     decided: bool
@@ -337,8 +337,8 @@ class Acceptance:
     def reason(self) -> str:
         """Why every label is rejected, in one sentence: how many slides there are and how many are needed; else ''."""
         if self.added:
-            asked = f"to accept '{self.added}' {LEAST_SLIDES_A_LABEL} are needed"
-            return '' if self.slides >= LEAST_SLIDES_A_LABEL else f'too little training: {self.slides} added; {asked}'
+            needs = f"to accept '{self.added}' {LEAST_SLIDES_A_LABEL} are needed"
+            return '' if self.slides >= LEAST_SLIDES_A_LABEL else f'too little training: {self.slides} added; {needs}'
         short = {label: count for label, count in self.domain.slides.items() if count < LEAST_SLIDES_A_LABEL}
         needed = math.ceil(slides_needed(self.rates.max_accepted_wrong) / TRIALS)
         if not short and self.slides >= needed:
@@ -374,24 +374,24 @@ class Acceptance:
         kept = (limit - equal) / (highest - equal)
         return [equal + kept * (probability - equal) for probability in probabilities]
 
-    # ---- what is said of a slide
+    # ---- decisions about a slide
 
     @cached_property
     def _rows(self) -> list[Limits]:
         return [Limits(*row) for row in self.levels.tolist()]
 
     def limits(self, effective_windows: float) -> Limits:
-        """Return the limits after so many windows, linear between two lengths of evidence."""
+        """Return the limits after this many windows, linear between two lengths of evidence."""
         after = bisect_right(LEVELS, effective_windows)
         if after == 0 or after == len(LEVELS):
             return self._rows[max(after - 1, 0)]
         low, high = LEVELS[after - 1], LEVELS[after]
-        share = (effective_windows - low) / (high - low)
+        weight = (effective_windows - low) / (high - low)
         pairs = zip(self._rows[after - 1], self._rows[after], strict=True)
-        return Limits(*(one if one == other else one + share * (other - one) for one, other in pairs))
+        return Limits(*(one if one == other else one + weight * (other - one) for one, other in pairs))
 
     def assess(self, margin: float, distance: float, effective_windows: float) -> Assessment:
-        """Return what is said of a slide by the margin of its label and the distance to the slides of it."""
+        """Return the decision about a slide from the margin of its label and the distance to the slides of it."""
         if self.distance is None or (self.added and self.reason):
             return Assessment(Rejection.TOO_LITTLE_TRAINING, decided=False)
         limits = self.limits(effective_windows)

@@ -38,7 +38,7 @@ class DomainMargins:
 # Intervals of conditions and arcs of directions that slides cover.
 
 # Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
-ODD_SHARE = 0.01
+ODD_FRACTION = 0.01
 FULL_CIRCLE: Interval = (-math.pi, math.pi)
 
 
@@ -67,11 +67,11 @@ def joint_interval(trained: Interval | None, added: Interval | None) -> Interval
 
 def interval_of(means: Iterable[Iterable[float]]) -> Interval | None:
     """Return the range of the means of slides without the odd slides; None if no slide has a known one."""
-    known = [own for slide in means for own in [[mean for mean in slide if math.isfinite(mean)]] if own]
+    known = [values for slide in means for values in [[mean for mean in slide if math.isfinite(mean)]] if values]
     if not known:
         return None
-    low = np.quantile([min(own) for own in known], ODD_SHARE, method='lower')
-    high = np.quantile([max(own) for own in known], 1.0 - ODD_SHARE, method='higher')
+    low = np.quantile([min(values) for values in known], ODD_FRACTION, method='lower')
+    high = np.quantile([max(values) for values in known], 1.0 - ODD_FRACTION, method='higher')
     return float(low), float(high)
 
 
@@ -89,9 +89,13 @@ def is_beyond(value: float, interval: Interval | None, margin: float) -> bool:
 # Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
-OUTSIDE = 'outside what was trained'
+OUTSIDE = 'outside the training'
 ONE_PLACE = 'trained at one place of each surface: elsewhere it may be rejected'
-REACH = {'sessions': 'session', 'places': 'place', 'fingers': 'sensor'}  # and what tells them of a slide
+REACH = {
+    'sessions': 'session',
+    'places': 'place',
+    'fingers': 'sensor',
+}  # and functions that return them for a slide
 
 
 @dataclass(frozen=True)
@@ -143,8 +147,8 @@ class Domain:
 
     @property
     def reach_reason(self) -> str:
-        """Where slides may be rejected as the training knew nothing else, in one sentence; '' if it is not known."""
-        if not self.reach or any(own['places'] > 1 or own['sessions'] > 1 for own in self.reach.values()):
+        """Where slides may be rejected for lack of training, in one sentence; '' if unknown."""
+        if not self.reach or any(counts['places'] > 1 or counts['sessions'] > 1 for counts in self.reach.values()):
             return ''
         return ONE_PLACE
 
@@ -161,7 +165,7 @@ class Domain:
             speed_m_s=joint_interval(self.speed_m_s, new.speed_m_s),
             force_n=joint_interval(self.force_n, new.force_n),
             directions_rad=(*self.directions_rad, *new.directions_rad) if self.directions_rad else (),
-            levels={name: joint_interval(own, new.levels.get(name)) or own for name, own in self.levels.items()},
+            levels={name: joint_interval(level, new.levels.get(name)) or level for name, level in self.levels.items()},
             slides=dict(Counter(self.slides) + Counter(new.slides)),
         )
 
@@ -209,13 +213,13 @@ def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[I
 
 
 def _reach(slides: Sequence[SlideConditions], labels: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Return how many sessions, places and fingers each label has; slides with a session each tell of none."""
+    """Return how many sessions, places and fingers each label has; one session per slide counts as none."""
     found = {}
     for label in dict.fromkeys(labels):
-        own = [slide for slide, of in zip(slides, labels, strict=True) if of == label]
-        names = {kind: {getattr(slide, name) for slide in own} for kind, name in REACH.items()}
+        of_label = [slide for slide, of in zip(slides, labels, strict=True) if of == label]
+        names = {kind: {getattr(slide, name) for slide in of_label} for kind, name in REACH.items()}
         counts = {kind: len(each) for kind, each in names.items()}
-        found[label] = {**counts, 'sessions': counts['sessions'] if counts['sessions'] < len(own) else 1}
+        found[label] = {**counts, 'sessions': counts['sessions'] if counts['sessions'] < len(of_label) else 1}
     return found
 
 

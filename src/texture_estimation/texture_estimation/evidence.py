@@ -57,9 +57,9 @@ def single_decisions(model: TextureModel, values: Array) -> list[str]:
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
-    A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the label is
+    A new exploration id, or a vector after the `last` one, starts a new slide. Each estimate shows whether the label is
     rejected, and why; it is decided only while it is not. An exploration under conditions that were not trained is
-    rejected, and the message says which condition it is. Equally probable labels give no label: unclassified.
+    rejected, and the message states which condition it is. Equally probable labels give no label: unclassified.
     No confidence is above what the slides held out of the training can show.
     """
 
@@ -100,7 +100,7 @@ class EvidenceAccumulator:
         self._deviation = ''  # of these conditions from those of the training
 
     def _note_skipped(self, skipped: int) -> None:
-        """Say in the final estimate how much of the slide is missing from it."""
+        """State in the final estimate how much of the slide is missing from it."""
         if skipped and not self._message:
             self._message = (
                 f'{skipped} of {skipped + self._windows} windows were left out, as samples were lost or not finite'
@@ -153,7 +153,7 @@ class EvidenceAccumulator:
             )
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
-        # As long as the windows that the classifier trusts do not add up to one, their mean counts less.
+        # As long as the weights of the windows do not add up to one, their mean counts less.
         mean = self._evidence.mean
         if self._trusted_ns < self._window_ns:
             mean = mean * (self._trusted_ns / self._window_ns)
@@ -209,11 +209,11 @@ class EvidenceAccumulator:
         """Return the probabilities of all labels from those of the trained textures among themselves."""
         if self._moments is None or model.slide_gaussians is None:
             return trained
-        shares = model.slide_gaussians.shares(self._moments.mean, self._moments.variance, effective_windows)
-        return model.slide_gaussians.combined(trained, shares)
+        log_proba = model.slide_gaussians.log_proba(self._moments.mean, self._moments.variance, effective_windows)
+        return model.slide_gaussians.combined(trained, log_proba)
 
     def _explanation(self, acceptance: Acceptance, final: bool, rejection: Rejection) -> str:
-        """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
+        """Return the message of an estimate for its reader, in sentences; '' if there is none."""
         missing: tuple[str, ...] = ()
         if final and not self._deviation:
             too_little = rejection is Rejection.TOO_LITTLE_TRAINING

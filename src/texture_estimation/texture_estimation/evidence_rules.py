@@ -15,7 +15,7 @@ from texture_core.types import Array
 from texture_estimation.learners.learner import log_softmax
 
 # A label without a single vote keeps so much, so that its logarithm is finite.
-MIN_SHARE = 1e-6
+MIN_FRACTION = 1e-6
 ROUNDING = 1e-9
 # Effective windows from which a slide counts as late. The novelty of a slide rests on as many, and slides that drift
 # begin to look like other textures after them.
@@ -24,7 +24,7 @@ FULL_WINDOWS = 5.0
 
 @dataclass(frozen=True)
 class EvidenceRule:
-    """Frozen parameters of a rule, which counts each window alike unless it says otherwise.
+    """Frozen parameters of a rule, which weights all windows equally unless stated otherwise.
 
     Where several labels share the highest log-probability nothing is decided: the surface is unclassified.
     """
@@ -84,9 +84,9 @@ class SoftVote(EvidenceRule):
     def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
         """Return softmax(n^tempering_exponent · mean log p)."""
         scores = mean_evidence * effective_windows**tempering_exponent
-        shares: Array = np.exp(scores - np.maximum.reduce(scores, axis=-1, keepdims=True))
-        shares /= np.add.reduce(shares, axis=-1, keepdims=True)
-        return shares
+        fractions: Array = np.exp(scores - np.maximum.reduce(scores, axis=-1, keepdims=True))
+        fractions /= np.add.reduce(fractions, axis=-1, keepdims=True)
+        return fractions
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class MajorityVote(EvidenceRule):
         return (best & alone).astype(np.float64)
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
-        """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.
+        """Return the logarithm of the fractions of the votes; equal ones for all labels where the majority is lacking.
 
         What did not vote is shared out equally. `tempering_exponent` does not matter: votes are counted.
         """
@@ -142,8 +142,8 @@ class MajorityVote(EvidenceRule):
         most = np.maximum.reduce(mean_evidence, axis=-1, keepdims=True) * effective_windows
         won = most >= self.share * np.maximum(effective_windows, self.windows) - ROUNDING
         abstained = 1.0 - np.add.reduce(mean_evidence, axis=-1, keepdims=True)
-        shares = np.maximum(mean_evidence + abstained / n_labels, MIN_SHARE)
-        return log_softmax(np.where(won, np.log(shares), 0.0))
+        fractions = np.maximum(mean_evidence + abstained / n_labels, MIN_FRACTION)
+        return log_softmax(np.where(won, np.log(fractions), 0.0))
 
 
 class GroupedEvidence:
@@ -183,17 +183,17 @@ def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array,
 
 
 def followed(
-    rule: EvidenceRule, evidence: Array, hop_share: float, trusted: Array | float = 1.0
+    rule: EvidenceRule, evidence: Array, hop_ratio: float, trusted: Array | float = 1.0
 ) -> tuple[Array, Array]:
     """Return the mean evidence of a slide after each window, and the effective window count that it rests on."""
     counts = 1 + np.arange(len(evidence))
     if not rule.group:
-        effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_share
+        effective_windows: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * hop_ratio
         return running_means(rule, evidence, effective_windows, trusted), effective_windows
     first = np.maximum(counts // rule.group - 1, 0) * rule.group
     stop = np.where(counts < rule.group, counts, first + rule.group)
     means = np.stack([evidence[one:other].mean(axis=0) for one, other in zip(first, stop, strict=True)])
-    return means, 1.0 + (stop - first - 1.0) * hop_share
+    return means, 1.0 + (stop - first - 1.0) * hop_ratio
 
 
 EVIDENCE_RULES: Mapping[str, type[EvidenceRule]] = {

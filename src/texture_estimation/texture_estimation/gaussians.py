@@ -18,10 +18,10 @@ from texture_estimation.learners.learner import Codes, group_means, log_softmax,
 # Gaussian classes with one covariance, to which classes of a few samples can be added.
 
 # Chosen on slides 21-30 of recorded materials, five of twenty added to a model of slides 1-20 of the others.
-PRIOR_SAMPLES = 30.0  # the covariance is drawn to its diagonal as by so many further samples
+PRIOR_SAMPLES = 30.0  # the covariance is shrunk towards its diagonal as by this many further samples
 MIN_VARIANCE = 0.01  # within classes, in that of all samples: few samples may agree by chance
-MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides tell it
-CONSTANT = 1e-12  # deviation of a feature that is taken for constant, relative to its largest value
+MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides determine it
+CONSTANT = 1e-12  # largest deviation of a constant feature, relative to its largest value
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +89,9 @@ def _projected(samples: Array, projection: Array) -> Array:
 
 
 # --------------------
-# Gaussians of whole slides: what tells added textures from the trained ones and from each other.
+# Gaussians of whole slides: they distinguish added textures from the trained ones and from each other.
 
-# Lengths of the start of a slide that have Gaussians of their own, in windows that do not overlap: the start of a
+# Lengths of the start of a slide that have separate Gaussians, in windows that do not overlap: the start of a
 # slide is like no other part of it.
 LENGTHS = (1.0, 2.0, 3.0, 5.0, 9.0)
 WHOLE = 0.9  # of the typical length of the trained slides: from here on a slide is compared with whole ones
@@ -104,10 +104,10 @@ SPREAD_FLOOR = 0.01  # of the mean variance of the windows within a slide, added
 
 @dataclass(frozen=True, eq=False)
 class SlideGaussians:
-    """Share of each texture in a slide, by the mean and the deviation of its features so far.
+    """Probability of each texture in a slide, by the mean and the deviation of its features so far.
 
     The first classes are the trained textures. The further ones are the textures of the added slides, which may include
-    trained ones: slides that were added to a trained texture are a class of their own.
+    trained ones: slides that were added to a trained texture are a separate class.
     """
 
     windows: GaussianClasses
@@ -119,7 +119,7 @@ class SlideGaussians:
 
     @classmethod
     def fit(
-        cls, values: Array, codes: Codes, slides: Codes, hop_share: float, compared: Array | float = 1.0
+        cls, values: Array, codes: Codes, slides: Codes, hop_ratio: float, compared: Array | float = 1.0
     ) -> SlideGaussians:
         """Return the Gaussians of the trained textures."""
         values = compared * values
@@ -128,7 +128,7 @@ class SlideGaussians:
         parts = np.split(values[order], first[1:])
         classes = codes[order][first]
         counts = np.bincount(classes)
-        typical = 1.0 + (float(np.median([len(part) for part in parts])) - 1.0) * hop_share
+        typical = 1.0 + (float(np.median([len(part) for part in parts])) - 1.0) * hop_ratio
         whole = max(WHOLE * typical, LENGTHS[0])
         lengths = (*(length for length in LENGTHS if length < whole), whole)
         variance = SPREAD_FLOOR * np.mean([part.var(axis=0) for part in parts], axis=0)
@@ -144,16 +144,16 @@ class SlideGaussians:
             len(counts),
             np.empty(0, dtype=np.intp),
         )
-        described = [fitted._described(part, hop_share) for part in parts]
+        described = [fitted._described(part, hop_ratio) for part in parts]
         starts = [GaussianClasses.fit(np.stack(rows), classes, counts) for rows in zip(*described, strict=True)]
         return replace(fitted, starts=tuple(map(_of_length, starts, lengths)))
 
-    def with_added(self, slides: Sequence[Array], codes: Codes, hop_share: float = 1.0) -> SlideGaussians:
+    def with_added(self, slides: Sequence[Array], codes: Codes, hop_ratio: float = 1.0) -> SlideGaussians:
         """Return the Gaussians of the trained textures and of these added slides, in place of others added before."""
         added, groups = np.unique(codes, return_inverse=True)
         counts = np.bincount(groups)
         trained = self.trained
-        described = [self._described(values, hop_share) for values in slides]
+        described = [self._described(values, hop_ratio) for values in slides]
         means = [group_means(np.stack(rows), groups) for rows in zip(*described, strict=True)]
         starts = tuple(start.with_classes(mean, counts) for start, mean in zip(trained.starts, means, strict=True))
         single = group_means(np.stack([values.mean(axis=0) for values in slides]), groups)
@@ -168,33 +168,33 @@ class SlideGaussians:
         )
         return replace(self, windows=windows, starts=tuple(starts), added=self.added[:0])
 
-    def shares(self, mean: Array, variance: Array, effective_windows: float) -> Array:
+    def log_proba(self, mean: Array, variance: Array, effective_windows: float) -> Array:
         """Return the log-probability of each class for a slide so far."""
         place = max(bisect_right(self.lengths, effective_windows + 1e-9) - 1, 0)
         return self.starts[place].log_probabilities(self._descriptor(mean, variance, self.lengths[place]))
 
-    def window_shares(self, X: Array) -> Array:
+    def window_log_proba(self, X: Array) -> Array:
         """Return the log-probability of each class for windows alone."""
         return self.windows.log_probabilities(X)
 
-    def combined(self, trained: Array, shares: Array) -> Array:
-        """Return the probability of each label: the trained textures share what they have together as they were."""
-        own = np.exp(shares)
+    def combined(self, trained: Array, log_proba: Array) -> Array:
+        """Return the probability of each label: the trained textures keep the ratios of their probabilities."""
+        proba = np.exp(log_proba)
         n_labels = max(self.n_trained, int(self.added.max(initial=-1)) + 1)
-        probabilities = np.zeros((*own.shape[:-1], n_labels))
-        together = np.add.reduce(own[..., : self.n_trained], axis=-1, keepdims=True)
+        probabilities = np.zeros((*proba.shape[:-1], n_labels))
+        together = np.add.reduce(proba[..., : self.n_trained], axis=-1, keepdims=True)
         probabilities[..., : self.n_trained] = together * trained
-        probabilities[..., self.added] += own[..., self.n_trained :]
+        probabilities[..., self.added] += proba[..., self.n_trained :]
         return probabilities
 
     def check(self, mean: Array) -> None:
-        """Raise ValueError unless the shares of a slide with this mean, (n_features,), are numbers at every length."""
-        if not all(np.isfinite(self.shares(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
+        """Raise ValueError unless a slide with this mean, (n_features,), has finite probabilities at every length."""
+        if not all(np.isfinite(self.log_proba(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
             raise ValueError('its values are too large to be features')
 
-    def _described(self, values: Array, hop_share: float) -> list[Array]:
+    def _described(self, values: Array, hop_ratio: float) -> list[Array]:
         """Return the descriptor of the start of a slide of each length; the last one is of the whole slide."""
-        ends = [*(window_count(length, hop_share) for length in self.lengths[:-1]), len(values)]
+        ends = [*(window_count(length, hop_ratio) for length in self.lengths[:-1]), len(values)]
         parts = [values[:end] for end in ends]
         return [
             self._descriptor(part.mean(axis=0), part.var(axis=0), length)
@@ -238,7 +238,7 @@ class SlideMoments:
 # Distance of the mean features of a slide to the training slides of one class.
 
 # Chosen on slides 1-24 against 25-30 of recorded materials, five of twenty left out of the training.
-DISTANCE_WINDOWS = 5.0  # the distance rests on the first so many: later ones drift
+DISTANCE_WINDOWS = 5.0  # number of first windows that determine the distance: later ones drift
 NEAREST = 3  # slides to which the distance counts: one alone may be an odd one
 SHRINKAGE = 0.6  # of the covariances towards their diagonals: there are hardly more slides than features
 FLOOR = 0.18  # of the mean variance within classes, added to each
@@ -268,12 +268,12 @@ class ClassDistance:
 
         names, codes = np.unique(classes, return_inverse=True)
         scale = means.std(axis=0)
-        scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # what is constant tells nothing
+        scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # constant features carry no information
         scaled = means / scale
-        own = np.stack([scaled[codes == code].mean(axis=0) for code in range(len(names))])
-        centre = own.mean(axis=0)
-        apart, between_classes = scaled - own[codes], own - centre
-        within = shrunk_covariance(apart.T @ apart / max(len(means) - len(names), 1), SHRINKAGE)
+        class_means = np.stack([scaled[codes == code].mean(axis=0) for code in range(len(names))])
+        centre = class_means.mean(axis=0)
+        deviations, between_classes = scaled - class_means[codes], class_means - centre
+        within = shrunk_covariance(deviations.T @ deviations / max(len(means) - len(names), 1), SHRINKAGE)
         floor = FLOOR * max(float(np.diag(within).mean()), SMALLEST)
         between = shrunk_covariance(between_classes.T @ between_classes / max(len(names) - 1, 1), SHRINKAGE)
         spread, directions = eigh(between, within + floor * np.eye(len(within)))
@@ -288,12 +288,12 @@ class ClassDistance:
         )
 
     @cached_property
-    def _own(self) -> dict[int, tuple[Array, Array]]:
+    def _of_class(self) -> dict[int, tuple[Array, Array]]:
         """Slides of each class relative to the centre, (n_directions, n_own), and half their squares, (n_own,)."""
         found = {}
         for code in np.unique(self.classes).tolist():
-            own = self.references[self.classes == code] - self.centre
-            found[code] = (own.T, 0.5 * np.einsum('ij,ij->i', own, own))
+            points = self.references[self.classes == code] - self.centre
+            found[code] = (points.T, 0.5 * np.einsum('ij,ij->i', points, points))
         return found
 
     @cached_property
@@ -308,19 +308,19 @@ class ClassDistance:
 
     def score(self, mean: Array, code: int) -> Array:
         """Return the score, (...), of mean features (..., n_features) for a class; infinite without its slides."""
-        found = self._own.get(code)
+        found = self._of_class.get(code)
         if found is None:
             return np.full(mean.shape[:-1], np.inf)
-        own, half_squares = found
-        away = mean @ self._directions
-        away -= self.centre
+        points, half_squares = found
+        projected = mean @ self._directions
+        projected -= self.centre
         # Half the squared distances, less half the square of what is away from the centre.
-        halves = half_squares - away @ own
+        halves = half_squares - projected @ points
         if halves.shape[-1] > NEAREST:
             halves.partition(NEAREST - 1)
             halves = halves[..., :NEAREST]
         nearest: Array = np.add.reduce(halves, axis=-1) * (2.0 / halves.shape[-1])
-        nearest += (away * away) @ self._nearer
+        nearest += (projected * projected) @ self._nearer
         return nearest
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:
@@ -331,12 +331,12 @@ class ClassDistance:
         return ClassDistance(self.projection, references[order], every[order], self.centre, self.weights)
 
 
-def compared_start(values: Array, hop_share: float) -> Array:
+def compared_start(values: Array, hop_ratio: float) -> Array:
     """Return the mean of what is compared of a slide, (n_compared,) of (n_windows, n_compared): of its start."""
-    mean: Array = values[: window_count(DISTANCE_WINDOWS, hop_share)].mean(axis=0)
+    mean: Array = values[: window_count(DISTANCE_WINDOWS, hop_ratio)].mean(axis=0)
     return mean
 
 
-def window_count(effective_windows: float, hop_share: float) -> int:
-    """Return how many windows count as so many that do not overlap."""
-    return 1 + round((effective_windows - 1.0) / hop_share)
+def window_count(effective_windows: float, hop_ratio: float) -> int:
+    """Return how many windows are equivalent to this many that do not overlap."""
+    return 1 + round((effective_windows - 1.0) / hop_ratio)

@@ -113,7 +113,7 @@ class IncrementalClassifier:
             )
         if others:
             raise ChangeRefused(
-                f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
+                f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot also be '{label}': "
                 'undo that first, or explore again',
                 ChangeError.ALREADY_ADDED,
             )
@@ -171,7 +171,7 @@ class IncrementalClassifier:
         raise unknown_name(label, added, 'added texture')
 
 
-DIRECTIONS = 40  # of largest variance over slides, in which covariances can be told from some hundred slides
+DIRECTIONS = 40  # of largest variance over slides, in which covariances can be estimated from some hundred slides
 SHRINKAGE = 0.1  # of the covariances, towards their diagonal and towards a round one
 DAY_SUFFIX = '-today'
 
@@ -180,7 +180,7 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     """Return the model as a discriminant whose classes are where slides of today and of the training place them.
 
     A class of a session is Gaussian about its mean over sessions, and slides are Gaussian about the class of their
-    session (two covariances); the slides of today say where the classes are today, and each counts as much as it is
+    session (two covariances); the slides of today show where the classes are today, and each counts as much as it is
     certain. A surface without a slide of today moves by the mean of those that have some. The answer is a label alone:
     nothing shows which slides of today would be unknown, so none is accepted.
 
@@ -192,18 +192,18 @@ def adapted(model: TextureModel, training: LabelledFeatures, today: LabelledFeat
     if strange := sorted(set(shot_labels) - set(names)):
         raise InvalidData(f"'{strange[0]}' is not a trained surface; label the slides of today with {', '.join(names)}")
     centre, scale = means.mean(axis=0), means.std(axis=0)
-    scale[scale <= 1e-9 * (1.0 + np.abs(centre))] = np.inf  # a constant feature tells nothing
+    scale[scale <= 1e-9 * (1.0 + np.abs(centre))] = np.inf  # a constant feature carries no information
     standard = (means - centre) / scale
     axes = np.linalg.svd(standard, full_matrices=False)[2][:DIRECTIONS].T
     points, seen = standard @ axes, ((shots - centre) / scale) @ axes
     within, between, classes = _covariances(points, labels, sessions, names)
     moved, uncertain = np.full_like(classes, np.nan), np.zeros_like(within)
     for number, name in enumerate(names):
-        own = seen[shot_labels == name]
-        if len(own):
-            gain = between @ np.linalg.inv(between + within / len(own))
-            moved[number] = classes[number] + gain @ (own.mean(axis=0) - classes[number])
-            uncertain += (between - gain @ between) * len(own) / len(seen)
+        shots_of_class = seen[shot_labels == name]
+        if len(shots_of_class):
+            gain = between @ np.linalg.inv(between + within / len(shots_of_class))
+            moved[number] = classes[number] + gain @ (shots_of_class.mean(axis=0) - classes[number])
+            uncertain += (between - gain @ between) * len(shots_of_class) / len(seen)
     shift = np.nanmean(moved - classes, axis=0)
     moved = np.where(np.isnan(moved), classes + shift, moved)
     weights = np.linalg.solve(within + uncertain, moved.T)
@@ -237,10 +237,10 @@ def _covariances(
     """Return the covariances within a session and between sessions of a label, and the mean of each label."""
     classes, inside, across, groups = [], [], [], 0
     for name in names:
-        own = labels == name
+        of_class = labels == name
         centres = []
-        for session in np.unique(sessions[own]):
-            group = points[own & (sessions == session)]
+        for session in np.unique(sessions[of_class]):
+            group = points[of_class & (sessions == session)]
             centres.append(group.mean(axis=0))
             inside.append(group - centres[-1])
             groups += 1

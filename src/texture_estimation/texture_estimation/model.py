@@ -59,7 +59,7 @@ def part_of(kind: Any, value: Any, where: str) -> Any:
         return None if value is None else part_of(given[0], value, where)
     elif origin is tuple and isinstance(value, list) and (given[-1] is ... or len(given) == len(value)):
         kinds = given[:1] * len(value) if given[-1] is ... else given
-        found = tuple(part_of(own, item, where) for own, item in zip(kinds, value, strict=True))
+        found = tuple(part_of(part_kind, item, where) for part_kind, item in zip(kinds, value, strict=True))
     elif origin is Mapping and isinstance(value, Mapping):
         found = {name: part_of(given[1], item, f'{where}, {name}') for name, item in value.items()}
     elif origin is np.ndarray and isinstance(value, np.ndarray) and value.dtype == get_args(given[1])[0]:
@@ -80,7 +80,7 @@ def _dataclass_of(kind: Any, value: Any, where: str) -> Any:
     different = set(types) ^ set(value)
     if different:
         raise InvalidData(f'{where} has the entries {", ".join(value)}; {", ".join(types)} are needed')
-    return kind(**{name: part_of(own, value[name], f'{where}, {name}') for name, own in types.items()})
+    return kind(**{name: part_of(part_kind, value[name], f'{where}, {name}') for name, part_kind in types.items()})
 
 
 # --------------------
@@ -100,7 +100,7 @@ BROKEN = (
 
 @contextmanager
 def usable(target: Path) -> Iterator[None]:
-    """Say in one sentence, within a `with` block, that what it makes of the files of a model cannot be used."""
+    """Report, within a `with` block, that the files of a model cannot be used."""
     try:
         yield
     except MissingLibrary:
@@ -127,7 +127,7 @@ def both_files(path: str | Path) -> tuple[Path, Path]:
 def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
     """Write NAME.npz and NAME.json, and return NAME.npz.
 
-    A reader never sees half a file: both are written beside their places and then moved.
+    A reader never sees half a file: both are written to temporary files and then moved.
     """
     arrays_path, card_path = both_files(path)
     card_path.parent.mkdir(parents=True, exist_ok=True)
@@ -141,7 +141,7 @@ def write_tree(path: str | Path, tree: Mapping[str, Any]) -> Path:
         text = json.dumps(card, indent=1) + '\n'
     except TypeError as error:
         raise InvalidData(
-            f'this model cannot be saved: {error}; what a learner of your own trains must be arrays and plain values'
+            f'this model cannot be saved: {error}; what a custom learner trains must be arrays and plain values'
         ) from error
     replace_file(arrays_path, content)
     replace_file(card_path, text.encode())
@@ -218,7 +218,7 @@ class StoredModel:
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
         """Write NAME.npz and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.npz.
 
-        Slides added to a model are not written: they lie beside the model to which they were added.
+        Slides added to a model are not written: they are stored next to the model to which they were added.
         """
         return write_tree(path, {**self.tree, **(facts or {})})
 
@@ -247,12 +247,12 @@ def _numbers(array: AnyArray, name: str) -> AnyArray:
 
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file whole or not at all."""
-    beside = path.with_name(f'.{path.name}.{os.getpid()}')
+    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
-        beside.write_bytes(content)
-        beside.replace(path)
+        temporary.write_bytes(content)
+        temporary.replace(path)
     finally:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
@@ -272,7 +272,7 @@ def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
 
 
 # --------------------
-# Slides added to a model after its training, stored in the folder NAME.added beside it.
+# Slides added to a model after its training, stored in the folder NAME.added next to it.
 
 ADDED_SLIDES_MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
 
@@ -289,8 +289,8 @@ class AddedSlide:
 
 def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
     """Write an added slide of a model by its number, from 1, atomically."""
-    told = {**tree_of(added_slide), 'values': added_slide.values.tolist()}
-    content = {'format': FORMAT, 'feature_set': feature_set, **told}
+    content_of_slide = {**tree_of(added_slide), 'values': added_slide.values.tolist()}
+    content = {'format': FORMAT, 'feature_set': feature_set, **content_of_slide}
     path = _folder(model) / f'{number:05d}.json'
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, (json.dumps(content) + '\n').encode())
@@ -364,13 +364,13 @@ class TrainingExamples:
 
     @classmethod
     def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
-        """Return what contributes keeping: of each label at most so many that more would hardly help."""
-        own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
-        kept = np.concatenate([rows[spread(len(rows))] for rows in own])
+        """Return what contributes keeping: of each label at most as many as are useful."""
+        of_label = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
+        kept = np.concatenate([rows[spread(len(rows))] for rows in of_label])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
     def check(self, n_features: int, n_labels: int) -> None:
-        """Raise ValueError unless they are examples of so many features and labels."""
+        """Raise ValueError unless they are examples of this many features and labels."""
         n = len(self.codes)
         if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
             raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
@@ -379,7 +379,7 @@ class TrainingExamples:
 
 
 def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
-    """Return at most so many of the numbers 0 to count - 1, evenly spread."""
+    """Return at most `most` of the numbers 0 to count - 1, evenly spread."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))
 
 
@@ -408,7 +408,7 @@ class TextureModel(StoredModel):
     added_slides
         Slides added after the training.
     slide_gaussians
-        Gaussians of whole slides that tell added textures; None until a slide is added.
+        Gaussians of whole slides that distinguish added textures; None until a slide is added.
 
     Examples
     --------
@@ -447,12 +447,12 @@ class TextureModel(StoredModel):
 
     @property
     def learns_online(self) -> bool:
-        """Whether added slides update the learner itself; otherwise Gaussians of whole slides tell them."""
+        """Whether added slides update the learner itself; otherwise Gaussians of whole slides distinguish them."""
         return hasattr(self.recipe.learner, 'partial_fit')
 
     @property
     def n_predicted(self) -> int:
-        """Number of textures that the predictor tells."""
+        """Number of textures that the predictor distinguishes."""
         return len(self.labels) if self.learns_online else self.n_trained
 
     @cached_property
@@ -521,7 +521,7 @@ class TextureModel(StoredModel):
         trained = log_softmax(self.predictor(X))
         if self.slide_gaussians is None or not self.added_slides:
             return trained
-        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_shares(X))
+        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_log_proba(X))
         return np.log(np.maximum(combined, LEAST_PROBABILITY))
 
     def decide(self, X: Array) -> list[str]:
@@ -577,8 +577,8 @@ class TextureModel(StoredModel):
             raise ModelMismatch(f"model '{self.name}' holds no training examples, so none can be added; train it again")
         known, windows = self.examples, self.recipe.training_windows
         kept = len(known.codes) / max(int(self.training.get('windows', 0)), len(known.codes))
-        hop_share = min(windows.hop_s / windows.length_s / kept, 1.0)
-        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_share, self._compared)
+        hop_ratio = min(windows.hop_s / windows.length_s / kept, 1.0)
+        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, hop_ratio, self._compared)
 
     def validate(self) -> None:
         """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.

@@ -20,8 +20,8 @@ from texture_features.feature_set import fingerprint_difference
 
 SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
 SAME_NATS = 1e-9  # informations that differ by less are the same
-LEAST = 2  # slides of one kind over one texture that tell how much slides differ; kinds among which to choose
-PARTS = 5  # that are held out in turn, to learn how sure a slide makes
+LEAST = 2  # slides of one kind over one texture that show how much slides differ; kinds among which to choose
+PARTS = 5  # that are held out in turn, to calibrate the confidence
 MIN_TEMPER = 1e-3
 
 
@@ -33,7 +33,7 @@ class NextTouch(NamedTuple):
 
 
 def log_likelihoods(places: Array, means: Array) -> Array:
-    """Return those of slides under one motion by texture, (..., n_textures), less what all textures share."""
+    """Return those of slides under one motion by texture, (..., n_textures), less the mean over all textures."""
     off = places[..., None, :] - means
     return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
 
@@ -41,7 +41,7 @@ def log_likelihoods(places: Array, means: Array) -> Array:
 def least_information(means: Array, log_prior: Array) -> float:
     """Return a lower bound of the information about the texture that one slide gives, in nats.
 
-    From the distances between textures alone: nothing for equal ones, the entropy of the prior for ones far apart.
+    From the distances between textures alone: nothing for equal ones, the entropy of the prior for distant ones.
 
     Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the Bhattacharyya
     distance, which of all Chernoff distances bounds best where the covariance is shared.
@@ -89,7 +89,7 @@ class NextTouchModel:
             if not over.all():
                 raise InvalidData(f'{motion} has no slide over {", ".join(names[~over])}; slide over every texture')
         if counts.max() < LEAST:
-            raise InvalidData('one slide of a kind over each texture does not tell how much slides differ; add some')
+            raise InvalidData('one slide of a kind over each texture does not show how much slides differ; add some')
         (projection, means), sure = _fit(values, cells, len(names)), math.sqrt(_temper(values, cells, len(names)))
         return cls(tuple(names.tolist()), sure * projection, tuple(made), sure * means)
 
@@ -169,14 +169,14 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
 
     Return the axes, (n_features, n_axes), and on them the mean of each texture, (n_motions, n_textures, n_axes).
 
-    Slides share their covariance, whatever the texture and the motion. Means of few slides lie apart by chance: along
+    Slides share their covariance, whatever the texture and the motion. Means of few slides differ by chance: along
     each axis they are drawn to the middle of their motion as far as their spread is not more than chance, and what
     stays uncertain about them is added to what differs between slides.
 
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with a covariance shrunk as Ledoit and Wolf do.
     """
     from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
-    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who classifies does not need it
+    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and is not needed to classify
 
     counts = np.bincount(cells)
     means = group_means(values, cells)
@@ -185,17 +185,17 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> tuple[Array, Array]
     # The shrinkage takes the number of slides for that of free deviations; means have used up some of them.
     covariance = ledoit_wolf(off / scale, assume_centered=True)[0] * len(values) / freedom
     by_motion = means.reshape(-1, n_textures, values.shape[1])
-    apart = (by_motion - by_motion.mean(axis=1, keepdims=True)).reshape(means.shape) / scale
-    between = apart.T @ apart / (len(by_motion) * max(n_textures - 1, 1))
+    deviations = (by_motion - by_motion.mean(axis=1, keepdims=True)).reshape(means.shape) / scale
+    between = deviations.T @ deviations / (len(by_motion) * max(n_textures - 1, 1))
     spread, axes = eigh(between, covariance + np.diag(1.0 * (np.diag(covariance) <= 0.0)))
     chance = float((1.0 / counts).mean())
     spread -= chance
     axes, spread = axes[:, spread > 0.0], spread[spread > 0.0]
     drawn = spread / (spread + chance)
     projection = axes / scale[:, None] / np.sqrt(1.0 + chance * drawn)
-    own = by_motion @ projection
-    middle = own.mean(axis=1, keepdims=True)
-    return projection, middle + drawn * (own - middle)
+    projected = by_motion @ projection
+    middle = projected.mean(axis=1, keepdims=True)
+    return projection, middle + drawn * (projected - middle)
 
 
 def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
@@ -209,11 +209,11 @@ def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     parts = np.where(counts[numbers] >= LEAST, (ranks + numbers) % PARTS, -1)
     found = []
     for part in range(PARTS):
-        own = parts == part
-        if own.any() and np.count_nonzero(~own) > len(counts):
-            projection, means = _fit(values[~own], cells[~own], n_textures)
-            likelihoods = log_likelihoods(values[own] @ projection, means[cells[own] // n_textures])
-            found.append((likelihoods, cells[own] % n_textures))
+        held_out = parts == part
+        if held_out.any() and np.count_nonzero(~held_out) > len(counts):
+            projection, means = _fit(values[~held_out], cells[~held_out], n_textures)
+            likelihoods = log_likelihoods(values[held_out] @ projection, means[cells[held_out] // n_textures])
+            found.append((likelihoods, cells[held_out] % n_textures))
     if not found:
         return 1.0
     untempered, truth = (np.concatenate(each) for each in zip(*found, strict=True))

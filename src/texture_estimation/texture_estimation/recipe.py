@@ -90,7 +90,7 @@ class DecisionParams(TrainingParams):
     )
     held_out_places: int = param(
         1,
-        'Into how many parts of the track slides are cut that were all made over one track: what is fitted to '
+        'Number of parts of the track into which slides over one track are cut: what is fitted to '
         'held-out slides is fitted to held-out parts of the track, as places that the training does not have; 1: none.',
         low=1,
         high=20,
@@ -114,14 +114,14 @@ class DecisionParams(TrainingParams):
     speed_margin: float = param(
         0.15,
         'How far the speed of an exploration may lie outside the speeds of the training, relative to them; '
-        'beyond, the estimate says that it is outside what was trained.',
+        'beyond, the estimate is rejected as outside the training.',
         low=0.0,
         high=100.0,
     )
     force_margin: float = param(
         0.3,
         'How far the force of an exploration may lie outside the forces of the training, relative to them; '
-        'beyond, the estimate says that it is outside what was trained.',
+        'beyond, the estimate is rejected as outside the training.',
         low=0.0,
         high=100.0,
     )
@@ -142,7 +142,7 @@ class DecisionParams(TrainingParams):
 
     @property
     def rates(self) -> Rates:
-        """How often what may go wrong when a slide is judged."""
+        """Allowed error rates of the decisions about a slide."""
         return Rates(self.max_accepted_wrong, self.false_rejection_rate, self.max_error_rate, self.coverage)
 
     @property
@@ -221,7 +221,7 @@ class Recipe:
 
 
 def _training(section: Any, where: str) -> tuple[DecisionParams, Augmentation]:
-    """Return the parameters of the section `training`, and those of its own section for augmentation."""
+    """Return the parameters of the section `training`, and those of the section for augmentation."""
     augmentation: Any = {}
     if isinstance(section, Mapping):
         augmentation = section.get(AUGMENTATION) or {}
@@ -233,12 +233,12 @@ def _training(section: Any, where: str) -> tuple[DecisionParams, Augmentation]:
 
 
 def load_recipe(name_or_path: str) -> Recipe:
-    """Read a shipped recipe by name, or any by path; a model's card holds one too.
+    """Read a shipped recipe by name, or any by path; a model's card also holds one.
 
     Raises
     ------
     UnknownName, InvalidParameter
-        With one sentence that says what is wrong and what is allowed.
+        With one sentence that states what is wrong and what is allowed.
     """
     name, content = read_recipe(name_or_path)
     return Recipe.from_mapping(content, name)

@@ -32,7 +32,7 @@ from texture_features.windows import WindowParams
 # --------------------
 # Whether a window can be graded at all, and if not, why.
 
-# Features that tell whether a window can be used; a regressor does not see them.
+# Features that show whether a window can be used; a regressor does not see them.
 STICK_SLIP, LEVEL = 'peak_to_median_power', 'log_variance'
 
 
@@ -69,7 +69,7 @@ SMOOTH, ROUGH = 1.0, 5.0
 
 
 # From features (..., n_features) to grade and its standard deviation, (...) each, as plain arrays: NaN as the grade
-# where the regressor has no answer, 0 as the deviation if it does not know it.
+# where the regressor has no answer, 0 as the deviation if it is unknown.
 RegressorPredictor = Callable[[Array], tuple[Array, Array]]
 
 
@@ -102,7 +102,7 @@ class GaussianProcess:
     """A straight line of standardised features, plus noise for each texture.
 
     The windows of a texture share its grade and its noise: they are one point, their mean. So three thousand windows of
-    fifteen textures are fifteen opinions, not three thousand, and the standard deviation says so. The hyperparameters
+    fifteen textures are fifteen opinions, not three thousand, and the standard deviation shows it. The hyperparameters
     maximise the marginal likelihood times a wide prior. The line passes through the middle of the scale, 3, at the mean
     of the training textures, so these should span the scale.
 
@@ -134,7 +134,7 @@ class GaussianProcess:
         points = np.stack([X[groups == code].mean(axis=0) for code in codes])
         targets = np.array([y[groups == code].mean() for code in codes]) - MIDDLE
         mean, scale = standardisation(points)
-        # One unit is the distance of two typical textures, however many features tell of it.
+        # One unit is the distance of two typical textures, whatever the number of features.
         scale = scale * np.sqrt(points.shape[1])
         places = (points - mean) / scale
         products = places @ places.T
@@ -186,7 +186,7 @@ TRAIN, TEST = 'train', 'test'
 class Grades:
     """The grade of each texture, and for which each is meant.
 
-    A grade is an opinion; the physical roughness of a surface stands elsewhere.
+    A grade is subjective; the physical roughness of a surface is another quantity.
     """
 
     grades: Mapping[str, float]
@@ -319,7 +319,7 @@ class RoughnessRecipe:
 
 
 def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
-    """Read a recipe that the package ships in config/roughness, or any by path; a model's card holds one too."""
+    """Read a recipe that the package ships in config/roughness, or any by path; a model's card also holds one."""
     name, content = read_recipe(name_or_path, 'config/roughness', 'roughness recipe')
     return RoughnessRecipe.from_mapping(content, name)
 
@@ -327,7 +327,7 @@ def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
 # --------------------
 # A trained roughness model.
 
-NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
+NORMAL_90 = 1.6449  # standard deviations around the mean within which 90 % of normal values lie
 
 
 @dataclass(frozen=True)
@@ -371,7 +371,7 @@ class RoughnessModel(StoredModel):
 
     def refusal(self, vector: FeatureVector) -> str:
         """Return why a window cannot be graded; '' if it can."""
-        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and says nothing
+        if vector.force_n < MIN_FORCE_N:  # an unknown force is NaN and is ignored
             return f'no contact: the force is {vector.force_n:.2f} N'
         finite = np.isfinite(vector.values)
         if not finite.all():
@@ -385,7 +385,7 @@ class RoughnessModel(StoredModel):
         return ''
 
     def grade(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features)."""
+        """Return grade and standard deviation of the regressor, (...) each, of (..., n_features)."""
         return self.predictor(X.take(self._graded, axis=-1))
 
     @property
@@ -419,13 +419,13 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
 
 
 # --------------------
-# The grade of a surface, and how sure it is, growing window by window while the finger slides.
+# The grade of a surface and its uncertainty, updated window by window while the finger slides.
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
 SILENT = 'no grade: the surface resembles no training surface'
-# The scatter of the windows of a texture, known from the training, counts as so many windows.
+# The scatter of the windows of a texture, known from the training, counts as this many windows.
 PRIOR_WINDOWS = 4.0
-# A grade is final once more sliding would narrow its 90 % interval by less, after so many graded windows.
+# A grade is final once more sliding would narrow its 90 % interval by less, after this many graded windows.
 MIN_NARROWING_GRADES, MIN_WINDOWS = 0.1, 3
 
 
@@ -538,7 +538,7 @@ SCALES = (0.05, 20.0)
 
 
 def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Grades, name: str = '') -> RoughnessModel:
-    """Return a model that grades as the people did who graded the textures of the examples.
+    """Return a model that predicts the grades by people of the textures of the examples.
 
     The standard deviation is calibrated on textures held out in turn, of the training alone.
     """
@@ -589,7 +589,7 @@ def hold_out(
 
 
 def calibrate(grades: Array, stds: Array, true: Array, textures: Codes) -> tuple[Calibration, dict[str, Any]]:
-    """Return the calibration, and facts for the card, from what was said of textures held out, (n,) each.
+    """Return the calibration, and facts for the card, from the estimates of held-out textures, (n,) each.
 
     The scale makes the mean square of error over standard deviation, each texture counting alike, what it is for a
     Student distribution with as many degrees of freedom as there are textures, whose 90 % interval ours then is.

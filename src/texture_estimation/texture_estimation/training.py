@@ -55,10 +55,10 @@ def fit_learner(
     Slides of one of these parts, (n_slides,), are held out together; slides are held out by themselves without parts.
 
     Where a label has a single slide, its windows are held out one by one and must not be there twice: then every window
-    counts once, and nothing is drawn besides.
+    counts once, and nothing else is drawn.
     """
     of_load = np.array([name.endswith(LOAD) for name in examples.names])
-    if of_load.any():  # what is constant tells nothing, and weighs nothing
+    if of_load.any():  # constant features carry no information and get no weight
         examples = replace(examples, values=np.where(of_load, 0.0, examples.values))
     if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_CALIBRATION_SLIDES:
         return recipe.learner.fit(examples.values, codes, groups)
@@ -81,9 +81,9 @@ def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows:
     if examples.resized is None:
         return taken
     names, first = np.unique(examples.groups, return_index=True)
-    own = np.isin(examples.resized.groups, names)
-    slides = np.searchsorted(names, examples.resized.groups[own])
-    further = examples.resized.values[own], codes[first][slides], slides
+    members = np.isin(examples.resized.groups, names)
+    slides = np.searchsorted(names, examples.resized.groups[members])
+    further = examples.resized.values[members], codes[first][slides], slides
     return (
         np.concatenate([taken[0], further[0]]),
         np.concatenate([taken[1], further[1]]),
@@ -107,19 +107,19 @@ def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
 def _augmented_examples(
     recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
 ) -> AugmentedExamples | None:
-    """Return what the learner draws besides the examples; None without augmentation or without copies of the slides."""
+    """Return what the learner draws in addition to the examples; None without augmentation or copies of the slides."""
     if examples.augmented is None or not recipe.augmentation.copies:
         return None
     copies = examples.augmented.copies
     names, first = np.unique(examples.groups, return_index=True)
-    own = np.isin(copies.groups, names)
-    copied = np.searchsorted(names, copies.groups[own])
-    runs = copied * (int(copies.copies.max(initial=0)) + 1) + copies.copies[own]
+    members = np.isin(copies.groups, names)
+    copied = np.searchsorted(names, copies.groups[members])
+    runs = copied * (int(copies.copies.max(initial=0)) + 1) + copies.copies[members]
     means = group_means(examples.values, groups)
     classes = codes[first]
     centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
     return AugmentedExamples(
-        values=copies.values if own.all() else copies.values[own],  # a copy of all takes as much memory again
+        values=copies.values if members.all() else copies.values[members],  # a copy of all takes as much memory again
         codes=classes[copied],
         groups=copied,
         rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
@@ -133,26 +133,26 @@ def _augmented_examples(
 def held_out_parts(examples: LabelledFeatures, *, by_speed: bool = False) -> Codes | None:
     """Return the part in which each slide is held out, (n_slides,), by session, place and finger; None to go by slides.
 
-    `by_speed` slides at other speeds are in other parts, too.
+    `by_speed` also slides at other speeds are in other parts.
 
-    Slides of one session share what is of that day: with one of them in the training, another tells nothing of the next
+    Slides of one session share the conditions of that day: with one of them in training, another is no test of the next
     day. A label with one session is held out slide by slide, as if its slides were sessions.
     """
     slides, rows = np.unique(examples.groups, return_index=True)
     made = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
-    alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide tells of no session
+    alone = len({(one.session, one.place) for one in made}) == len(made)  # a bag for each slide defines no session
     speeds = [f'{one.speed_m_s:.2g}' if by_speed else '' for one in made]
     sessions = np.array(
         [f'{"" if alone else one.session}\n{one.place}\n{one.sensor}\n{v}' for one, v in zip(made, speeds, strict=True)]
     )
     labels = examples.labels[rows]
-    own = [np.flatnonzero(labels == label) for label in np.unique(labels)]
+    of_labels = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     order = _ranks(sessions, rows)
     count = min(FOLDS, int(order.max()) + 1)
-    if max(len(set(sessions[of])) for of in own) < 2 or min(map(len, own)) < 2:
+    if max(len(set(sessions[of])) for of in of_labels) < 2 or min(map(len, of_labels)) < 2:
         return None
     parts: Codes = order * count // (order.max() + 1)
-    for of in own:
+    for of in of_labels:
         if len(set(parts[of].tolist())) < 2:
             rank = _ranks(sessions[of] if len(set(sessions[of])) > 1 else slides[of], rows[of])
             parts[of] = rank * count // (rank.max() + 1)
@@ -163,7 +163,7 @@ GAP = 0.2  # of a part of the track, left out before the next one: neighbours ar
 
 
 def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
-    """Return slides over one track cut into so many parts of it, each a slide at a place of its own.
+    """Return slides over one track cut into this many parts of it, each a slide at a separate place.
 
     Windows that lie in two parts are left out, and more, so that a gap lies between the parts. Where the slides are of
     several places, sessions or fingers already, and where a slide has too few windows, they stay as they are.
@@ -180,10 +180,10 @@ def in_places(examples: LabelledFeatures, count: int) -> LabelledFeatures:
         parts = np.arange(len(rows)) * count // len(rows)
         for number in range(count):
             name = f'{slide} part {number + 1}/{count}'
-            own = rows[parts == number]
-            groups[own] = name
-            gap = max(spanned, round(GAP * len(own)))
-            kept[own[len(own) - gap :] if number < count - 1 else []] = False
+            members = rows[parts == number]
+            groups[members] = name
+            gap = max(spanned, round(GAP * len(members)))
+            kept[members[len(members) - gap :] if number < count - 1 else []] = False
             made = examples.conditions.get(slide, SlideConditions())
             conditions[name] = replace(made, place=f'{number + 1}/{count}')
     return replace(examples, groups=groups.astype(np.str_), conditions=conditions).take(kept)
@@ -196,7 +196,7 @@ def _ranks(names: Any, rows: Codes) -> Codes:
     return np.argsort(np.argsort(first))[numbers]
 
 
-# What learners may declare as their `extras`: keyword arguments of `fit` besides the examples.
+# What learners may declare as their `extras`: keyword arguments of `fit` in addition to the examples.
 EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = {
     'augmented': _augmented_examples,
 }
@@ -206,14 +206,14 @@ EXTRAS: Mapping[str, Callable[[Recipe, LabelledFeatures, Codes, Codes], Any]] = 
 # Follow slides and disturbed copies window by window, as models do that have not seen them.
 
 FOLDS = 5
-# Of the copies of each slide, so many are among the slides to which the distance is measured, at random gains, if they
+# Of the copies of each slide, this many lie among those to which the distance is measured, at random gains, if they
 # have no noise: what is tolerated as noise would let strong noise pass. Chosen on slides 21-30, trained on 1-20.
 REFERENCE_COPIES = 6
 
 
 @dataclass(frozen=True, eq=False)
 class _Slide:
-    """A slide or a copy of one, whose windows are rows of examples; in double precision only when asked for."""
+    """A slide or a copy of one, whose windows are rows of examples; in double precision only on request."""
 
     group: int
     truth: int
@@ -235,7 +235,7 @@ class Followed:
 
     def __init__(self, recipe: Recipe, examples: LabelledFeatures) -> None:
         self._recipe = recipe
-        self._hop_share = min(examples.hop_s / examples.window_s, 1.0)
+        self._hop_ratio = min(examples.hop_s / examples.window_s, 1.0)
         self._classes = np.unique(examples.labels, return_inverse=True)[1]
         names, first, self._groups = np.unique(examples.groups, return_index=True, return_inverse=True)
         truths = self._classes[first]
@@ -263,19 +263,19 @@ class Followed:
                 else:
                     continue
                 evidence = rule.window_evidence(log_softmax(scores) * scale)
-                counts: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * self._hop_share
-                means, _ = followed(rule, evidence, self._hop_share, trusted)
+                counts: Array = 1.0 + np.arange(len(evidence), dtype=np.float64) * self._hop_ratio
+                means, _ = followed(rule, evidence, self._hop_ratio, trusted)
                 yield HeldOutSlide.follow(
                     slide.truth, means, counts, self._values(values, predictor), distance, disturbance=slide.disturbance
                 )
 
     def distance(self, predictor: Predictor | None, held_out: Collection[int] = ()) -> ClassDistance:
-        """Return the distance to slides that are not held out: their metric, and among the references copies, too."""
+        """Return the distance to slides that are not held out: their metric, with copies among the references."""
         means, codes = [], []
         for those in (self._slides, self._copies):
             kept = [slide for slide in those if slide.group not in held_out]
             codes.append(np.array([slide.truth for slide in kept], dtype=np.intp))
-            means.append([compared_start(self._values(one.values, predictor), self._hop_share) for one in kept])
+            means.append([compared_start(self._values(one.values, predictor), self._hop_ratio) for one in kept])
         found = ClassDistance.fit(np.stack(means[0]), codes[0])
         return found.with_slides(np.stack(means[1]), codes[1]) if means[1] else found
 
@@ -322,7 +322,7 @@ DEFAULT_TEMPERING_EXPONENT = 0.5
 
 
 def fit_tempering_exponent(
-    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_share: float, *, temperature: float
+    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, hop_ratio: float, *, temperature: float
 ) -> float:
     """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
     if fitted.held_out is None:
@@ -332,7 +332,7 @@ def fit_tempering_exponent(
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
         means, counts = followed(
-            rule, evidence[rows], hop_share, 1.0 if fitted.trusted is None else fitted.trusted[rows]
+            rule, evidence[rows], hop_ratio, 1.0 if fitted.trusted is None else fitted.trusted[rows]
         )
         slides.append((means, counts, codes[rows]))
     means, counts, truth = (np.concatenate(parts) for parts in zip(*slides, strict=True))
@@ -348,7 +348,7 @@ def fit_tempering_exponent(
 
 
 def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> TextureModel:
-    """Return a model that knows the labels of the examples.
+    """Return a model of the labels of the examples.
 
     Probabilities, how fast evidence grows within a slide, when a slide may end and which textures are candidates are
     trained on slides held out of the training in turn. With a single slide of a label, windows of that slide are held
@@ -377,12 +377,12 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     _check(examples)
     labels, codes = np.unique(examples.labels, return_inverse=True)
     groups = np.unique(examples.groups, return_inverse=True)[1]
-    hop_share = min(examples.hop_s / examples.window_s, 1.0)
+    hop_ratio = min(examples.hop_s / examples.window_s, 1.0)
     # Fit to all slides, and without some of them in turn.
     bound = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
     fitted = fit_learner(bound, examples, codes, groups)
     tempering_exponent = fit_tempering_exponent(
-        fitted, codes, groups, recipe.evidence, hop_share, temperature=fitted.temperature
+        fitted, codes, groups, recipe.evidence, hop_ratio, temperature=fitted.temperature
     )
     held_out = 0 if fitted.held_out is None else len(np.unique(groups))
     calibrated, truth = fitted, codes
@@ -391,7 +391,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         slides = Followed(bound, examples)
         near = [*slides.held_out(fitted, fitted.temperature, None)]
         far: list[HeldOutSlide] = []
-        # Where slides are of several places, sessions or fingers, fit without each of these in turn, too.
+        # Where slides are of several places, sessions or fingers, also fit without each of these in turn.
         placed = in_places(examples, recipe.training.held_out_places)
         parts = held_out_parts(placed, by_speed=bool(recipe.training.slowest_m_s))
         if parts is not None:
@@ -400,7 +400,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             calibrated, truth = without, kinds
             far = [*Followed(bound, placed).held_out(without, fitted.temperature, parts)]
             tempering_exponent = fit_tempering_exponent(
-                without, kinds, slides_of, recipe.evidence, hop_share, temperature=fitted.temperature
+                without, kinds, slides_of, recipe.evidence, hop_ratio, temperature=fitted.temperature
             )
         distance = slides.distance(bound.learner.predictor(fitted.parameters))
         acceptance = acceptance.fitted(near, far, recipe.evidence, tempering_exponent, distance)

@@ -71,14 +71,14 @@ def test_a_finger_is_checked_corrected_and_found_as_trained_again(trained):
 
 def test_the_reference_tells_how_its_slide_was_made(trained):
     model, slides = trained
-    asked = ExplorationRequest(
+    request = ExplorationRequest(
         'linear_slide', speed_m_s=0.03, force_n=5.0, distance_m=0.08, direction_rad=0.5, surface='plate'
     )
-    store_reference(model, TOPICS, slides[:2], asked)
+    store_reference(model, TOPICS, slides[:2], request)
     assert read_reference(model)[1] == {
         'speed_m_s': 0.03, 'force_n': 5.0, 'distance_m': 0.08, 'direction_rad': 0.5
     }  # fmt: skip
-    # Of a slide from a bag nobody knows what was asked: 3 s at 0.05 m/s and 1 N were simulated.
+    # Of a slide from a bag the commanded conditions are unknown: 3 s at 0.05 m/s and 1 N were simulated.
     store_reference(model, TOPICS, slides[:2])
     made = read_reference(model)[1]
     assert (made['speed_m_s'], made['force_n'], made['distance_m']) == pytest.approx((0.05, 1.0, 0.15), rel=0.05)
@@ -125,7 +125,7 @@ def starts(batches):
     return np.cumsum([0, *(len(one.samples) for one in batches[:-1])]).tolist()
 
 
-def test_noise_and_drift_are_measured_where_there_is_rest_and_else_said_not_to_be(trained):
+def test_noise_and_drift_are_measured_where_there_is_rest_and_else_reported_as_missing(trained):
     model, slides = trained
     stored = store_reference(model, TOPICS, slides[:2])
     assert 'noise and drift were not measured' in stored

@@ -38,8 +38,8 @@ def test_the_touches_lie_on_the_patch_and_spread_over_places_directions_speeds_a
     middles = np.array([[one.start_x_m, one.start_y_m] for one in touches]) + [
         [0.015 * math.cos(one.direction_rad), 0.015 * math.sin(one.direction_rad)] for one in touches
     ]
-    apart = [math.dist(a, b) for i, a in enumerate(middles) for b in middles[:i]]
-    assert min(apart) > 0.015
+    distances = [math.dist(a, b) for i, a in enumerate(middles) for b in middles[:i]]
+    assert min(distances) > 0.015
     angles = np.array([one.direction_rad for one in touches])
     assert np.abs(np.exp(1j * angles).mean()) < 0.6  # in all directions
     for name, low, high in (('speed_m_s', 0.02, 0.03), ('force_n', 1.0, 2.0)):
@@ -64,7 +64,7 @@ ANY, UR5E = (0.1, 6.0), (3.0, 8.0)
 
 
 @pytest.mark.parametrize(
-    ('asked', 'allowed_n', 'expected_n'),
+    ('requested', 'allowed_n', 'expected_n'),
     [
         ((0.0, 0.0), ANY, (1.0, 2.0)),
         ((0.0, 0.0), UR5E, (3.0, 6.0)),
@@ -77,10 +77,10 @@ ANY, UR5E = (0.1, 6.0), (3.0, 8.0)
         ((4.0, 4.0), UR5E, (4.0, 4.0)),
     ],
 )
-def test_forces_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that_the_explorer_allows(
-    asked, allowed_n, expected_n
+def test_forces_that_were_not_requested_are_those_nearest_to_the_usual_ones_that_the_explorer_allows(
+    requested, allowed_n, expected_n
 ):
-    params = replace(PARAMS, force_low_n=asked[0], force_high_n=asked[1], seed=1)
+    params = replace(PARAMS, force_low_n=requested[0], force_high_n=requested[1], seed=1)
     assert fitted_range(params, ('force_low_n', 'force_high_n'), allowed_n) == pytest.approx(expected_n)
     plan = PlacePlan('oak', params, PATCH, allowed_n)
     forces_n = [plan.next().force_n for _ in range(9)]
@@ -88,9 +88,9 @@ def test_forces_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that
     assert min(forces_n) == pytest.approx(expected_n[0])
 
 
-def test_speeds_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that_the_explorer_allows():
-    def speeds_m_s(most_m_s, **asked):
-        plan = PlacePlan('oak', CollectionParams(**asked), PATCH, allowed_speeds_m_s=(0.002, most_m_s))
+def test_speeds_that_were_not_requested_are_those_nearest_to_the_usual_ones_that_the_explorer_allows():
+    def speeds_m_s(most_m_s, **requested):
+        plan = PlacePlan('oak', CollectionParams(**requested), PATCH, allowed_speeds_m_s=(0.002, most_m_s))
         made = [plan.next().speed_m_s for _ in range(9)]
         return min(made), max(made)
 
@@ -101,11 +101,11 @@ def test_speeds_that_were_not_asked_for_are_those_nearest_to_the_usual_ones_that
 
 
 @pytest.mark.parametrize(
-    ('asked', 'named'),
+    ('requested', 'named'),
     [((1.0, 2.0), 'force_low_n'), ((0.0, 2.0), 'force_high_n'), ((9.0, 0.0), 'force_low_n'), ((4, 9), 'force_high_n')],
 )
-def test_a_range_of_force_that_the_explorer_does_not_allow_is_refused_in_one_sentence(asked, named):
-    params = replace(PARAMS, force_low_n=asked[0], force_high_n=asked[1])
+def test_a_range_of_force_that_the_explorer_does_not_allow_is_refused_in_one_sentence(requested, named):
+    params = replace(PARAMS, force_low_n=requested[0], force_high_n=requested[1])
     with pytest.raises(InvalidParameter, match=rf"'{named}' is \d N; the explorer allows 3 to 8 N$"):
         PlacePlan('oak', params, PATCH, UR5E)
 
@@ -154,7 +154,7 @@ def test_neighbours_of_a_left_out_place_are_left_out_too():
 
 
 @pytest.mark.parametrize(('bands', 'spacing_m'), [((5, 5, 1), 0.08), ((5, 1, 5), 0.04), ((1, 5, 5), 0.0), ((), 0.0)])
-def test_tracks_may_be_twice_as_far_apart_as_the_farthest_good_band(bands, spacing_m):
+def test_the_spacing_of_tracks_is_twice_the_farthest_good_band(bands, spacing_m):
     counted = tuple(Band(far_m, 5, correct, 0) for far_m, correct in zip(BANDS_M, bands, strict=False))
     assert PlaceAccuracy(5, 5, '', 1, counted).spacing_m == pytest.approx(spacing_m)
 
@@ -162,9 +162,9 @@ def test_tracks_may_be_twice_as_far_apart_as_the_farthest_good_band(bands, spaci
 DONE = (ExplorationError.NONE, '')
 
 
-def run(judgements, touches=(), params=PARAMS):
+def run(evaluations, touches=(), params=PARAMS):
     """Collect; a touch that is not given is done, and one that is an exception is raised."""
-    given, ends, told = iter(judgements), iter(touches), []
+    given, ends, reports = iter(evaluations), iter(touches), []
 
     def explore(_request):
         end = next(ends, DONE)
@@ -177,36 +177,36 @@ def run(judgements, touches=(), params=PARAMS):
         params,
         explore,
         lambda _slides: next(given),
-        lambda sentence, slides: told.append((slides, sentence)),
+        lambda sentence, slides: reports.append((slides, sentence)),
     )
-    return end, told
+    return end, reports
 
 
 def test_it_ends_at_the_bound_not_before_the_fewest_places():
-    end, told = run([PlaceAccuracy(3, 3, '', 2), PlaceAccuracy(4, 3, 'felt', 2), PlaceAccuracy(6, 6, '', 2)])
+    end, reports = run([PlaceAccuracy(3, 3, '', 2), PlaceAccuracy(4, 3, 'felt', 2), PlaceAccuracy(6, 6, '', 2)])
     assert (end.error, end.slides) == (CollectionError.NONE, 6)
-    assert [slides for slides, _ in told] == [3, 4, 6]
+    assert [slides for slides, _ in reports] == [3, 4, 6]
     assert end.message.startswith('6 of 6 left-out places correct; at new places at least 68 %')
 
 
-def test_a_bound_that_is_not_met_says_what_is_missing():
+def test_a_bound_that_is_not_met_reports_what_is_missing():
     end, _ = run([PlaceAccuracy(places, 1, 'felt', 2) for places in (3, 4, 6, 9)])
     assert (end.error, end.slides) == (CollectionError.BOUND_MISSED, 9)
-    assert 'mostly misidentified as felt' in end.message and 'collect felt at more places, too' in end.message
+    assert 'mostly misidentified as felt' in end.message and 'also collect felt at more places' in end.message
 
 
 def test_the_first_surface_of_a_folder_ends_with_the_fewest_places():
     end, _ = run([PlaceAccuracy(3, 0), PlaceAccuracy(4, 0)])
     assert (end.error, end.slides) == (CollectionError.NONE, 4)
-    assert 'no other surface is in the folder yet' in end.message
+    assert 'the folder holds no other surface yet' in end.message
 
 
 def test_three_failures_in_a_row_end_it_and_two_do_not():
     failed = [(ExplorationError.FORCE_LIMIT, text) for text in ('the patch ends', 'too hard', 'a', 'b', 'c')]
-    end, told = run([PlaceAccuracy(3, 3, '', 1)] * 3, [DONE, *failed[:2], DONE, DONE, *failed[2:]])
+    end, reports = run([PlaceAccuracy(3, 3, '', 1)] * 3, [DONE, *failed[:2], DONE, DONE, *failed[2:]])
     assert (end.error, end.slides, end.accuracy.places) == (CollectionError.MOTION_FAILED, 3, 3)
     assert end.message == '3 touches in a row failed, the last: c'
-    assert (1, 'a touch failed: the patch ends') in told
+    assert (1, 'a touch failed: the patch ends') in reports
 
 
 @pytest.mark.parametrize(

@@ -80,12 +80,12 @@ def tones(slides: int = 6, *, seed: int = 0, shuffled: bool = False) -> SlideDat
         np.sin(2 * np.pi * (TONES_HZ[label] * time_s + rng.random()))[:, None] + 0.1 * rng.normal(size=(1000, 1))
         for label in labels
     ]
-    told = rng.permutation(labels).tolist() if shuffled else labels
+    given = rng.permutation(labels).tolist() if shuffled else labels
     speeds = [SPEEDS_M_S[(number // len(TONES_HZ)) % len(SPEEDS_M_S)] for number in range(len(labels))]
-    return SlideDataset.from_arrays({'signal': samples}, told, {'signal': 1000.0}, speed_m_s=speeds, force_n=1.0)
+    return SlideDataset.from_arrays({'signal': samples}, given, {'signal': 1000.0}, speed_m_s=speeds, force_n=1.0)
 
 
-def test_tones_are_told_apart_in_every_fold() -> None:
+def test_tones_are_distinguished_in_every_fold() -> None:
     result = cross_validate(RECIPE, tones(), StratifiedGroupKFold(3))
     figures = result.as_json()
     assert figures['window_accuracy'] == figures['slide_accuracy'] == 1.0
@@ -105,7 +105,7 @@ def test_slides_that_are_all_right_or_all_wrong_have_the_exact_bound(n: int) -> 
 
 def test_shuffled_labels_are_recognised_by_chance_alone() -> None:
     figures = cross_validate(RECIPE, tones(15, shuffled=True), StratifiedGroupKFold(5)).as_json()
-    # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial share are 17 %.
+    # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial fraction are 17 %.
     assert 0.08 < figures['slide_accuracy'] < 0.42
 
 
@@ -217,7 +217,7 @@ def test_slides_of_what_was_left_out_are_one_cluster_of_the_interval(
     assert f'surfaces; {shift}' in table(result, 'x')[0]
 
 
-def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
+def test_a_fold_without_two_surfaces_to_train_on_is_named() -> None:
     dataset = tones().select(labels=['cork', 'felt'])
     only = np.array(['x' if label == 'cork' else 'y' for label in dataset.labels])
     with pytest.raises(InvalidData, match="fold 'x' cannot be trained: all windows are of 'felt'"):
@@ -351,7 +351,7 @@ def test_slides_of_one_place_are_one_case_of_the_test() -> None:
 
 
 def test_the_interval_of_the_difference_is_that_of_pairs() -> None:
-    """Slides that both recognise, or both do not, say nothing of the difference and widen it little."""
+    """Slides that both recognise, or both do not, carry no information on the difference and widen it little."""
     common = [True, False] * 50
     one = compare(cross_validation('a', common), cross_validation('b', common))
     assert one.slide_interval == (0.0, 0.0)
@@ -394,9 +394,9 @@ def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
             '--json', str(tmp_path / 'figures.json'), '--chart', str(tmp_path / 'figures.png'),
         ])
     )  # fmt: skip
-    said = capsys.readouterr().out
-    assert "recipe 'bands', split leave-one-out:session: 3 surfaces" in said
-    assert "'level' against 'bands' on 18 slides" in said
+    output = capsys.readouterr().out
+    assert "recipe 'bands', split leave-one-out:session: 3 surfaces" in output
+    assert "'level' against 'bands' on 18 slides" in output
     figures = json.loads((tmp_path / 'figures.json').read_text())
     assert (figures['split'], figures['seed']) == ('leave-one-out:session', 0)
     assert (figures['bags'], figures['slides']) == ([str(tmp_path / 'bags')], 'all')

@@ -42,7 +42,7 @@ def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float,
     ('decided_from', 'line'),
     [(2, 'as soon as decided: accuracy 100.0 %, after 0.70 s on average'), (99, 'as soon as decided: never decided')],
 )
-def test_a_report_says_when_slides_were_decided_or_that_none_was(decided_from: int, line: str) -> None:
+def test_a_report_states_when_slides_were_decided_or_that_none_was(decided_from: int, line: str) -> None:
     report = EvaluationReport(('a', 'b'), [slide('a', 'bbaa', decided_from=decided_from)], [], np.ones(4))
     assert line in summary(report)
 
@@ -84,7 +84,7 @@ def test_the_curve_of_windows_that_vote_has_a_point_for_each_complete_vote_alone
     assert seconds.tolist() == pytest.approx([1.0])  # no vote was complete: the slide's end decides
 
 
-def test_confidence_that_is_right_as_often_as_it_says_has_no_calibration_error() -> None:
+def test_confidence_that_equals_its_accuracy_has_no_calibration_error() -> None:
     honest = [slide('a', 'aaab', confidences=(0.75,) * 4)]
     assert metrics.calibration_error(honest) == pytest.approx(0.0)
     assert metrics.calibration_error([slide('a', 'bbbb', confidences=(0.9,) * 4)]) == pytest.approx(0.9)

@@ -59,14 +59,14 @@ def test_a_recipe_of_friction_learns_from_bags_of_sheets_that_differ_in_it(name:
     expected = {'dusty_plastic': 0.3 + 0.05 * np.exp(-4.0), 'oiled_plastic': 0.05 + 0.05 * np.exp(-25.0) + 0.02}
     for sheet, coefficient in expected.items():
         of_sheet = friction[np.array(examples.y) == sheet]
-        # Speed and force of the finger are not quite what the state says: by 2 and 5 %.
+        # Speed and force of the finger deviate from the state by 2 and 5 %.
         assert np.median(of_sheet) == pytest.approx(coefficient, rel=0.1)
     model = train_from_bags(name, bags, '1-4', out=tmp_path / 'model')
     assert evaluate(model, bags, '5-6').as_json()['window_accuracy'] > 0.8
 
 
 def slides_of_days(days: tuple[int, ...]) -> SlideDataset:
-    """Return ten slides of each of two surfaces a day: neighbours change together, or those two taxels apart."""
+    """Return ten slides of each of two surfaces a day: neighbours change together, or those two taxels away."""
     slides = []
     for day in days:
         rng = np.random.default_rng(day)
@@ -99,8 +99,8 @@ def test_what_changes_together_is_recognised_on_a_day_with_other_levels(name: st
     assert np.mean([final.accepted for final in finals]) > 0.7
     # On log shares, which the day gives, the same slides are guessed.
     features = {'signal_static': {'features': ['log_shares']}}
-    shares = Recipe.from_mapping({'inputs': features, 'learner': 'discriminant'}, 'shares')
-    guessed = evaluate_dataset(train(shares, training_examples(shares, trained)), tested)
+    log_fractions = Recipe.from_mapping({'inputs': features, 'learner': 'discriminant'}, 'shares')
+    guessed = evaluate_dataset(train(log_fractions, training_examples(log_fractions, trained)), tested)
     assert window_accuracy(guessed.known) < 0.8
 
 

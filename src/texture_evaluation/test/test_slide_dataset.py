@@ -97,7 +97,7 @@ def test_speeds_within_five_per_cent_are_one_condition() -> None:
 def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> None:
     with pytest.raises(InvalidData, match="no condition 'colour'; use one of speed, force"):
         from_arrays().condition('colour')
-    with pytest.raises(InvalidData, match="slide 'cork/1' and 5 others do not tell their force"):
+    with pytest.raises(InvalidData, match="slide 'cork/1' and 5 others have no force"):
         from_arrays(force_n=math.nan).condition('force')
 
 
@@ -214,7 +214,7 @@ def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
     topics = ('finger0/signal', 'finger1/signal')
     assert model.recipe.feature_set.topics == topics
     slides = SlideDataset.from_bags(bags, topics=topics).slides
-    for slide in slides:  # each finger has traits of its own, at the same time
+    for slide in slides:  # each finger has individual traits, at the same time
         first, second = (slide.signals[topic] for topic in topics)
         assert first[0].stamp_ns == second[0].stamp_ns
         assert not np.array_equal(first[0].samples, second[0].samples)
@@ -249,8 +249,8 @@ def test_parts_of_equal_time_hold_every_sample_once_and_windows_never_span_two()
         assert [start // NANOSECONDS % 5 for start in starts[:2]] == [first] * 2
         for event in events:
             if isinstance(event, CutWindow):
-                own = event.windows['signal'].samples[:, 0]
-                assert first - 1e-3 <= own[0] < own[-1] < first + 1.0
+                times = event.windows['signal'].samples[:, 0]
+                assert first - 1e-3 <= times[0] < times[-1] < first + 1.0
 
 
 def test_parts_are_of_equal_distance_where_slides_tell_their_speed() -> None:

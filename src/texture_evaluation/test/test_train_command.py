@@ -43,7 +43,7 @@ def model() -> TextureModel:
     return train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
 
 
-def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: TextureModel) -> None:
+def test_the_training_reports_when_its_slides_are_too_few_to_decide(model: TextureModel) -> None:
     lines = summary(model, Path('model.npz'))
     assert lines[0] == "recipe 'tiny' trained on 2 surfaces: cork, felt"
     assert lines[2] == model.acceptance.reason
@@ -51,22 +51,22 @@ def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: Text
 
 
 @pytest.mark.parametrize(
-    ('slides', 'said'),
+    ('slides', 'expected'),
     [({'cork': 4, 'felt': 1}, 'few slides of felt: 1, of others up to 4'), ({'cork': 4, 'felt': 3}, '')],
 )
-def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, said: str) -> None:
+def test_a_surface_with_far_fewer_slides_than_others_is_named(model: TextureModel, slides: dict, expected: str) -> None:
     domain = replace(model.acceptance.domain, slides=slides)
     uneven = replace(model, acceptance=replace(model.acceptance, domain=domain))
     found = [line for line in summary(uneven, Path('model.npz')) if line.startswith('few slides')]
-    assert [line.partition(';')[0] for line in found] == ([said] if said else [])
+    assert [line.partition(';')[0] for line in found] == ([expected] if expected else [])
 
 
-def test_a_training_with_one_slide_of_a_label_is_said_to_be_too_confident(simulated: Path) -> None:
+def test_a_training_with_one_slide_of_a_label_is_reported_as_too_confident(simulated: Path) -> None:
     lines = summary(train_from_bags('default', [simulated], '1'), Path('model.npz'))
-    assert lines[2] == 'this fraction is of held-out windows, as a label has a single slide: too confident'
+    assert lines[2] == 'this accuracy is of held-out windows, as a label has a single slide: too confident'
 
 
-def test_the_training_says_nothing_of_it_where_they_are_enough(model: TextureModel) -> None:
+def test_the_training_reports_nothing_where_they_are_enough(model: TextureModel) -> None:
     domain = replace(model.acceptance.domain, slides={'cork': 75, 'felt': 75})
     enough = replace(model, acceptance=replace(model.acceptance, slides=150, domain=domain))
     assert not any('too ' in line for line in summary(enough, Path('model.npz')))
@@ -89,7 +89,7 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ('hop_s', 'warning'),
     [
-        (0.1, r'\d+\.\d % of the held-out windows is not above chance, 50\.0 % of 2'),
+        (0.1, r'\d+\.\d % accuracy of held-out windows is not above chance, 50\.0 % of 2'),
         (0.005, 'windows overlap more than'),
     ],
 )
@@ -117,7 +117,7 @@ def table(folder, lines):
     return path
 
 
-def test_bags_and_grades_make_a_model_whose_card_says_from_what(simulated, tmp_path) -> None:
+def test_bags_and_grades_make_a_model_whose_card_lists_them(simulated, tmp_path) -> None:
     train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-4', tmp_path / 'rough.npz')
     model = load_roughness_model(tmp_path / 'rough')
     assert model.name == 'rough'

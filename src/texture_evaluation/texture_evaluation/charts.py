@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Charts that explain themselves: what is shown stands in the title, units on the axes, colours safe for all eyes."""
+"""Self-explanatory charts: what is shown is in the title, units on the axes, colours safe for colour blindness."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def refuse_chart_format(path: str | Path) -> None:
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Return the points, by rising cost, of which no other has at most the cost and at least the share."""
+    """Return the points, by rising cost, of which no other has at most the cost and at least the accuracy."""
     front: list[int] = []
     for index in sorted(range(len(points)), key=lambda index: (points[index][0], -points[index][1])):
         if not front or points[index][1] > points[front[-1]][1]:
@@ -52,7 +52,7 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '', points: 
 
     No display is needed and no global state is touched.
     """
-    # Not pyplot, which would keep every figure and ask for a display.
+    # Not pyplot, which would keep every figure and need a display.
     with mpl.rc_context({**STYLE, 'font.size': points, 'axes.titlesize': points + 1.0}):
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)

@@ -23,14 +23,14 @@ from texture_features.correction import (
     InputComparison,
     InputStatistics,
     compare,
-    file_beside,
+    file_next_to,
     write_reference,
 )
 from texture_recordings.dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide, SlideSamples
 
 TOUCH_NS = 200_000_000  # the skin feels a touch before the arm does
-UNMEASURED = 'noise and drift were not measured, for too little was recorded before the touch'
+UNMEASURED = 'noise and drift were not measured, as too little was recorded before the touch'
 
 
 def statistics_of(slide: LabelledSlide, topics: Iterable[str]) -> dict[str, InputStatistics]:
@@ -49,7 +49,7 @@ def _at_rest(slide: LabelledSlide, topic: str) -> Array:
     approaching = [one.stamp_ns for one in slide.states if one.phase is Phase.APPROACH]
     touched = [one.stamp_ns for one in slide.states if one.phase is not Phase.APPROACH]
     batches = slide.signals[topic]
-    # The rest ends where the approach does; without an approach nobody knows what was rest.
+    # The rest ends where the approach does; without an approach the rest is unknown.
     until_ns = min([at for at in touched if approaching and at > approaching[0]], default=0) - TOUCH_NS
     # By sample, not by batch: the batches of a slide are joined, so one holds the rest and the touch.
     counts = [max(0, int((until_ns - one.stamp_ns) * 1e-9 * one.sampling_rate_hz)) for one in batches]
@@ -64,12 +64,12 @@ def store_reference(
 ) -> str:
     """Store the last slide over the plate as that of the finger of the training, once the one before shows the same."""
     if len(slides) < 2:
-        raise InvalidData('one slide over the plate does not prove itself; record two, and store again')
+        raise InvalidData('one slide over the plate does not show repeatability; record two, and store again')
     before, last = (statistics_of(slide, topics) for slide in slides[-2:])
     if faults := _faults({topic: compare(before[topic], last[topic]) for topic in last}):
         raise InvalidData(
             f'nothing is stored, for two slides over the plate differ: {"; ".join(faults)}. Clean and fasten the '
-            'finger, close what else the machine computes, and store again'
+            'finger, stop other programs on the computer, and store again'
         )
     path = write_reference(model, last, _numbers_of(request) if request else _numbers_shown(slides[-1]))
     unknown = '' if all(np.isfinite(one.rest_rms).all() for one in last.values()) else f'; {UNMEASURED}'
@@ -90,9 +90,9 @@ def check_finger(
         raise InvalidData(f"the reference holds no '{missing[0]}'; store it again by --store")
     found = {topic: compare(reference[topic], one) for topic, one in today.items()}
     faults = _faults(found)
-    correction = file_beside(model, CORRECTION)
+    correction = file_next_to(model, CORRECTION)
     if not faults:
-        # Of a finger that is as trained a correction would make another one.
+        # A correction would falsify a finger that is as trained.
         removed = correct and correction.exists()
         if removed:
             correction.unlink()

@@ -25,7 +25,7 @@ from texture_evaluation.cross_validation import predict_slides
 from texture_features.feature_set import LabelledFeatures, SlideConditions
 
 # --------------------
-# What is asked for.
+# The request.
 
 
 SHORTEST_S = 0.6  # of a slide: one window, and what starts late
@@ -58,9 +58,7 @@ class CollectionParams:
         low=0.0,
         high=50.0,
     )
-    bound: float = param(
-        0.6, 'Fraction of new places right that must be shown, as a lower 90 % bound.', low=0.0, high=0.99
-    )
+    bound: float = param(0.6, 'Required accuracy at new places, as a lower 90 % bound.', low=0.0, high=0.99)
     seed: int = param(0, 'Seed of places and directions.', low=0)
 
     def __post_init__(self) -> None:
@@ -86,12 +84,12 @@ class Patch:
 
 
 UNLIMITED = (0.0, math.inf)
-# By the names of the lowest and the highest: the usual lowest, so many times which is the usual highest, and the unit.
+# By the names of the lowest and the highest: default of the lowest, ratio of the default highest to it, and the unit.
 USUAL = {('force_low_n', 'force_high_n'): (1.0, 2.0, 'N'), ('speed_low_m_s', 'speed_high_m_s'): (0.02, 2.5, 'm/s')}
 
 
 def fitted_range(params: CollectionParams, names: tuple[str, str], allowed: tuple[float, float]) -> tuple[float, float]:
-    """Return the lowest and highest force or speed; what was not asked for is fitted into what the explorer allows."""
+    """Return the lowest and highest force or speed; omitted ones are fitted into what the explorer allows."""
     usual_low, span, unit = USUAL[names]
     (least, most), (low, high) = allowed, (getattr(params, name) for name in names)
     for name, asked in zip(names, (low, high), strict=True):
@@ -107,7 +105,7 @@ def fitted_range(params: CollectionParams, names: tuple[str, str], allowed: tupl
 CANDIDATES = 200
 EDGE = 0.5  # of a slide beyond its end, for the ramps before and after it
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-PLASTIC = 0.7548776662466927  # the same for a second sequence beside it (Roberts 2018)
+PLASTIC = 0.7548776662466927  # the same for a second, parallel sequence (Roberts 2018)
 
 
 class PlacePlan:
@@ -123,7 +121,7 @@ class PlacePlan:
     ) -> None:
         self._surface, self._params, self._patch = checked_label(surface), params, patch
         if not self._surface:
-            raise InvalidData('no surface was named; give the label of what is collected')
+            raise InvalidData('no surface was named; give its label')
         forces, speeds = USUAL
         self._forces_n = fitted_range(params, forces, allowed_forces_n)
         self._speeds_m_s = fitted_range(params, speeds, allowed_speeds_m_s)
@@ -179,7 +177,7 @@ class PlacePlan:
 
 
 def _between(low: float, high: float, fraction: float) -> float:
-    return float(low * (high / low) ** fraction)  # equal ratios apart, not equal steps
+    return float(low * (high / low) ** fraction)  # equal ratios, not equal steps
 
 
 # --------------------
@@ -187,7 +185,7 @@ def _between(low: float, high: float, fraction: float) -> float:
 
 RECIPE, SHRINKAGE = 'default', 0.5  # few slides show no correlations
 CONFIDENCE = 0.9
-# Within which other places of the surface are left out, too: neighbours show more than a new place will.
+# Within which other places of the surface are also left out: neighbours show more than a new place will.
 GAPS_M = (0.01, 0.03, 0.06)
 BANDS_M = (0.02, 0.04, 0.08)  # largest distance of each band from the nearest trained place
 ENOUGH = 0.8  # accuracy of a band up to which tracks are near enough
@@ -222,15 +220,15 @@ class PlaceAccuracy:
 
     @property
     def spacing_m(self) -> float:
-        """How far apart tracks may be: the farthest point between two is half of it from either; 0 if unknown."""
+        """Largest spacing of tracks: the farthest point between two is half of it from either; 0 if unknown."""
         near = list(takewhile(lambda band: band.correct >= ENOUGH * band.places, self.bands))
         return 2.0 * near[-1].far_m if near else 0.0
 
     @property
     def sentence(self) -> str:
-        """What is known so far."""
+        """Results so far."""
         if not self.others:
-            return f'{self.places} places; no other surface is in the folder yet to distinguish it from'
+            return f'{self.places} places; the folder holds no other surface yet'
         mistaken = f', mostly misidentified as {self.confused}' if self.confused else ''
         found = (
             f'{self.correct} of {self.places} left-out places correct{mistaken}; at new places at least '
@@ -242,8 +240,8 @@ class PlaceAccuracy:
             f'{100 * band.far_m:.0f} cm {band.correct} of {band.places} ({band.accepted} accepted)'
             for band in self.bands
         )
-        spacing = f'be {100 * self.spacing_m:.0f} cm apart' if self.spacing_m else 'not even be that near'
-        return f'{found}; at most so far from the nearest trained place: {by_distance}; tracks may {spacing}'
+        spacing = f'up to {100 * self.spacing_m:.0f} cm' if self.spacing_m else 'smaller than these distances'
+        return f'{found}; by distance to the nearest trained place: {by_distance}; spacing of tracks: {spacing}'
 
 
 def evaluate_places(features: LabelledFeatures, surface: str) -> PlaceAccuracy:
@@ -299,7 +297,7 @@ def _distance_m(place: str, other: str) -> float:
 # --------------------
 # The collection itself.
 
-EVERY = 3  # places after which it is judged
+EVERY = 3  # places after which it is evaluated
 FAILURES = 3  # in a row end it
 ASKED_TO_END = {ExplorationError.STOPPED, ExplorationError.CANCELLED, ExplorationError.NOT_ACTIVE}
 
@@ -321,9 +319,9 @@ def collect(
     evaluate_all: Callable[[int], PlaceAccuracy],
     tell: Callable[[str, int], None],
 ) -> CollectionEnd:
-    """Touch place after place until the bound is met, the places are used up, or it cannot or shall not go on.
+    """Touch place after place until the bound is met, the places are used up, or it cannot or must not continue.
 
-    Ctrl-C, a recorder that ends and recordings that cannot be read are such ends, too: the slides so far count.
+    Ctrl-C, a recorder that ends and recordings that cannot be read are also such ends: the slides so far count.
     """
     slides, failures, accuracy = 0, 0, PlaceAccuracy(0, 0)
 
@@ -343,12 +341,12 @@ def collect(
                     return ended(CollectionError.MOTION_FAILED, last)
                 continue
             slides, failures = slides + 1, 0
-            # Each judgement trains once for each place; the first and the last possible end are always judged.
+            # Each evaluation trains once for each place; the first and the last possible end are always evaluated.
             if slides % EVERY and slides not in (params.places, params.most_places):
                 continue
             accuracy = evaluate_all(slides)
             tell(accuracy.sentence, slides)
-            # The first surface of a folder has nothing to be told from.
+            # The first surface of a folder has nothing to be distinguished from.
             met = accuracy.bound >= params.bound if accuracy.others else True
             if slides >= params.places and met:
                 return ended(CollectionError.NONE, accuracy.sentence)
@@ -358,7 +356,7 @@ def collect(
         return ended(CollectionError.NOT_RECORDED, str(error))
     missing = f'; the bound of {100 * params.bound:.0f} % is not met: '
     missing += (
-        f'collect {accuracy.confused} at more places, too, or other speeds and forces, or add slow channels'
+        f'also collect {accuracy.confused} at more places, use other speeds and forces, or add slow channels'
         if accuracy.confused
         else 'allow more places'
     )

@@ -40,7 +40,7 @@ from texture_recordings.dataset import CONDITIONS, SlideDataset
 
 ANSWER_S, WORKERS_S = 4, 4  # for a scheduler to answer, and for its first worker to come
 # What scheduler and workers must have as this process has it: both unpack what is computed, and a scheduler that cannot
-# says so in its own log alone, while everybody waits.
+# reports it in its log only, while all others wait.
 ON_CLUSTER = ('texture_core', 'texture_features', 'texture_estimation', 'texture_recordings', 'texture_evaluation')
 CLUSTER_ADVICE = (
     'start both with `ros-run dask scheduler` and `ros-run dask worker ADDRESS`, or in shells that have sourced the '
@@ -49,13 +49,13 @@ CLUSTER_ADVICE = (
 
 
 def single_blas_thread() -> AbstractContextManager[Any]:
-    """Keep linear algebra from starting threads of its own within a `with` block: the cores are busy already."""
+    """Keep linear algebra from starting threads within a `with` block: the cores are busy already."""
     return threadpool_limits(limits=1, user_api='blas')
 
 
 @contextmanager
 def workers(jobs: int = -1, dask: str = '') -> Iterator[None]:
-    """Have joblib use so many cores (-1: all) within a `with` block, or the cluster whose address is given.
+    """Have joblib use this many cores (-1: all) within a `with` block, or the cluster whose address is given.
 
     Threads, not processes: what takes the time (libsvm, products of arrays) lets go of Python's lock, and nothing is
     copied.
@@ -108,7 +108,7 @@ def _check_cluster(client: Any, address: str) -> None:
 
 
 # --------------------
-# Shares of windows and slides that are right, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
+# Accuracy of windows and slides, with 95 % intervals by bootstrap over clusters; exact at 0 and 100 %.
 
 RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
@@ -128,16 +128,16 @@ def figures(results: Sequence[SlideResult], clusters: Sequence[str] | None = Non
         reached = [row for row, end in enumerate(ends) if end is not None]
         right = _counted([end.label == one.surface for one, end in zip(results, ends, strict=True) if end is not None])
         key = f'{seconds:.1f}'
-        at_s[key], intervals_at_s[key] = _share_of(right, of_clusters[reached])
+        at_s[key], intervals_at_s[key] = _accuracy_of(right, of_clusters[reached])
         n_at_s[key] = len(reached)
-    shares = {name: _share_of(own, of_clusters) for name, own in counts.items()}
+    accuracies = {name: _accuracy_of(pair, of_clusters) for name, pair in counts.items()}
     return {
         'rejections': metrics.rejections(results),
         'n_slides': len(results),
         'n_windows': sum(len(result.window_labels) for result in results),
         'n_clusters': len(set(of_clusters.tolist())),
-        **{name: share for name, (share, _) in shares.items()},
-        **{f'{name}_interval': own for name, (_, own) in shares.items()},
+        **{name: value for name, (value, _) in accuracies.items()},
+        **{f'{name}_interval': pair for name, (_, pair) in accuracies.items()},
         'accuracy_at_s': at_s,
         'accuracy_at_s_interval': intervals_at_s,
         'n_slides_at_s': n_at_s,
@@ -149,17 +149,17 @@ def _counted(which: Sequence[bool]) -> Array:
     return np.array([(one, 1) for one in which], dtype=np.float64).reshape(-1, 2)
 
 
-def _share_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[float] | None]:
-    """Return a share and its interval; None for both without an answer."""
+def _accuracy_of(counts: Array, clusters: AnyArray) -> tuple[float | None, list[float] | None]:
+    """Return an accuracy and its interval; None for both without an answer."""
     right, answers = counts.sum(axis=0)
     return (float(right / answers), interval(counts, clusters)) if answers else (None, None)
 
 
 def interval(counts: Array, clusters: Sequence[str] | AnyArray | None = None) -> list[float]:
-    """Return the 95 % interval of a share by bootstrap over clusters: answers within one are not independent.
+    """Return the 95 % interval of an accuracy by bootstrap over clusters: answers within one are not independent.
 
     Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
-    the share of clusters, about 3/n wide.
+    the fraction of clusters, about 3/n wide.
     """
     counts = counts if clusters is None else clustered(counts, clusters)
     right, answers = counts.sum(axis=0)
@@ -176,7 +176,7 @@ def clustered(counts: Array, clusters: Sequence[str] | AnyArray) -> Array:
 
 
 def _resampled(counts: Array) -> Array:
-    """Return the share that is right in each resample of the rows, (..., RESAMPLES), of (..., n_clusters, 2)."""
+    """Return the accuracy in each resample of the rows, (..., RESAMPLES), of (..., n_clusters, 2)."""
     # Always the same resamples: the figures of a page do not change from run to run.
     n_rows = counts.shape[-2]
     drawn = np.random.default_rng(0).integers(n_rows, size=(RESAMPLES, n_rows))
@@ -370,8 +370,8 @@ def compare(first: CrossValidation, second: CrossValidation) -> PairedComparison
     recognised = right[..., 0] > 0.5 * right[..., 1]
     only_first, only_second = (int((recognised[a] & ~recognised[b]).sum()) for a, b in ((0, 1), (1, 0)))
     clusters = [first.clusters.get(name, name) for name in slides]
-    right, windows = (np.stack([clustered(own, clusters) for own in both]) for both in (right, windows))
-    alike = np.stack([clustered(_counted(own), clusters)[:, 0] for own in recognised])  # slides of each cluster
+    right, windows = (np.stack([clustered(results, clusters) for results in both]) for both in (right, windows))
+    alike = np.stack([clustered(_counted(results), clusters)[:, 0] for results in recognised])  # slides of each cluster
     p_value = mcnemar(int((alike[0] > alike[1]).sum()), int((alike[1] > alike[0]).sum()))
     slide_difference, slide_interval = _difference(right)
     window_difference, window_interval = _difference(windows)
@@ -413,13 +413,13 @@ def _counts(result: CrossValidation, slides: Sequence[str], *, of_windows: bool)
     for fold in result.folds:
         kept = {name: one for name, one in fold.results.items() if name in place}
         if kept:
-            own = (window_counts if of_windows else slide_counts)(list(kept.values()))
-            counts[[place[name] for name in kept]] += own
+            counted = (window_counts if of_windows else slide_counts)(list(kept.values()))
+            counts[[place[name] for name in kept]] += counted
     return counts
 
 
 def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
-    """Return second minus first share, and its interval; `counts` is (2, n_clusters, 2)."""
+    """Return second minus first accuracy, and its interval; `counts` is (2, n_clusters, 2)."""
     first, second = (right / answers for right, answers in counts.sum(axis=1))
     # Both recipes on the same resampled clusters: what is hard for both widens no interval.
     drawn = _resampled(counts)
@@ -428,13 +428,13 @@ def _difference(counts: Array) -> tuple[float, tuple[float, float]]:
 
 
 # --------------------
-# Draw cross-validated recipes beside each other: shares with their intervals, and slides over sliding time.
+# Draw cross-validated recipes next to each other: accuracies with intervals, and slides over sliding time.
 
 KINDS = (('window', 'single windows', 'o'), ('slide', 'whole slides', 's'))
 
 
 def comparison_chart(results: Sequence[CrossValidation], title: str, path: str | Path) -> Path:
-    """Draw the shares of windows and slides that are right with 95 % intervals, and how slides do over their time.
+    """Draw the accuracy of windows and slides with 95 % intervals, and that of slides over their time.
 
     Parameters
     ----------
@@ -450,8 +450,8 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     Path
     """
     with chart(path, (10.0, 2.4 + 0.5 * len(results)), title) as figure:
-        shares, times = figure.subplots(1, 2)
-        _draw_shares(shares, results)
+        accuracies, times = figure.subplots(1, 2)
+        _draw_accuracies(accuracies, results)
         for result, style in zip(results, line_styles(), strict=False):
             seconds, accuracy = curve(result.pooled)
             times.plot(seconds, 100 * accuracy, label=result.recipe, marker='.', **style)
@@ -461,15 +461,15 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     return Path(path)
 
 
-def _draw_shares(axes: Any, results: Sequence[CrossValidation]) -> None:
+def _draw_accuracies(axes: Any, results: Sequence[CrossValidation]) -> None:
     figures = [result.as_json() for result in results]
     rows = np.arange(len(results))
     for (kind, name, marker), colour, offset in zip(KINDS, COLOURS, (-0.12, 0.12), strict=False):
-        shares = 100 * np.array([one[f'{kind}_accuracy'] for one in figures])
+        accuracies = 100 * np.array([one[f'{kind}_accuracy'] for one in figures])
         edges = 100 * np.array([one[f'{kind}_accuracy_interval'] for one in figures]).T
-        errors = np.maximum([shares - edges[0], edges[1] - shares], 0.0)
+        errors = np.maximum([accuracies - edges[0], edges[1] - accuracies], 0.0)
         axes.errorbar(
-            shares, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
+            accuracies, rows + offset, xerr=errors, fmt=marker, color=colour, capsize=3, label=f'{name}, 95 % interval'
         )
     axes.set_yticks(rows, [result.recipe for result in results])
     axes.set(xlabel='right (%)', xlim=(None, 101), ylim=(len(results) - 0.5, -0.5))
@@ -477,7 +477,7 @@ def _draw_shares(axes: Any, results: Sequence[CrossValidation]) -> None:
 
 
 # --------------------
-# What `texture cross-validate` names: a splitter, and what must not be on both sides of a split.
+# What `texture cross-validate` names: a splitter, and what must not be in training and test.
 
 TEST_SIZE = 0.25  # of a random split
 
@@ -532,7 +532,7 @@ SPLITS: Mapping[str, Callable[[str, str, int], Split]] = {
         name, StratifiedGroupKFold(int(folds or 5), shuffle=True, random_state=seed)
     ),
     'leave-one-out': lambda name, condition, _seed: _leave_one_out(name, condition),
-    'chronological': lambda name, share, _seed: Split(name, ChronologicalSplit(float(share or 0.75))),
+    'chronological': lambda name, value, _seed: Split(name, ChronologicalSplit(float(value or 0.75))),
     'random': lambda name, splits, seed: Split(
         name, GroupShuffleSplit(int(splits or 20), test_size=TEST_SIZE, random_state=seed)
     ),
@@ -554,7 +554,7 @@ def split_slides(
 ) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return the training and test slides of each split, by their index in the data set.
 
-    Where parts of one slide would be on both sides, a split becomes two, each of which trains on every other slide of
+    Where parts of one slide would be in training and test, a split becomes two, each trained on every other slide of
     a surface and tests on those between.
     """
     labels, columns = dataset.labels, slide_groups(dataset, groups)
@@ -568,13 +568,13 @@ def split_slides(
         splits = list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:
         raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
-    return [apart for train, test in splits for apart in _of_other_slides(dataset, train, test)]
+    return [part for train, test in splits for part in _of_other_slides(dataset, train, test)]
 
 
 def _of_other_slides(
     dataset: SlideDataset, train: NDArray[np.intp], test: NDArray[np.intp]
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield a split as it is, or as two if parts of a slide are on both sides."""
+    """Yield a split as it is, or as two if parts of a slide are in training and test."""
     wholes = np.array([slide.whole_name for slide in dataset])
     if not np.isin(wholes[test], wholes[train]).any():
         yield train, test
@@ -594,7 +594,7 @@ Rows = NDArray[np.intp]
 def of_trained_surfaces(labels: AnyArray, splits: Sequence[tuple[Rows, Rows]]) -> list[tuple[Rows, Rows]]:
     """Return splits that test no slide of a surface that they do not train: it could not be right."""
     if any(len(np.unique(labels[train])) < 2 for train, _ in splits):
-        return list(splits)  # the training says it better: it names the fold
+        return list(splits)  # the error of the training is better: it names the fold
     possible = [(train, test[np.isin(labels[test], labels[train])]) for train, test in splits]
     left = [(train, test) for train, test in possible if len(test)]
     if not left:
@@ -642,7 +642,7 @@ def cross_validate(
 ) -> CrossValidation:
     """Train a recipe on some slides and test it on others, for each split of the slides.
 
-    Features are computed once for all folds. The splitter divides slides, so no slide is ever on both sides. A slide
+    Features are computed once for all folds. The splitter divides slides, so no slide is in training and test. A slide
     is tested as on the robot: window by window, from the accumulated evidence.
 
     Parameters
@@ -656,9 +656,9 @@ def cross_validate(
         for each slide.
     n_jobs
         Number of folds computed at once, as joblib counts (-1: one per core). None: 1, or what a surrounding
-        `joblib.parallel_config` says, such as the workers of a Dask cluster.
+        `joblib.parallel_config` selects, such as the workers of a Dask cluster.
     groups
-        What must not be on both sides: 'slide', a condition of the data set, such as 'speed', or an array (n_slides,).
+        What must not be in training and test: 'slide', a condition such as 'speed', or an array (n_slides,).
 
     Returns
     -------
@@ -681,9 +681,9 @@ def cross_validate(
     """
     columns = slide_groups(dataset, groups)
     splits = split_slides(dataset, splitter, columns)
-    asked = {row for _, test in splits for row in test.tolist()}
+    requested = {row for _, test in splits for row in test.tolist()}
     splits = of_trained_surfaces(dataset.labels, splits)
-    untested = asked - {row for _, test in splits for row in test.tolist()}
+    untested = requested - {row for _, test in splits for row in test.tolist()}
     names = dataset.names
     named = [
         (names[train_rows], names[test_rows], _fold_name(number, columns, test_rows))
@@ -717,7 +717,7 @@ def cross_validate(
 
 
 def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str, SlideResult]:
-    """Return what a model says of each slide, by its name, window by window as on the robot."""
+    """Return the estimates of a model for each slide, by its name, window by window as on the robot."""
     results = {}
     for slide in dict.fromkeys(features.groups.tolist()):
         # The empty last vector closes the evidence as on the robot.
@@ -733,7 +733,7 @@ def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str,
 def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> str:
     left_out = np.unique(groups[test_rows])
     if len(left_out) != 1 or len(test_rows) < 2:
-        return str(number)  # the name of a single slide says nothing of the fold
+        return str(number)  # the name of a single slide does not describe the fold
     return f'{left_out[0]:g}' if np.issubdtype(left_out.dtype, np.number) else str(left_out[0])
 
 

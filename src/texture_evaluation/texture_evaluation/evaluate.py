@@ -49,7 +49,7 @@ class EvaluationReport:
 
     @property
     def confusion(self) -> AnyArray:
-        """How many windows of each surface (row) were taken for each label (column)."""
+        """How many windows of each surface (row) got each label (column)."""
         return metrics.confusion(self.known, self.labels)
 
     @property
@@ -58,7 +58,7 @@ class EvaluationReport:
         return sorted({result.surface for result in (*self.known, *self.unknown)})
 
     def as_json(self) -> dict[str, Any]:
-        """Return the figures; null where no slide tells."""
+        """Return the figures; null where there is no slide."""
         nothing = {'accuracy': None, 'mean_s': None}
         median, p99 = np.percentile(self.latency_us, (50, 99))
         return {
@@ -169,7 +169,7 @@ def run_model(
 
 
 def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEvent]) -> tuple[SlideResult, Array]:
-    """Return what the model says of each usable window of a slide, and the computing times of all."""
+    """Return the estimate for each usable window of a slide, and the computing times of all."""
     vectors, estimates, taken_us = run_model(model, events)
     used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
@@ -206,7 +206,7 @@ def sentence(one: PairedComparison) -> str:
         test = f'exact sign test over {one.n_clusters} clusters'
     return (
         f"'{one.second}' against '{one.first}' on {one.n_slides} slides: slides {slides}, windows {windows}; "
-        f'{one.only_second} slides are right by it alone, {one.only_first} by the other alone: '
+        f'{one.only_second} slides are correct by it only, {one.only_first} by the other only: '
         f'p = {one.p_value:.2g} ({test}), {one.p_value_adjusted:.2g} adjusted for all comparisons (Holm)'
     )
 
@@ -258,9 +258,9 @@ def summary(report: EvaluationReport) -> list[str]:
     """Return the figures in lines for people."""
     figures = report.as_json()
     at = [
-        f'{percent(share)} after {seconds} s ({figures["n_slides_at_s"][seconds]} slides)'
-        for seconds, share in figures['accuracy_at_s'].items()
-        if share is not None
+        f'{percent(fraction)} after {seconds} s ({figures["n_slides_at_s"][seconds]} slides)'
+        for seconds, fraction in figures['accuracy_at_s'].items()
+        if fraction is not None
     ]
     early, latency = figures['early'], figures['latency_us']
     lines = [
@@ -269,7 +269,7 @@ def summary(report: EvaluationReport) -> list[str]:
         *(
             [
                 f'accuracy of single windows: {percent(figures["window_accuracy"])}',
-                f'accuracy of slides: {", ".join(at) or "no slide is long enough to say"}',
+                f'accuracy of slides: {", ".join(at) or "no slide is long enough"}',
             ]
             if report.known
             else [
@@ -293,14 +293,14 @@ def summary(report: EvaluationReport) -> list[str]:
         lines.append(f'of other surfaces, {by_reason(figures["rejections_of_untrained"])}')
     if report.trained_on:
         lines.append(
-            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures say too '
-            'much; leave them out with --slides'
+            f'{len(report.trained_on)} of {len(report.known)} slides were in the training, so these figures are '
+            'optimistic; leave them out with --slides'
         )
     if report.unusable:
         lines.append(f'without a usable window, and not counted: {", ".join(report.unusable)}')
     return [*lines, *report.tare_faults]
 
 
-def percent(share: float | None) -> str:
-    """Return a share in per cent, or a dash if there is none."""
-    return '–' if share is None else f'{100 * share:.1f} %'
+def percent(fraction: float | None) -> str:
+    """Return a fraction in per cent, or a dash if there is none."""
+    return '–' if fraction is None else f'{100 * fraction:.1f} %'

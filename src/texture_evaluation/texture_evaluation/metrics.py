@@ -19,7 +19,7 @@ TOLERANCE_S = 1e-6  # sums of hops are not exact
 
 @dataclass(frozen=True, eq=False)
 class SlideResult:
-    """What a model said during one slide."""
+    """Estimates of a model during one slide."""
 
     surface: str
     window_labels: Sequence[str]
@@ -42,7 +42,7 @@ class SlideResult:
         """Return the estimate after so much sliding; None if the slide has less or the first window is longer."""
         if not self.estimates or self.estimates[-1].evidence_s < seconds - TOLERANCE_S:
             return None
-        # Windows may be longer than the time asked for.
+        # Windows may be longer than the requested time.
         received = [estimate for estimate in self.estimates if estimate.evidence_s <= seconds + TOLERANCE_S]
         return received[-1] if received else None
 
@@ -52,26 +52,26 @@ class SlideResult:
 
 
 def window_accuracy(results: Sequence[SlideResult]) -> float:
-    """Return the share of windows that are recognised each by itself."""
+    """Return the accuracy of single windows."""
     right = [label == result.surface for result in results for label in result.window_labels]
     return float(np.mean(right))
 
 
 def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
-    """Return the share of slides that are recognised after so much sliding; None if no slide is long enough."""
+    """Return the accuracy of slides after a time of sliding; None if no slide is long enough."""
     decided = [(result.surface, result.after(seconds)) for result in results]
-    return _share([estimate.label == surface for surface, estimate in decided if estimate is not None])
+    return _fraction([estimate.label == surface for surface, estimate in decided if estimate is not None])
 
 
 def unclassified_windows(results: Sequence[SlideResult]) -> float:
-    """Return the share of windows that alone are taken for nothing."""
+    """Return the fraction of single windows that are unclassified."""
     return float(np.mean([not label for result in results for label in result.window_labels]))
 
 
 def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return the share of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
+    """Return the fraction of slides without a label after the usual times, keyed '0.5', '1.0' and so on."""
     ends = {f'{seconds:.1f}': [result.after(seconds) for result in results] for seconds in TIMES_S}
-    return {key: _share([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
+    return {key: _fraction([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
 
 
 def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
@@ -112,28 +112,28 @@ def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
 
 def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over trained surfaces that were rejected at the end; None without any."""
-    return _share([not result.end.accepted for result in results])
+    return _fraction([not result.end.accepted for result in results])
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over surfaces without training that were accepted; None without any."""
-    return _share([result.end.accepted for result in results])
+    return _fraction([result.end.accepted for result in results])
 
 
 def accepted_wrong(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides that were accepted but wrong, over any surfaces; None without slides."""
     early = [e.accepted and e.decided and e.label != surface for surface, e in _early_ends(results)]
     final = [result.end.accepted and result.end.label != result.surface for result in results]
-    return {'early': _share(early), 'final': _share(final)}
+    return {'early': _fraction(early), 'final': _fraction(final)}
 
 
 def rejected(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return the fraction of slides that were rejected, early ('early') or at their end ('final'); None without slides.
 
-    A slide that is never decided goes on to its end: there its last estimate counts as early, too.
+    A slide that is never decided continues to its end: there its last estimate also counts as early.
     """
     early = [not estimate.accepted for _, estimate in _early_ends(results)]
-    return {'early': _share(early), 'final': _share([not result.end.accepted for result in results])}
+    return {'early': _fraction(early), 'final': _fraction([not result.end.accepted for result in results])}
 
 
 def rejections(results: Sequence[SlideResult]) -> Mapping[str, int]:
@@ -151,14 +151,14 @@ def _early_ends(results: Sequence[SlideResult]) -> list[tuple[str, TextureEstima
     ]
 
 
-def _share(which: Sequence[bool]) -> float | None:
+def _fraction(which: Sequence[bool]) -> float | None:
     return float(np.mean(which)) if which else None
 
 
 def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray:
-    """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels).
+    """Return how many windows of each surface (row) got each label (column), (n_labels, n_labels).
 
-    Unclassified windows stand in no column.
+    Unclassified windows are in no column.
     """
     place = {label: index for index, label in enumerate(labels)}
     table = np.zeros((len(labels), len(labels)), dtype=int)
@@ -169,7 +169,7 @@ def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray
 
 
 def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
-    """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches.
+    """Return seconds of sliding and the accuracy of slides after them, as far as every slide reaches.
 
     The times are those at which decisions are made: windows that vote together decide when their vote is complete.
     """

@@ -29,7 +29,7 @@ COLUMNS = ('rater', 'texture', 'grade')
 
 @dataclass(frozen=True, eq=False)
 class Ratings:
-    """What each person says of each texture."""
+    """Grades of each person for each texture."""
 
     raters: tuple[str, ...]
     textures: tuple[str, ...]
@@ -84,7 +84,7 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
 
 
 # --------------------
-# How far people agree who graded the same things.
+# Agreement of people who graded the same things.
 
 
 def krippendorff_alpha(grades: Array) -> float:
@@ -127,15 +127,15 @@ def intraclass_correlation(table: Array) -> tuple[float, float]:
 def one_against_rest(grades: Array) -> tuple[float, float]:
     """Return mean absolute difference and mean correlation of each person with the mean of the others."""
     errors, correlations = [], []
-    for index, own in enumerate(grades):
+    for index, grades_of_one in enumerate(grades):
         others = np.delete(grades, index, axis=0)
-        shared = ~np.isnan(own) & ~np.isnan(others).all(axis=0)
+        shared = ~np.isnan(grades_of_one) & ~np.isnan(others).all(axis=0)
         if not shared.any():
             continue
         rest = np.nanmean(others[:, shared], axis=0)
-        errors.append(float(np.abs(own[shared] - rest).mean()))
-        if own[shared].std() > 0 and rest.std() > 0:  # who gives one grade to all correlates with nobody
-            correlations.append(float(np.corrcoef(own[shared], rest)[0, 1]))
+        errors.append(float(np.abs(grades_of_one[shared] - rest).mean()))
+        if grades_of_one[shared].std() > 0 and rest.std() > 0:  # a rater with one grade for all has no correlation
+            correlations.append(float(np.corrcoef(grades_of_one[shared], rest)[0, 1]))
     return _mean(errors), _mean(correlations)
 
 
@@ -172,7 +172,7 @@ def agreement(grades: Array) -> dict[str, float]:
 
 
 def report_of(ratings: Ratings) -> dict[str, Any]:
-    """Return what a panel says and how far its people agree, as panel.json holds it; null for what cannot be said."""
+    """Return the results and the agreement of a panel, as panel.json holds them; null for what is undefined."""
     rows = zip(ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True)
     return {
         'raters': len(ratings.raters),
@@ -219,7 +219,7 @@ def _uneven_raters(ratings: Ratings) -> Iterator[str]:
         used = (np.rint(row)[:, None] == RATINGS_GRADES).sum(axis=0)
         if used.min() < low or used.max() > high:
             shown = ', '.join(f'{count} × {grade}' for grade, count in zip(RATINGS_GRADES, used, strict=True))
-            yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are asked'
+            yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are required'
 
 
 def _allowed_a_grade(n_textures: int) -> tuple[int, int]:
@@ -234,7 +234,7 @@ def _or_none(value: float) -> float | None:
 # --------------------
 # The two pictures of a human panel: votes per grade, and mean with standard deviation.
 
-MIN_SHARE = 4 / 30  # the paper leaves out grades that got fewer than 4 of 30 votes
+MIN_FRACTION = 4 / 30  # the paper leaves out grades that got fewer than 4 of 30 votes
 MANY = 40  # more textures than this: small names
 LARGEST_DOT = 220.0
 
@@ -243,7 +243,7 @@ def votes_chart(ratings: Ratings, path: str | Path) -> Path:
     """Draw how many people gave each texture each grade, textures from smooth to rough (the paper's Fig. 3)."""
     order = np.argsort(ratings.means, kind='stable')
     votes = ratings.votes[order]
-    least = max(1, round(MIN_SHARE * len(ratings.raters)))
+    least = max(1, round(MIN_FRACTION * len(ratings.raters)))
     with chart(path, _size(ratings)) as figure:
         axes = figure.subplots()
         texture, grade = np.nonzero(votes >= least)

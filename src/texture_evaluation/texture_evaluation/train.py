@@ -27,7 +27,7 @@ def train_from_bags(
     slides: str = '',
     out: str | Path | None = None,
 ) -> TextureModel:
-    """Return a model trained on the labelled slides of bags, and save it; a TextureError says what is wrong.
+    """Return a model trained on the labelled slides of bags, and save it; a TextureError states what is wrong.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def train_grades_from_bags(
     slides: str = '',
     out: str | Path | None = None,
 ) -> RoughnessModel:
-    """Return a roughness model trained on labelled slides, and save it; a TextureError says what is wrong."""
+    """Return a roughness model trained on labelled slides, and save it; a TextureError states what is wrong."""
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
     examples = SlideDataset.from_bags(bags, slides, topics=windows.topics).features(windows)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Augmented copies against what physics says of them."""
+"""Augmented copies against analytical results."""
 
 import dataclasses
 import math
@@ -90,9 +90,9 @@ def test_copies_are_of_the_slides_they_are_named_after_and_repeatable() -> None:
 def test_copies_without_any_range_are_the_slide_itself() -> None:
     same = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0)
     values = np.stack([vector.values for vector in FEATURES.extract_many(cut()[:-1])])
-    own = same.copies.values[same.copies.groups == 'cork/1']
-    np.testing.assert_allclose(own, values[: len(own)], rtol=1e-5, atol=1e-5)
-    assert len(own) >= len(values) - 1
+    copied = same.copies.values[same.copies.groups == 'cork/1']
+    np.testing.assert_allclose(copied, values[: len(copied)], rtol=1e-5, atol=1e-5)
+    assert len(copied) >= len(values) - 1
     assert len(same.disturbed.groups) == 0
 
 
@@ -126,9 +126,9 @@ def test_noise_raises_the_power_of_the_quiet_bands_as_much_as_it_has_power() -> 
     loud = augmented(speed_range=0.0, noise_range=10.0, copies=8, disturbed_copies=0).copies
     quiet = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0).copies
     assert loud.values[:, 7].max() > quiet.values[:, 7].max() + 2 * math.log(3.0)
-    told = loud.values[loud.kinds == '', 7]
-    assert len(told)
-    assert told.max() == pytest.approx(quiet.values[:, 7].max(), abs=0.1)
+    undisturbed = loud.values[loud.kinds == '', 7]
+    assert len(undisturbed)
+    assert undisturbed.max() == pytest.approx(quiet.values[:, 7].max(), abs=0.1)
 
 
 def test_a_low_pass_halves_the_power_at_its_cut_off_and_keeps_what_is_far_below() -> None:

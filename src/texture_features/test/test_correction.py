@@ -11,7 +11,7 @@ from texture_features.correction import (
     Correction,
     InputStatistics,
     compare,
-    file_beside,
+    file_next_to,
     read_correction,
     read_reference,
     write_reference,
@@ -87,23 +87,23 @@ def test_a_corrected_window_has_the_features_of_the_finger_of_the_training():
     )
     wrong, left = (np.abs(one.values - expected.values).max() for one in (without, corrected))
     assert left < 0.35 * wrong
-    # A classifier that does not know of the correction must notice it.
+    # A classifier without the correction must notice it.
     assert corrected.feature_set.startswith(f'{expected.feature_set} corrected=')
 
 
 def test_slides_that_prove_nothing_are_refused_with_what_to_do():
-    for samples, rest, said in (
+    for samples, rest, message in (
         (slide(seconds=1.0), None, 'slide for 2 s or longer'),
         (np.clip(slide(), -50.0, 50.0), None, 'the sensor is saturated; press less'),
         (slide(), slide(3), 'too little signal; see that the finger touches the plate'),
     ):
-        with pytest.raises(InvalidData, match=said):
+        with pytest.raises(InvalidData, match=message):
             found(samples, rest)
     with pytest.raises(InvalidData, match=r'the reference is of the sensor biotac.* and this one is tsf85'):
         compare(found(slide()), found(slide(), sensor='tsf85'))
 
 
-def test_files_beside_a_model_are_read_back_or_refused(tmp_path):
+def test_files_next_to_a_model_are_read_back_or_refused(tmp_path):
     model = tmp_path / 'cloths.npz'
     assert read_correction(model) is None
     with pytest.raises(ModelMismatch, match=r'no reference is stored.*--store'):
@@ -113,13 +113,13 @@ def test_files_beside_a_model_are_read_back_or_refused(tmp_path):
     inputs, made = read_reference(tmp_path / 'cloths.json')
     assert compare(inputs['signal'], reference).faults == []
     assert made == {'speed_m_s': 0.03, 'force_n': 5.0}
-    path = file_beside(model, 'reference')
+    path = file_next_to(model, 'reference')
     for damaged in ('[1]', '{"speed": 0.03}', '{"speed_m_s": NaN}', '{"force_n": [5]}', '{"force_n": -5}'):
         path.write_text(f'{{"inputs": {{}}, "slide": {damaged}}}')
         with pytest.raises(ModelMismatch, match=r'cannot be used: .*; store it again by --store'):
             read_reference(model)
     correction = Correction.of({'signal': compare(reference, found(2.0 * slide(1)))})
-    path = file_beside(model, 'correction')
+    path = file_next_to(model, 'correction')
     path.write_text(json.dumps(correction.as_mapping()))
     assert read_correction(model).fingerprint == correction.fingerprint
     window = WindowBatch(np.zeros((100, 2)), RATE_HZ)

@@ -111,7 +111,7 @@ def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
     bench.until(lambda: bench.features and bench.features[-1].last)
     assert bench.features[-1].skipped == 4
     assert [vector.sequence for vector in bench.features] == list(range(len(bench.features)))
-    bench.until(lambda: any('nothing has come yet on signal' in report.status[0].message for report in bench.reports))
+    bench.until(lambda: any('no message yet on signal' in report.status[0].message for report in bench.reports))
 
 
 def test_broken_messages_are_counted_and_survived(bench):
@@ -160,7 +160,7 @@ def finger_batches(topic, seconds, late_s, seed):
 def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
     with LocalGraph(69) as graph:
         bench = Bench(graph, recipe='kaboli-svm-two-fingers', topics=FINGERS)
-        # the second finger's numbering begins later: only its stamps tell which samples belong together
+        # the second finger's numbering begins later: only its stamps show which samples belong together
         batches = {topic: finger_batches(topic, 3.0, 0.05 * ('1/' in topic), n) for n, topic in enumerate(FINGERS)}
         bench.states.publish(to_msg(slide(2.5)))
         bench.until(lambda: bench.node._cutter._slides)
@@ -173,8 +173,8 @@ def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
         alone = {topic.rpartition('/')[2]: signals for topic, signals in batches.items() if topic.startswith(finger)}
         events = cut_recording(alone, [slide(2.5), lift(2.5)], one_finger.windows)
         expected = next(one_finger.extract(event) for event in events if event.start_ns == received.start_ns)
-        own = [value for name, value in zip(received.names, received.values, strict=True) if name.startswith(finger)]
-        np.testing.assert_allclose(own, expected.values)
+        found = [value for name, value in zip(received.names, received.values, strict=True) if name.startswith(finger)]
+        np.testing.assert_allclose(found, expected.values)
 
 
 def test_a_recipe_that_sees_the_level_warns_of_a_sensor_that_is_not_tared_and_stops_when_it_is():

@@ -71,7 +71,7 @@ def test_the_end_of_a_slide_is_an_empty_last_vector():
     assert (vector.last, vector.names, vector.skipped, vector.window_s) == (True, (), 3, 0.0)
 
 
-def test_the_fingerprint_says_what_the_values_mean():
+def test_the_fingerprint_depends_on_what_the_values_mean():
     feature_set = FeatureSet.from_mapping(RECIPE)
     fingerprint = feature_set.extract(cut()).feature_set
     assert fingerprint.endswith(' signal=1000Hz*1 signal_static=60Hz*2')
@@ -125,7 +125,7 @@ def test_a_file_that_is_no_recipe_gets_one_sentence(tmp_path, text):
     assert '\n' not in str(caught.value)
 
 
-def test_one_input_is_described_twice_with_features_of_their_own() -> None:
+def test_one_input_is_described_twice_with_separate_features() -> None:
     recipe = {
         'inputs': {
             'signal': {'features': ['mean_log_bands']},

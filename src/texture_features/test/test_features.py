@@ -62,7 +62,7 @@ def test_any_finite_window_gives_finite_values(name, samples):
     assert np.isfinite(FEATURES[name]()(windows(samples))).all()
 
 
-# How the values of a signal follow from those of one 1000 times as weak; the rest says nothing of the kind.
+# How the values of a signal follow from those of one 1000 times as weak; the rest does not follow such a rule.
 SAME, TIMES, SHIFTED = 'the same', 'times 1000', 'plus log 1000 squared'
 SCALING = {
     'log_bands': SHIFTED,
@@ -234,7 +234,7 @@ def test_white_noise_has_the_exponent_zero_and_its_sum_two(coefficients, exponen
 
 
 @pytest.mark.parametrize('speed_m_s', SPEEDS)
-def test_spatial_variation_of_a_wave_is_that_of_places_apart_at_any_speed(speed_m_s) -> None:
+def test_spatial_variation_of_a_wave_is_that_of_places_at_a_distance_at_any_speed(speed_m_s) -> None:
     # The mean square of h·(sin(φ + δ) - sin φ) is h²·(1 - cos δ).
     expected = np.log(3.0**2 * (1 - np.cos(2 * np.pi * 0.25)))
     feature = SpatialVariation(lag_m=2.5e-4, points=512)
@@ -274,7 +274,7 @@ PLACES_M = np.array([0.0, 1e-3, 5e-3, 9e-3])
 
 
 def slide(speed_m_s, distance_m=0.05, places_m=PLACES_M, surface=None):
-    """Slide an array of taxels over a surface: each measures the height at its own place."""
+    """Slide an array of taxels over a surface: each measures the height at its place."""
     along = np.arange(round(distance_m / speed_m_s * SPATIAL_RATE_HZ)) / SPATIAL_RATE_HZ * speed_m_s
     surface = surface or (lambda x: np.sin(2 * np.pi * x / PITCH_M))
     return surface(along[:, None] + places_m)
@@ -330,9 +330,9 @@ def test_shape_has_its_closed_forms():
 
 
 def test_shares_keep_the_sign_and_leave_the_noise_of_free_taxels_out():
-    shares = FEATURES['log_shares']()
+    fractions = FEATURES['log_shares']()
     calm, noisy = (
-        shares(WindowBatch(np.tile([60.0, -40.0, free], (20, 1)), SPATIAL_RATE_HZ))[:, 0] for free in (0.1, -0.1)
+        fractions(WindowBatch(np.tile([60.0, -40.0, free], (20, 1)), SPATIAL_RATE_HZ))[:, 0] for free in (0.1, -0.1)
     )
     np.testing.assert_allclose(calm - calm[2], [np.log(60 / 1.001), -np.log(40 / 1.001), 0.0], rtol=0.01)
     np.testing.assert_allclose(calm, noisy, atol=0.01)

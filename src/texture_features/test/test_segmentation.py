@@ -87,7 +87,7 @@ def test_a_wrong_shape_gets_one_sentence():
 
 
 def spans(states):
-    """Return (start, end) of each slide that states tell, s from the beginning."""
+    """Return (start, end) of each slide by its states, s from the beginning."""
     begun, ended = {}, {}
     for state in states:
         at_s = (state.stamp_ns - START_NS) / NANOSECONDS
@@ -98,7 +98,7 @@ def spans(states):
     return [(begun[name], ended[name]) for name in begun]
 
 
-def test_slides_of_a_recording_are_told_with_their_starts_and_ends():
+def test_slides_of_a_recording_are_found_with_their_starts_and_ends():
     slides = ((1.0, 2.5), (4.0, 5.0))
     states = segment_recording(batches(recording(slides, 6.5), RATE_HZ), SegmentationParams())
     np.testing.assert_allclose(spans(states), slides, atol=0.06)
@@ -106,7 +106,7 @@ def test_slides_of_a_recording_are_told_with_their_starts_and_ends():
     np.testing.assert_allclose(guaranteed_s, [end - start for start, end in spans(states)], atol=1e-8)
 
 
-def test_a_sensor_that_restarts_and_one_that_says_nothing_are_survived():
+def test_a_sensor_that_restarts_and_one_that_is_silent_are_survived():
     assert segment_recording([], SegmentationParams()) == []
     fast = recording()
     again = batches(fast, RATE_HZ, START_NS + 10 * NANOSECONDS)

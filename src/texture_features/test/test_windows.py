@@ -37,7 +37,7 @@ def state(at_s, phase=Phase.SLIDE, steady_s=0.0, name='e1', **others):
 
 
 def stream(duration_s, rate_hz=1000.0, batch=5, begin_s=0.0, columns=1):
-    """Return batches whose samples are their own running index."""
+    """Return batches whose samples are their running index."""
     total = round(duration_s * rate_hz)
     rows = np.repeat(np.arange(total, dtype=np.float32)[:, None], columns, axis=1)
     channels = tuple(f'c{column}' for column in range(columns))
@@ -153,12 +153,12 @@ def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
 @pytest.mark.parametrize(('begin_s', 'windows'), [(3599.0, 6), (0.0, 6), (7200.0, 0)])
 def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, monkeypatch):
     """Whoever promises an hour for each of thousands of slides shall not make anybody count to 36 000 for each."""
-    asked = []
+    calls = []
     window = SlideCoverage.window
-    monkeypatch.setattr(SlideCoverage, 'window', lambda slide: asked.append(1) or window(slide))
+    monkeypatch.setattr(SlideCoverage, 'window', lambda slide: calls.append(1) or window(slide))
     *cut, end = run({'signal': stream(1.0, begin_s=begin_s)}, [state(0.0, steady_s=3600.0)])
     assert (len(cut), end.skipped) == (windows, 35_996 - windows)
-    assert len(asked) < 50
+    assert len(calls) < 50
 
 
 def test_speed_and_force_are_means_over_the_window():
@@ -256,7 +256,7 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
     assert as_data(events + cutter.finish()) == expected
 
 
-def test_a_finger_that_drops_out_beside_another_is_named_and_two_silent_ones_are_not() -> None:
+def test_a_finger_that_drops_out_next_to_another_is_named_and_two_silent_ones_are_not() -> None:
     fingers = ('finger0/signal', 'finger1/signal')
     cutter = WindowCutter(PARAMS, fingers)
     batches = stream(2.0, batch=500)
@@ -381,7 +381,7 @@ RECIPE = {'windows': {'length_s': 0.5, 'hop_s': 0.5}, 'inputs': {'signal': {'fea
 
 
 def states(tangential_n, seconds=1.0):
-    """Slide under 2 N; each state says how much the surface drags at its time."""
+    """Slide under 2 N; each state holds the drag of the surface at its time."""
     for number in range(round(seconds * 1e9 / STEP_NS)):
         stamp_ns = number * STEP_NS
         yield ExplorationState(
@@ -414,7 +414,7 @@ def test_the_feature_is_the_coefficient_of_coulomb_friction_at_any_stretch(coeff
     assert friction_of(lambda _time_s: 2.0 * coefficient, stretch_to_m_s) == pytest.approx([coefficient] * 2)
 
 
-def test_each_window_has_the_mean_of_its_own_time():
+def test_each_window_has_the_mean_of_its_time():
     assert friction_of(lambda time_s: 0.4 if time_s < 0.4999 else 1.0) == pytest.approx([0.2, 0.5])
 
 

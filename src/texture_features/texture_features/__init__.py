@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Windows of a tactile signal and the features that describe them.
 
-Data in: `TactileSignal`s of any rate and number of channels, and `ExplorationState`s, which say when the finger slides.
+Data in: `TactileSignal`s of any rate and number of channels, and `ExplorationState`s with the times of sliding.
 Data out: a `FeatureVector` per window, with names such as `signal/log_bands/12/dynamic` (input, feature, value,
 channel). The node and the offline functions give the same numbers to the last bit.
 
@@ -16,5 +16,5 @@ vectors = features.extract_many(cut_recording({'signal': batches}, states, featu
 
 With ROS: `ros2 run texture_features feature_extractor --ros-args -p recipe:=default`
 
-Limits: signals and states may arrive at most 10 s apart.
+Limits: signals and states may arrive with a difference of at most 10 s.
 """

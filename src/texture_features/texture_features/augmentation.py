@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of training windows under computed disturbances, so that a model knows what lies beside its training."""
+"""Copies of training windows under computed disturbances, so that a model covers what lies next to its training."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class SlideWindows:
         return self.samples.std(axis=(0, 1))
 
 
-# Takes the windows of one input, a strength, of which each disturbance says the unit, and the source of all that is
+# Takes the windows of one input, a strength, of which each disturbance defines the unit, and the source of all that is
 # random; returns the samples (n_windows, n_samples, n_channels) as the disturbance would change them.
 Disturbance = Callable[[SlideWindows, float, np.random.Generator], Array]
 
@@ -125,7 +125,7 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
 
 @lru_cache(maxsize=RATIO_LIMIT)
 def _resampling_filter(rate: int) -> Array:
-    """Return the low-pass that `resample_poly` makes anew at each call, which takes as long as the rest of the call."""
+    """Return the low-pass that `resample_poly` designs at each call, which takes as long as the rest of the call."""
     return firwin(20 * rate + 1, 1.0 / rate, window=('kaiser', 5.0))
 
 
@@ -339,8 +339,8 @@ class Augmenter:
 
     def _gain_response(self, window: CutWindow) -> Array:
         topic = self._features.window_names[0]
-        own = window.windows[topic]
-        louder = {**window.windows, topic: dataclasses.replace(own, samples=GAIN_STEP * own.samples)}
+        stretch = window.windows[topic]
+        louder = {**window.windows, topic: dataclasses.replace(stretch, samples=GAIN_STEP * stretch.samples)}
         both = self._features.extract_many([window, dataclasses.replace(window, windows=louder)])
         return (both[1].values - both[0].values) / math.log(GAIN_STEP)
 

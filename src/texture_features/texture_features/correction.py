@@ -25,8 +25,8 @@ from texture_features.windows import WindowBatch
 BANDS = 48
 SEGMENT_S = 0.25  # of a spectrum: resolves 4 Hz
 MIN_SEGMENTS = 8  # of a slide: fewer leave the spectrum uncertain by more than 1 dB
-SATURATED_SHARE = 0.01  # samples of a channel at its lowest or highest value
-DISTINCT = 100  # a channel with fewer values is too coarse to tell
+SATURATED_FRACTION = 0.01  # samples of a channel at its lowest or highest value
+DISTINCT = 100  # a channel with fewer values is too coarse
 SIGNAL_TO_REST = 2.0  # least rms of the slide over that at rest
 FLOOR = 1e-12
 
@@ -54,10 +54,10 @@ class InputStatistics:
             )
         for column in samples.T:
             values, counts = np.unique(column, return_counts=True)
-            share = max(counts[0], counts[-1]) / len(column)
-            if len(values) >= DISTINCT and share > SATURATED_SHARE:
+            fraction = max(counts[0], counts[-1]) / len(column)
+            if len(values) >= DISTINCT and fraction > SATURATED_FRACTION:
                 raise InvalidData(
-                    f'{100 * share:.0f} % of the samples of the reference slide are at the end of the range: the '
+                    f'{100 * fraction:.0f} % of the samples of the reference slide are at the end of the range: the '
                     'sensor is saturated; press less, or lower its gain'
                 )
         rms = samples.std(axis=0)
@@ -73,9 +73,9 @@ class InputStatistics:
                 'too little signal; see that the finger touches the plate, or slide faster or harder'
             )
         starts = np.arange(0, len(samples) - length + 1, length // 2)
-        pieces = np.stack([samples[start : start + length] for start in starts])
-        pieces = (pieces - pieces.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]
-        power = np.mean(np.abs(np.fft.rfft(pieces, axis=1)) ** 2, axis=0) / length / rate_hz
+        segments = np.stack([samples[start : start + length] for start in starts])
+        segments = (segments - segments.mean(axis=1, keepdims=True)) * np.hanning(length)[:, None]
+        power = np.mean(np.abs(np.fft.rfft(segments, axis=1)) ** 2, axis=0) / length / rate_hz
         edges = np.linspace(1, len(power), min(BANDS, len(power) - 1) + 1).astype(int)  # without the mean
         bands = np.add.reduceat(power, edges[:-1], axis=0) / np.diff(edges)[:, None]
         return cls(sensor, rate_hz, tuple(channels), np.log(bands + FLOOR), rms, rest_rms, rest_level)
@@ -194,7 +194,7 @@ class Correction:
 
     @property
     def fingerprint(self) -> str:
-        """What tells it from other corrections."""
+        """Identifies it among other corrections."""
         return hashlib.sha256(json.dumps(self.as_mapping(), sort_keys=True).encode()).hexdigest()[:8]
 
     def as_mapping(self) -> dict[str, Any]:
@@ -233,7 +233,7 @@ class Correction:
 
 
 # --------------------
-# The files beside a model: what the finger of the training showed, and by what another one is corrected.
+# The files next to a model: what the finger of the training showed, and by what another one is corrected.
 
 CORRECTION, REFERENCE = 'correction', 'reference'
 SLIDE_NUMBERS = ('speed_m_s', 'force_n', 'distance_m', 'direction_rad')  # by which a slide over the plate is repeated
@@ -242,7 +242,7 @@ MOST_DB = 60.0  # of a response that can be taken out
 CORRECTED = ' corrected='  # before the fingerprint of a correction, in that of features
 
 
-def file_beside(model: str | Path, kind: str) -> Path:
+def file_next_to(model: str | Path, kind: str) -> Path:
     """Return the path NAME.reference.json or NAME.correction.json of a model, by the path of any of its files."""
     path = Path(model)
     name = path.name.removesuffix('.npz').removesuffix('.json')
@@ -250,8 +250,8 @@ def file_beside(model: str | Path, kind: str) -> Path:
 
 
 def read_correction(model: str | Path) -> Correction | None:
-    """Return the correction beside a model; None if there is none."""
-    path = file_beside(model, CORRECTION)
+    """Return the correction next to a model; None if there is none."""
+    path = file_next_to(model, CORRECTION)
     if not path.exists():
         return None
     try:
@@ -275,7 +275,7 @@ def read_correction(model: str | Path) -> Correction | None:
 
 def write_reference(model: str | Path, inputs: Mapping[str, InputStatistics], slide: Mapping[str, float]) -> Path:
     """Store what the finger of the training showed on the plate, by topic, and how it slid; return the path."""
-    path = file_beside(model, REFERENCE)
+    path = file_next_to(model, REFERENCE)
     write_json({'slide': dict(slide), 'inputs': {topic: one.as_mapping() for topic, one in inputs.items()}}, path)
     return path
 
@@ -285,7 +285,7 @@ def read_reference(model: str | Path) -> tuple[dict[str, InputStatistics], dict[
 
     The numbers are those of the request that repeats the slide; none if it was not straight.
     """
-    path = file_beside(model, REFERENCE)
+    path = file_next_to(model, REFERENCE)
     if not path.exists():
         raise ModelMismatch(
             f"no reference is stored: '{path}' does not exist; slide over the reference plate with the finger that the "

@@ -110,7 +110,7 @@ def read_recipe(
 ) -> tuple[str, Mapping[str, Any]]:
     """Return name and content of a recipe (YAML) that texture_estimation ships, or of any file.
 
-    A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card beside it.
+    A model's card (JSON) holds its recipe under `recipe`; a model (.npz) has the card next to it.
     """
     path = find_file(name_or_path, 'texture_estimation', subfolder, kind)
     if path.suffix == '.npz':
@@ -167,7 +167,7 @@ class InputFeatures:
 
 @dataclass(frozen=True)
 class InputOptions:
-    """What an input of a recipe may say besides its features."""
+    """What an input of a recipe may define in addition to its features."""
 
     stretch_to_m_s: float = param(
         0.0, 'Speed to which windows are resampled before feature extraction; 0: no resampling.', unit='m/s', low=0.0
@@ -200,7 +200,7 @@ class FeatureSet:
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
-        """Read the feature set of a recipe (YAML), or of a model's card (JSON) with the correction beside it.
+        """Read the feature set of a recipe (YAML), or of a model's card (JSON) with the correction next to it.
 
         Raises
         ------
@@ -318,7 +318,7 @@ class FeatureSet:
         return self._names_and_fingerprint(layout)[1]
 
     def _kind(self, event: WindowEvent) -> tuple[Any, ...]:
-        """Return what events must share to be described together; () for the end of a slide."""
+        """Return the layout that events described together have in common; () for the end of a slide."""
         if isinstance(event, SlideEnd):
             return ()
         return tuple(
@@ -419,7 +419,7 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
 
 
 def _prepared(feature: Feature, options: InputOptions) -> Feature:
-    """Return the feature of the input as the options change it; what tells of the motion itself stays as it is."""
+    """Return the feature of the input as the options change it; features of the motion itself stay as they are."""
     if not options.stretch_to_m_s or isinstance(feature, MOTION_FEATURES):
         return feature
     return Stretched(feature, options.stretch_to_m_s)
@@ -450,7 +450,7 @@ def _parameters(feature: Feature) -> dict[str, Any]:
 
 
 # --------------------
-# Say in which part two fingerprints of feature sets differ.
+# Report in which part two fingerprints of feature sets differ.
 
 PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
 
@@ -470,10 +470,10 @@ def fingerprint_difference(came: str, trained: str) -> str:
             return f"'{topic}' has {channels} channels, the model was trained on {trained_channels}"
     if came.partition(CORRECTED)[0] == trained.partition(CORRECTED)[0]:
         return (
-            'the correction of the finger is another; start the feature_extractor and the classifier again, both with '
+            'the correction of the finger differs; start the feature_extractor and the classifier again, both with '
             "the model's card"
         )
-    return "features or window length are others; start the feature_extractor with the model's card as its recipe"
+    return "features or window length differ; start the feature_extractor with the model's card as its recipe"
 
 
 def _inputs(fingerprint: str) -> dict[str, tuple[str, str]]:
@@ -488,9 +488,9 @@ def _listed(inputs: dict[str, tuple[str, str]]) -> str:
 # How one exploration was made: motion, sensor, and the speed, force, directions and signal level of its windows.
 
 DIRECTION_DIGITS = 2  # so that a slide has few directions, however long it is
-# In the name of the feature that tells the level of a channel, 'signal/moments/signal_log_power/dynamic'.
+# In the name of the feature that holds the level of a channel, 'signal/moments/signal_log_power/dynamic'.
 LOG_POWER = '/moments/signal_log_power/'
-LOAD = '/load_level'  # ends the name of the feature that tells the level of a whole array
+LOAD = '/load_level'  # ends the name of the feature that holds the level of a whole array
 
 
 # Of a channel, such as 'signal/dynamic', over a slide: geometric mean of the root mean square of its windows, in the

@@ -23,7 +23,7 @@ LEAST_S = 0.15  # a shorter slide is none
 MAX_GAP_S = 0.06  # below the threshold, and still part of one slide; from the touch to the slide it takes longer
 # The quietest tenth of the means of 55 ms, of which half are at rest, ends at 0.8 of the mean of rest.
 REST_QUANTILE, REST_OVER_QUANTILE = 0.1, 1.25
-MIN_REST = 1e-9  # share of the largest power: samples that do not change at all are no measure of the noise
+MIN_REST = 1e-9  # fraction of the largest power: samples that do not change at all are no measure of the noise
 WHOLE_S = 1e6  # so that a recording is kept as a whole
 MOTION = 'detected'
 
@@ -99,7 +99,7 @@ def find_sliding(
             runs[-1][1] = last
         else:
             runs.append([first, last])
-    # What goes on before the first sample or after the last one has no ramp there.
+    # Sliding that continues before the first sample or after the last one has no ramp there.
     found = [
         (
             first * cell_s + (params.ramp_s if first else 0.0),

@@ -128,10 +128,10 @@ class Feature(Protocol):
     """Frozen parameters of a feature; called with windows it gives its values.
 
     A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
-    and has `per_channel` False. One that can join several inputs, found in `windows.joined`, says so by a class
+    and has `per_channel` False. One that can join several inputs, found in `windows.joined`, declares it by a class
     variable `joins` that is True; it has `per_channel` False. So has one of pairs of channels, which gives
-    (..., n_pairs, n_names) in the order of itertools.combinations and says so by a class variable `per_pair` that is
-    True.
+    (..., n_pairs, n_names) in the order of itertools.combinations and declares it by a class variable `per_pair` that
+    is True.
     """
 
     per_channel: ClassVar[bool] = True  # whether there are values for each channel
@@ -393,7 +393,7 @@ class BufferedStream:
 Interval = tuple[float, float]
 UNKNOWN: Interval = (math.nan, math.nan)
 
-# Two slide states at most so far apart cover the time between them.
+# Largest difference of two slide states that cover the time between them.
 LINK_NS = NANOSECONDS // 2
 # No guarantee holds for longer: a wrong one must not make millions of windows.
 MAX_STEADY_S = 3600.0
@@ -416,13 +416,13 @@ class CoveredSpan:
 
 
 class SlideCoverage:
-    """The covered time of consecutive `slide` states, handed out window by window.
+    """The covered time of consecutive `slide` states, given window by window.
 
     After a state without guarantee, though others had one, the time up to the next state is not covered: the finger has
-    lost the surface, turns, or does not slide as asked. If its force or speed is far from that of the slide so far,
-    what is left of the guarantee is not covered either; windows that were already handed out are not taken back.
+    lost the surface, turns, or does not slide as commanded. If its force or speed is far from that of the slide so far,
+    what is left of the guarantee is not covered either; windows that were already given are kept.
 
-    All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
+    Its output depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.
     """
 
@@ -482,7 +482,7 @@ class SlideCoverage:
             self._intervals.popleft()
 
     def advance(self, count: int = 1) -> int:
-        """Go on by so many windows, but not beyond the covered stretch of the present one; return by how many."""
+        """Advance by this many windows, but not beyond the covered stretch of the present one; return by how many."""
         left = (self._intervals[0][1] - self._length_ns - self._next_ns) // self._hop_ns + 1
         count = min(count, left)
         self._next_ns += count * self._hop_ns
@@ -540,7 +540,7 @@ class RunningMean:
         self._count = 0
 
     def update(self, value: float) -> None:
-        """Add a value; one that is not finite says nothing."""
+        """Add a value; one that is not finite is ignored."""
         if math.isfinite(value):
             self._sum += value
             self._count += 1
@@ -629,7 +629,7 @@ class _Missing(enum.Enum):
 class WindowCutter:
     """Turn signal batches and exploration states into windows, in whatever order they arrive.
 
-    What is cut depends on the data alone, as long as signals and states arrive at most `keep_s` apart.
+    What is cut depends on the data alone, as long as signals and states arrive with a difference of at most `keep_s`.
     """
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
@@ -699,7 +699,7 @@ class WindowCutter:
 
     @property
     def waiting_for(self) -> tuple[str, ...]:
-        """Inputs of which nothing has come yet."""
+        """Inputs without any message yet."""
         return tuple(topic for topic, source in self._inputs.items() if not source.buffers)
 
     def dropped(self, now_s: float) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from texture_papers.protocol import (
     MethodResult,
     PaperProtocol,
     RecognitionTask,
-    apart,
+    difference,
     digest_of,
     digest_of_row,
     drawn,
@@ -37,8 +37,8 @@ from texture_papers.protocol import (
     over_seeds,
     recipe_of,
     reduced,
-    share,
     training_in,
+    wilson,
     with_seeds,
 )
 from texture_papers.report import at_least, higher, lower_in, most_errors, seldom
@@ -65,7 +65,7 @@ def outcome(decided: list[int] | np.ndarray) -> MethodResult:
 
 @pytest.mark.benchmark
 @pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=PROTOCOLS)
-def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(
+def test_each_experiment_runs_and_shows_the_papers_figures_next_to_its_figures(
     protocol: PaperProtocol, tmp_path: Path
 ) -> None:
     result, path = run_experiment(protocol.name, Experiment(tmp_path, quick=True))
@@ -88,10 +88,10 @@ def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(
 def few_show_the_direction_of_what_is_large(name: str, findings: list[dict[str, Any]]) -> int:
     """Assert that what is large in the stored experiment has its sign in these findings; return how many are large."""
     stored = {one['claim']: one.get('over_seeds', one['interval']) for one in STORED[name]['findings']}
-    large, border = 0, LARGE_GRADES if name == 'roughness' else LARGE
+    large, limit = 0, LARGE_GRADES if name == 'roughness' else LARGE
     for finding in findings:
         value, low, high = stored[finding['claim']]
-        if min(abs(low), abs(high)) > border and low * high > 0:
+        if min(abs(low), abs(high)) > limit and low * high > 0:
             assert finding['interval'][0] * value > 0, finding['claim']
             large += 1
     return large
@@ -127,11 +127,11 @@ def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_
     run_experiment('ets-linear', Experiment(tmp_path, seed=1, quick=True, tune=True))
     assert (tmp_path / 'searches.jsonl').read_text() == searches  # what is done is not searched again
     late = Experiment(tmp_path, seed=2, quick=True, tune=True)
-    with pytest.raises(TextureError, match='12 of 12 searches are left; the same command goes on'):
+    with pytest.raises(TextureError, match='12 of 12 searches are left; the same command continues'):
         run_searches('ets-linear', late, until_s=0.0)
 
 
-def test_two_directions_are_joined_into_one_vector_with_components_of_their_own() -> None:
+def test_two_directions_are_joined_into_one_vector_with_separate_components() -> None:
     protocol = PROTOCOLS['hu']
     task = reduced(protocol.tasks[0], 4)
     slides = gather(load_scene(protocol.scene), (), task.visits, 0, slow=False)
@@ -142,15 +142,15 @@ def test_two_directions_are_joined_into_one_vector_with_components_of_their_own(
     halves_of = [slides.extract(recipe.feature_set, task.methods[place].views)[0] for place, recipe in
                  ((1, x_only), (2, y_only))]  # fmt: skip
     np.testing.assert_array_equal(values, np.concatenate(halves_of, axis=1))
-    kept = [recipe.learner.fit(own, slides.codes, owner).parameters['components'].shape[1]
-            for recipe, own in ((both, values), (x_only, halves_of[0]), (y_only, halves_of[1]))]  # fmt: skip
+    kept = [recipe.learner.fit(columns, slides.codes, owner).parameters['components'].shape[1]
+            for recipe, columns in ((both, values), (x_only, halves_of[0]), (y_only, halves_of[1]))]  # fmt: skip
     assert kept[0] == kept[1] + kept[2]  # the paper: 39 and 39 make 78
 
 
 def test_every_paper_figure_is_a_share() -> None:
     methods = [method for paper in PROTOCOLS.values() for task in paper.tasks for method in task.methods]
-    shares = [value for one in methods for value in (one.paper.learning, one.paper.test, one.paper.unclassified)]
-    assert all(0 <= value <= 1 for value in shares if value is not None)
+    fractions = [value for one in methods for value in (one.paper.learning, one.paper.test, one.paper.unclassified)]
+    assert all(0 <= value <= 1 for value in fractions if value is not None)
 
 
 def test_divisions_keep_to_the_papers_split() -> None:
@@ -174,7 +174,7 @@ def test_figures_of_a_known_outcome() -> None:
     assert one.taken_for('cork', 'felt').sum() == 2
 
 
-def test_a_claim_holds_only_if_the_interval_says_so() -> None:
+def test_a_claim_holds_only_if_the_interval_supports_it() -> None:
     good, bad = outcome(CODES), outcome(np.where(np.arange(60) % 3 == 0, (CODES + 1) % 3, CODES))
     assert higher('', good, bad).holds is True
     assert higher('', bad, good).holds is False
@@ -191,15 +191,15 @@ def test_a_claim_holds_only_if_the_interval_says_so() -> None:
 
 
 def test_intervals_are_those_of_the_textbook() -> None:
-    wilson = share(np.r_[np.ones(8), np.zeros(2)])  # 8 of 10: 0.490 to 0.943
-    assert (wilson.low, wilson.high) == (pytest.approx(0.490, abs=1e-3), pytest.approx(0.943, abs=1e-3))
+    eight = wilson(np.r_[np.ones(8), np.zeros(2)])  # 8 of 10: 0.490 to 0.943
+    assert (eight.low, eight.high) == (pytest.approx(0.490, abs=1e-3), pytest.approx(0.943, abs=1e-3))
     values = np.array([1.0, 2.0, 3.0, 4.0])
     assert mean(values).high - 2.5 == pytest.approx(1.96 * values.std(ddof=1) / 2, rel=1e-3)
-    assert apart(values, values).value == 0
+    assert difference(values, values).value == 0
 
 
 @pytest.mark.parametrize('protocol', PROTOCOLS.values(), ids=PROTOCOLS)
-def test_what_has_no_label_of_its_own_is_the_released_recipe_word_for_word(protocol: PaperProtocol) -> None:
+def test_what_has_no_separate_label_is_the_recipe_as_released(protocol: PaperProtocol) -> None:
     named = [method for task in protocol.tasks for method in task.methods if not method.label]
     for method in named:
         released = load_recipe(method.recipe)
@@ -264,7 +264,7 @@ def test_each_figure_has_its_mean_over_seeds_and_a_finding_is_decided_by_it() ->
 
 
 def test_seeds_are_no_draws_of_textures_so_that_few_textures_decide() -> None:
-    by_texture = {'cork': 0.5, 'felt': -0.1, 'linen': 0.1}  # the same in all seeds: seeds alone would be sure
+    by_texture = {'cork': 0.5, 'felt': -0.1, 'linen': 0.1}  # the same in all seeds: seeds alone would be certain
     runs = [numbers(seed, 0.8, 0.1667, by_texture=by_texture) for seed in range(5)]
     [finding] = with_seeds(runs[0], runs[1:])['findings']
     assert finding['over_seeds'] == pytest.approx([0.1667, 0.1667 - 0.759, 0.1667 + 0.759], abs=2e-3)  # t of 2 degrees
@@ -331,7 +331,7 @@ def test_a_verdict_follows_from_the_interval_over_seeds_or_over_textures(name: s
 
 
 def guessed(protocol: PaperProtocol) -> dict[tuple[str, str], MethodResult]:
-    """Return results of each method in each task by which every slide is taken for any surface."""
+    """Return results of each method in each task by which every slide gets any surface as its label."""
     rng = np.random.default_rng(0)
     results = {}
     for task in protocol.tasks:
@@ -350,15 +350,15 @@ ANCHORED = {name: one for name, one in PROTOCOLS.items() if one.anchor}
 
 @pytest.mark.parametrize('protocol', ANCHORED.values(), ids=ANCHORED)
 def test_the_figure_that_set_a_scene_is_no_finding(protocol: PaperProtocol, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[tuple[MethodResult, float]] = []
+    calls: list[tuple[MethodResult, float]] = []
 
-    def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
-        asked.append((outcome, border))
-        return report.at_least(claim, outcome, border)
+    def at_least(claim: str, outcome: MethodResult, limit: float) -> Finding:
+        calls.append((outcome, limit))
+        return report.at_least(claim, outcome, limit)
 
     module = importlib.import_module(protocol.findings.__module__)
     monkeypatch.setattr(module, 'at_least', at_least, raising=False)
     results, anchor = guessed(protocol), protocol.anchor
     assert protocol.findings(results)
     anchored = results.get((anchor.task, anchor.method))
-    assert not [border for outcome, border in asked if outcome is anchored and border == anchor.test]
+    assert not [limit for outcome, limit in calls if outcome is anchored and limit == anchor.test]

@@ -28,7 +28,7 @@ from texture_papers.kaboli import (
 )
 from texture_papers.roberge import Network, SvmPairs, fit_network, pairs_won
 
-# What the papers add: the shared checks hold for it, too.
+# What the papers add: the shared checks also hold for it.
 PAPERS = (
     *(f'texture_papers.roberge:{name}' for name in ('AnnPairs', 'SvmPairs', 'TunedPairs')),
     *(f'texture_papers.kaboli:{name}' for name in ('SvmLinear', 'PassiveAggressive', 'EmMixture')),
@@ -276,20 +276,20 @@ def test_principal_components_are_orthonormal_and_explain_what_they_should(shape
     assert explained.sum() >= 0.95 > explained[:-1].sum()
 
 
-def test_components_of_examples_less_their_own_means_are_those_of_eq_7():
+def test_components_of_examples_less_their_means_are_those_of_eq_7():
     values = np.random.default_rng(0).normal(size=(40, 6)) + np.arange(6.0) + np.arange(40.0)[:, None]
     codes = np.repeat([0, 1], 20)
     parameters = SvmMaxWins(variance=0.9).fit(values, codes, np.arange(40)).parameters
     centred = values - values.mean(axis=1, keepdims=True)  # eq. 7: the mean over k of x_i(k)
     variances, vectors = np.linalg.eigh(centred.T @ centred / 40)  # eq. 8
-    shares = np.cumsum(variances[::-1]) / variances.sum()  # eq. 10
-    count = int((shares < 0.9).sum()) + 1
+    fractions = np.cumsum(variances[::-1]) / variances.sum()  # eq. 10
+    count = int((fractions < 0.9).sum()) + 1
     assert parameters['components'].shape == (6, count)
     projected = values @ parameters['components']
     np.testing.assert_allclose(np.abs(projected), np.abs(centred @ vectors[:, ::-1][:, :count]), atol=1e-9)
 
 
-def test_two_directions_have_components_of_their_own_and_odd_features_are_refused(examples):
+def test_two_directions_have_separate_components_and_odd_features_are_refused(examples):
     codes, groups = codes_of(examples)
     components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parameters['components']
     assert SvmMaxWins(components=2, blocks=2).fit(examples.values, codes, groups).parameters['components'].shape == (

@@ -94,16 +94,16 @@ def test_the_search_writes_recipes_that_can_be_trained_and_grades_unseen_texture
     assert 0.01 <= recipe.regressor.c <= 10.0
 
 
-def test_a_missing_grade_is_counted_apart_and_each_texture_is_one_opinion() -> None:
+def test_a_missing_grade_is_counted_separately_and_each_texture_is_one_sample() -> None:
     nan = np.nan
-    said = Answers(
+    answers = Answers(
         np.array([1.0, 2.0, nan, 5.0]), np.full(4, 0.5), np.array([1.0, 1.0, 4.0, 4.0]), ['a', 'a', 'b', 'b']
     )
-    figures = said.figures()
+    figures = answers.figures()
     assert figures['error'] == pytest.approx(2.0 / 3.0)
     assert figures['without_grade'] == 0.25
     assert figures['error_none_as_0'] == pytest.approx((0.0 + 1.0 + 4.0 + 1.0) / 4.0)
-    assert said.error_by_texture() == {'a': 0.5, 'b': 1.0}
+    assert answers.error_by_texture() == {'a': 0.5, 'b': 1.0}
     assert figures['error_of_the_mean'] == pytest.approx(0.25)
-    alone = dataclasses.replace(said, textures=['a'] * 4)
+    alone = dataclasses.replace(answers, textures=['a'] * 4)
     assert alone.figures()['error_of_the_mean'] is None

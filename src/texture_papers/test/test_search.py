@@ -107,12 +107,12 @@ def test_the_same_seed_finds_the_same_and_its_scores_are_those_of_training() -> 
     assert first == second
     recipe = varied(base, first.individual)
     values, codes = scans.values(recipe), np.unique(scans.labels, return_inverse=True)[1]
-    shares = []
+    fractions = []
     for half in random_halves(scans.labels, SMALL.halves, SMALL.seed):
         fitted = recipe.learner.fit(values[half], codes[half], np.arange(half.sum()))
         right = recipe.learner.predictor(fitted.parameters)(values).argmax(axis=1) == codes
-        shares.append((right[half].mean(), right[~half].mean()))
-    assert (first.learning, first.test) == pytest.approx(tuple(np.mean(shares, axis=0)), abs=1e-4)
+        fractions.append((right[half].mean(), right[~half].mean()))
+    assert (first.learning, first.test) == pytest.approx(tuple(np.mean(fractions, axis=0)), abs=1e-4)
 
 
 @pytest.mark.parametrize(('box', 'scale'), [(1.0, 3.0), (10.0, 0.5), (0.01, 100.0)])
@@ -125,7 +125,7 @@ def test_the_machine_of_a_search_decides_as_the_learner_does(box: float, scale: 
     np.testing.assert_allclose(decisions_of_pair(learner, values, codes, rows), exact, atol=5e-3)  # libsvm's tolerance
 
 
-def test_each_pair_of_textures_gets_variables_and_a_machine_of_its_own(tmp_path: Path) -> None:
+def test_each_pair_of_textures_gets_separate_variables_and_a_separate_machine(tmp_path: Path) -> None:
     scans, base = tones(noise=0.5), load_recipe('ets-linear-svm')
     names = np.unique(scans.labels).tolist()
     found = {pair: search(base, scans.of(np.isin(scans.labels, pair)), SMALL) for pair in combinations(names, 2)}

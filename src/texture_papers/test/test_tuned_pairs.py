@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""One model in which each pair of textures has features and a learner of its own."""
+"""One model in which each pair of textures has separate features and a separate learner."""
 
 import dataclasses
 from itertools import combinations
@@ -49,7 +49,7 @@ def numbers(examples):
     return tuple(np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
 
 
-def test_each_pair_is_decided_by_its_own_learner_on_its_own_features_alone(tuned, examples, numbers, make_examples):
+def test_each_pair_is_decided_by_its_learner_on_its_features_alone(tuned, examples, numbers, make_examples):
     codes, groups = numbers
     fresh = make_examples(seed=3).values
     decisions = tuned.predictor(tuned.fit(examples.values, codes, groups).parameters).decisions(fresh)
@@ -91,7 +91,7 @@ def test_a_model_of_pairs_is_stored_and_loads_with_all_its_variables(recipe, exa
     loaded = load_model(model.save(tmp_path / 'm'))
     np.testing.assert_array_equal(loaded.predict_log_proba(named.values), model.predict_log_proba(named.values))
     assert loaded.recipe.as_mapping() == recipe.as_mapping()
-    assert '3 of 6 pairs have variables of their own' in loaded.training['calibration']
+    assert '3 of 6 pairs have separate variables' in loaded.training['calibration']
     broken = {**model.parameters, 'n_pairs': 10}
     with pytest.raises(ModelMismatch, match='10 pairs are decided by 6 learners'):
         TunedPairs.predictor(broken)

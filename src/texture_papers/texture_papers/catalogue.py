@@ -87,9 +87,9 @@ SEARCHES = 'searches.jsonl'
 def run_searches(
     name: str, experiment: Experiment, count: int = 1, jobs: int = 1, until_s: float = math.inf
 ) -> Experiment:
-    """Search the variables of all pairs for so many seeds; return the experiment with what was found.
+    """Search the variables of all pairs for this many seeds; return the experiment with what was found.
 
-    Each search is a line of a file in the folder of the results, written when it is done: another call goes on there.
+    Each search is a line of a file in the folder of the results, written when it is done: another call continues there.
     """
     if not experiment.tune or name not in TUNED:
         return experiment
@@ -114,7 +114,7 @@ def run_searches(
                     file.write(json.dumps({'search': str(one), 'found': asdict(found)}) + '\n')
     left = sum(str(one) not in done for one in wanted)
     if left:
-        raise TextureError(f'{left} of {len(wanted)} searches are left; the same command goes on with them')
+        raise TextureError(f'{left} of {len(wanted)} searches are left; the same command continues with them')
     return replace(experiment, found={one: done[str(one)] for one in wanted})
 
 
@@ -128,14 +128,14 @@ def _searched(wanted: PairSearch, start: Sequence[Individual], until_s: float) -
 
 
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
-    """Run one experiment; return its result and the JSON file, next to which its charts lie."""
+    """Run one experiment; return its result and the JSON file, with the charts next to it."""
     run_of = _run_of(name, experiment)
     result = run_of(experiment if experiment.found else run_searches(name, experiment))
     return result, result.write(experiment.out)
 
 
 def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
-    """Run one experiment with so many seeds from its own on; return what `run_experiment` does."""
+    """Run one experiment with this many seeds, from its seed on; return what `run_experiment` does."""
     run_of = _run_of(name, experiment)
     experiment = experiment if experiment.found else run_searches(name, experiment, count)
     result = over_seeds(run_of, name, experiment, count, DIGESTS[f'{name}{"-tuned" if experiment.tune else ""}']())

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fabrics by a finger of PVDF (Hu et al. 2014): power spectrum, principal components, machines by Max Wins.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 slide
     Paper: 25.5 mm/s, 1.5 N, along x and along y, 60 places on each linen (5.1). Time and sampling rate are not
@@ -23,9 +23,9 @@ components
 x and y
     Paper: Joined, 78 numbers (5.2).
     Here: `hu-pca-svm-xy`: inputs `signal@x` and `signal@y`, each with its components, about 150 numbers; the experiment
-        has 39 + 39, too.
+        also has 39 + 39.
 machine
-    Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not told.
+    Paper: RBF, one against one, Max Wins (4.2). Width and penalty are not given.
     Here: `SvmMaxWins`: those of scikit-learn's `SVC`, with C = 10.
 """
 
@@ -67,7 +67,7 @@ class Spectrum:
 
     points: int = param(
         12288,
-        'Number of frequency bins k · rate / (2 · points), k from 1; more bins resolve finer.',
+        'Number of frequency bins k · rate / (2 · points), k from 1.',
         low=2,
         high=1 << 19,
     )
@@ -110,7 +110,7 @@ class SvmMaxWins:
 
     variance: float = param(
         0.99,
-        'Fraction of the variance that the kept principal components explain; a larger one keeps more of them.',
+        'Fraction of the variance that the kept principal components explain.',
         low=0.01,
         high=1.0,
     )
@@ -162,8 +162,8 @@ class SvmMaxWins:
         return np.concatenate(found, axis=1)
 
 
-def principal_components(centred: Array, share: float, wanted: int = 0) -> Array:
-    """Return the fewest components, (n_features, n_components), that explain a share of the variance, or so many.
+def principal_components(centred: Array, fraction: float, wanted: int = 0) -> Array:
+    """Return the fewest components, (n_features, n_components), that explain a fraction of the variance, or `wanted`.
 
     Source: Hu et al. 2014, eq. 7 to 12.
     """
@@ -176,6 +176,6 @@ def principal_components(centred: Array, share: float, wanted: int = 0) -> Array
     if total <= 0.0:
         return np.eye(n_features, 1)
     explained = np.cumsum(variances) / total
-    count = wanted or int(np.searchsorted(explained, share - TINY)) + 1
+    count = wanted or int(np.searchsorted(explained, fraction - TINY)) + 1
     kept = vectors[:, : min(count, int((variances > TINY * variances[0]).sum()))]
     return np.asarray(centred.T @ kept / np.sqrt(variances[: kept.shape[1]]) if wide else kept)

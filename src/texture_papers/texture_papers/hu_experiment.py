@@ -41,7 +41,7 @@ ALONG_X_AND_Y = (View(), View(turned_rad=math.pi / 2))
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section 5 tells."""
+    """Check the claims of section 5."""
     both, x_only, y_only = (outcomes[TASK, name] for name in (BOTH, X_ONLY, Y_ONLY))
     log, power = (outcomes[TASK, name] for name in (LOG, POWER))
     return [
@@ -120,16 +120,16 @@ def components(slides: Slides, method: str) -> Mapping[str, Mapping[str, int]]:
     """Return by direction and linen how many components the recipe of a method of the experiment keeps of one linen."""
     recipe = recipe_of(next(one for one in PROTOCOL.tasks[0].methods if one.name == method))
     values, owner = slides.extract(recipe.feature_set)
-    share = recipe.learner.variance  # type: ignore[attr-defined]  # of SvmMaxWins
+    ratio = recipe.learner.variance  # type: ignore[attr-defined]  # of SvmMaxWins
     return {
-        direction: {linen: kept(part[slides.codes[owner] == code], share) for code, linen in enumerate(slides.surfaces)}
+        direction: {linen: kept(part[slides.codes[owner] == code], ratio) for code, linen in enumerate(slides.surfaces)}
         for direction, part in zip(DIRECTIONS, np.split(values, len(DIRECTIONS), axis=1), strict=True)
     }
 
 
-def kept(values: Array, share: float) -> int:
-    """Return how many components explain a share of the variance, the mean of each example subtracted (eq. 7)."""
-    return principal_components(values - values.mean(axis=1, keepdims=True), share).shape[1]
+def kept(values: Array, ratio: float) -> int:
+    """Return how many components explain a fraction of the variance, the mean of each example subtracted (eq. 7)."""
+    return principal_components(values - values.mean(axis=1, keepdims=True), ratio).shape[1]
 
 
 def component_digests() -> dict[str, str]:
@@ -140,12 +140,12 @@ def component_digests() -> dict[str, str]:
 def component_findings(counts: Counts) -> list[Finding]:
     """Check the 39 components of the paper with each reading of its spectrum, over linens and directions."""
     found = {scale: np.array([[*of.values()] for of in parts.values()]).ravel() for scale, parts in counts.items()}
-    away = {scale: np.abs(values - PAPER) for scale, values in found.items()}
+    distances = {scale: np.abs(values - PAPER) for scale, values in found.items()}
     return [
         *(_component_finding(f'one linen takes {PAPER} components or more: {scale}', values - PAPER, values)
           for scale, values in found.items()),
         *(_component_finding(f'not of the paper: magnitudes are nearer to its {PAPER} components than the {other}',
-                             away[other] - away['magnitude'], found[other])
+                             distances[other] - distances['magnitude'], found[other])
           for other in ('power', 'logarithm')),
     ]  # fmt: skip
 

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Materials by surface texture (Jamali & Sammut 2010): peaks grown from regions, naive Bayes.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 run
-    Paper: Down to about 1 N, straight at a constant speed, up (V.C). Speed and length are not told.
+    Paper: Down to about 1 N, straight at a constant speed, up (V.C). Speed and length are not given.
     Here: Preset `jamali`: 0.05 m/s for 2 s.
 signals
     Paper: Four PVDF films and four strain gauges at 2.5 kHz, low-pass of 500 Hz (III, V.B).
@@ -14,7 +14,7 @@ contact
     Paper: Cut by hand, "the entire interval" (IV.A).
     Here: Steady sliding alone, by the states of the exploration or found in the signal.
 peaks
-    Paper: Algorithm 1: equal regions by energy, neighbours joined; their number is not told (IV.A).
+    Paper: Algorithm 1: equal regions by energy, neighbours joined; their number is not given (IV.A).
     Here: `RegionPeaks` with 32 regions: the frequency of the largest coefficient of each peak (IV.B).
 learner
     Paper: Naive Bayes of Weka (IV.B, VI).

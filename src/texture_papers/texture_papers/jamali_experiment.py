@@ -26,7 +26,7 @@ ALIKE = (('carpet_1', 'carpet_2'), ('tile_1', 'tile_2'), VINYLS)
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section VI tells."""
+    """Check the claims of section VI."""
     three, five = (outcomes[TASK, name] for name in (THREE, FIVE))
     amplitude = outcomes[TASK, AMPLITUDE]
     return [

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects in a hand by texture (Kaboli et al. 2015): Hjorth parameters, correlations; three learners.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 motion
     Paper: Index and middle finger slide for 2 s while the others hold, to train; thumb and index finger, to test
-        (III.B). Speed and force are not told.
+        (III.B). Speed and force are not given.
     Here: Preset `kaboli`: 2.1 s at 0.008 m/s and 1 N with the finger sets `kaboli-train`, `kaboli-test`; the
         experiment 2 s at 0.02 m/s.
 signals
@@ -31,7 +31,7 @@ online learning
     Here: `PassiveAggressive`, all planes together, one pass; `passes` gives more. `texture add` updates the planes
         live.
 clusters
-    Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not told.
+    Paper: EM on "the entire unsupervised data set", classes by majority (V.C). Shape of the clusters is not given.
     Here: `EmMixture`, features independent within a cluster; in the experiment of all slides, whose labels name the
         clusters; by the recipe of the training slides.
 objects
@@ -183,7 +183,7 @@ class SvmLinear:
     folds: int = param(5, 'Number of cross-validation folds; more folds take longer to train.', low=2, high=50)
     repeats: int = param(
         10,
-        'Number of repetitions of the cross-validation with other random folds; more take longer to train.',
+        'Number of repetitions of the cross-validation with other random folds.',
         low=1,
         high=1000,
     )
@@ -240,7 +240,7 @@ class PassiveAggressive:
     rounds: int = param(0, 'Number of examples of each label to train on; 0 takes all.', low=0)
     passes: int = param(
         1,
-        'How often all examples are gone through; more passes fit them more closely. The paper names no number.',
+        'Number of passes over all examples; the paper names no number.',
         low=1,
         high=10_000,
     )
@@ -352,7 +352,7 @@ class EmMixture:
         clusters, names = unpacked(parameters['packed']), parameters['names']
 
         def predict(X: Array) -> Array:
-            shares = clusters.predict_proba(X.reshape(-1, X.shape[-1]))
-            return log_softmax(np.log(shares @ names + LEAST)).reshape(*X.shape[:-1], -1)
+            proba = clusters.predict_proba(X.reshape(-1, X.shape[-1]))
+            return log_softmax(np.log(proba @ names + LEAST)).reshape(*X.shape[:-1], -1)
 
         return predict

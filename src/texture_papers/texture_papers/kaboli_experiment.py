@@ -27,15 +27,15 @@ from texture_papers.protocol import (
     mean,
     recipe_of,
     reduced,
-    share,
     training_in,
+    wilson,
 )
 from texture_papers.report import at_least, built_in, digests, higher, kept_in, most_errors, right_of
 from texture_papers.slides import Mask, View, Visits, gather
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import load_scene
 
-# Time is the paper's; speed and force are not told. The preset `kaboli` is slower, so that 2 s pass without a turn.
+# Time is the paper's; speed and force are not given. The preset `kaboli` is slower, so that 2 s pass without a turn.
 SLIDING = SimulatedSlide(0.02, 1.0, duration_s=2.0)
 THUMB, INDEX, MIDDLE = View(finger=0), View(finger=1), View(finger=2)
 TRAINED = 'index and middle finger'
@@ -67,7 +67,7 @@ SETS = dict(zip(TASKS, SURFACES, strict=True))
 
 
 def findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section V tells."""
+    """Check the claims of section V."""
     svm = outcomes[ALL, SVM]
     em = {task: outcomes[task, EM] for task in TASKS}
     first, last, often = (outcomes[ALL, name] for name in (pa(ROUNDS[0]), pa(ROUNDS[-1]), passes(PASSES[-1])))
@@ -85,16 +85,16 @@ def findings(outcomes: MethodResults) -> list[Finding]:
 
 def _on_average(claim: str, outcome: MethodResult) -> Finding:
     """Check that the mean of the three sets reaches the paper's."""
-    shares = [mean(right_of(outcome, surfaces)) for surfaces in SURFACES]
-    centre = sum(one.value for one in shares) / len(shares)
-    reach = max(one.high - one.value for one in shares)  # the sets share their slides
+    accuracies = [mean(right_of(outcome, surfaces)) for surfaces in SURFACES]
+    centre = sum(one.value for one in accuracies) / len(accuracies)
+    reach = max(one.high - one.value for one in accuracies)  # the sets share their slides
     over = Interval(centre, centre - reach, centre + reach).less(PAPER_PA)
-    named = ', '.join(f'{task} {100 * one.value:.1f}' for task, one in zip(TASKS, shares, strict=True))
+    named = ', '.join(f'{task} {100 * one.value:.1f}' for task, one in zip(TASKS, accuracies, strict=True))
     return Finding(claim, f'{100 * centre:.1f} % ({named})', over)
 
 
 def pa(rounds: int) -> str:
-    """Return the name of online learning after so many slides of each object."""
+    """Return the name of online learning after this many slides of each object."""
     return f'{PA}, t = {rounds}'
 
 
@@ -216,7 +216,7 @@ def run_online(experiment: Experiment) -> ExperimentResult:
     rows = [np.flatnonzero(trained & (y == code)) for code in range(OLD, OLD + NEW)]
     figures, taken_s = {'none': _right(learner, parameters, X, y, ~trained)}, []
     for given in range(min(map(len, rows))):
-        for row in (own[given] for own in rows):
+        for row in (of_kind[given] for of_kind in rows):
             began = time.perf_counter()
             parameters = learner.partial_fit(parameters, X[[row]], int(y[row]))
             taken_s.append(time.perf_counter() - began)
@@ -248,7 +248,7 @@ def _right(learner: Any, parameters: Mapping[str, Any], X: Array, y: Codes, test
     right = (learner.predictor(parameters)(X).argmax(axis=1) == y).astype(np.float64)
     known = len(parameters['planes'])
     kinds = {'old objects': tested & (y < OLD), 'new objects': tested & (y >= OLD)}
-    return {kind: share(right[rows]) for kind, rows in kinds.items() if known > OLD or kind == 'old objects'}
+    return {kind: wilson(right[rows]) for kind, rows in kinds.items() if known > OLD or kind == 'old objects'}
 
 
 def online_digests() -> dict[str, str]:

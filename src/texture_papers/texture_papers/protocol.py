@@ -51,26 +51,26 @@ class Interval:
     high: float
 
     def positive(self) -> bool | None:
-        """Tell whether the figure is above 0; None if the interval does not tell."""
+        """Return whether the figure is above 0; None if the interval includes 0."""
         if self.low > 0.0:
             return True
         return False if self.high < 0.0 else None
 
-    def less(self, border: float) -> Interval:
-        """Return how much the figure is above a border."""
-        return Interval(self.value - border, self.low - border, self.high - border)
+    def less(self, limit: float) -> Interval:
+        """Return how much the figure is above a limit."""
+        return Interval(self.value - limit, self.low - limit, self.high - limit)
 
     def as_json(self) -> list[float]:
         """Return value, low and high, rounded."""
         return [round(self.value, 4), round(self.low, 4), round(self.high, 4)]
 
 
-def share(right: Array) -> Interval:
-    """Return the share of slides that are right (Wilson's interval)."""
+def wilson(right: Array) -> Interval:
+    """Return the accuracy of slides (Wilson's interval)."""
     n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
     reach = NORMAL_95 * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
-    # Where all or none are right, rounding may leave the share just outside.
+    # Where all or none are right, rounding may leave the fraction just outside.
     return Interval(p, min(p, float(middle - reach)), max(p, float(middle + reach)))
 
 
@@ -81,7 +81,7 @@ def mean(values: Array) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
-def apart(first: Array, second: Array) -> Interval:
+def difference(first: Array, second: Array) -> Interval:
     """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,)."""
     centre = float(np.mean(first) - np.mean(second))
     reach = NORMAL_95 * math.sqrt(_uncertainty(first) + _uncertainty(second))
@@ -89,7 +89,7 @@ def apart(first: Array, second: Array) -> Interval:
 
 
 def _uncertainty(values: Array) -> float:
-    """Return the variance of a mean; one value says nothing of it."""
+    """Return the variance of a mean; one value does not determine it."""
     return float(np.var(values, ddof=1)) / len(values) if len(values) > 1 else math.inf
 
 
@@ -106,7 +106,7 @@ class MethodResult:
 
     @property
     def learning(self) -> float | None:
-        """Share of the training slides that are recognised; None if none is used for training as a whole."""
+        """Accuracy on the training slides; None if none is used for training as a whole."""
         return float((self.decided == self.codes)[self.trained_on].mean()) if self.trained_on.any() else None
 
     @property
@@ -116,21 +116,21 @@ class MethodResult:
 
     @property
     def test(self) -> Interval:
-        """Share of the slides held out that are recognised."""
-        return share(self.right())
+        """Accuracy on the held-out slides."""
+        return wilson(self.right())
 
     @property
     def unclassified(self) -> float:
-        """Share of the slides held out that are taken for nothing."""
+        """Fraction of the held-out slides that are unclassified."""
         return float((self.decided == UNDECIDED)[~self.trained_on].mean())
 
     @property
     def confusion(self) -> AnyArray:
-        """Share of the test slides of each surface (row) that are taken for each surface, or for nothing (last)."""
+        """Fraction of the test slides of each surface (row) with each label, or unclassified (last)."""
         n = len(self.surfaces)
         table = np.zeros((n, n + 1))
-        true, said = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
-        np.add.at(table, (true, np.where(said == UNDECIDED, n, said)), 1.0)
+        true, got = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
+        np.add.at(table, (true, np.where(got == UNDECIDED, n, got)), 1.0)
         return table / np.maximum(table.sum(axis=1, keepdims=True), 1.0)
 
     def right(self, of: NDArray[np.bool_] | None = None) -> Array:
@@ -138,21 +138,21 @@ class MethodResult:
         return self._tested(self.decided == self.codes, of)
 
     def taken_for(self, first: str, second: str, of: NDArray[np.bool_] | None = None) -> Array:
-        """Return how often each slide was taken for the other one of two surfaces, (n_tested,)."""
+        """Return how often each slide was misidentified as the other one of two surfaces, (n_tested,)."""
         pair = [self.surfaces.index(first), self.surfaces.index(second)]
         other = np.select([self.codes == pair[0], self.codes == pair[1]], [pair[1], pair[0]], default=UNDECIDED - 1)
         return self._tested(self.decided == other, of)
 
     def wrong(self) -> Array:
-        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not."""
+        """Return how often each slide was misidentified as another surface, (n_tested,), without unclassified ones."""
         return self._tested((self.decided != self.codes) & (self.decided != UNDECIDED))
 
     def nothing(self) -> Array:
-        """Return how often each slide was taken for nothing, (n_tested,)."""
+        """Return how often each slide was unclassified, (n_tested,)."""
         return self._tested(self.decided == UNDECIDED)
 
     def pairs(self) -> list[tuple[str, str]]:
-        """Return all pairs of surfaces, those taken for each other most often first."""
+        """Return all pairs of surfaces, those confused most often first."""
         n = len(self.surfaces)
         table = self.confusion[:, :n]
         both = table + table.T
@@ -171,7 +171,7 @@ Splitter = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
 
 @dataclass(frozen=True)
 class Figures:
-    """What a paper reports of a method, as shares; None if it does not."""
+    """Figures that a paper reports of a method, 0 to 1; None if it does not."""
 
     learning: float | None = None
     test: float | None = None
@@ -233,7 +233,7 @@ MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what
 
 @dataclass(frozen=True)
 class Anchor:
-    """The one reported figure by which the difficulty of a scene is set: the share of test slides that are right."""
+    """The one reported figure by which the difficulty of a scene is set: the accuracy on test slides."""
 
     task: str
     method: str
@@ -289,9 +289,9 @@ def folds(count: int, repeats: int) -> Splitter:
     return _of(splitter)
 
 
-def drawn(share: float, count: int) -> Splitter:
-    """Return what draws so large a share of all slides for training, whatever their surface."""
-    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=share, random_state=seed))
+def drawn(fraction: float, count: int) -> Splitter:
+    """Return what draws this fraction of all slides for training, whatever their surface."""
+    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=fraction, random_state=seed))
 
 
 def training_in(condition: str) -> Splitter:
@@ -327,7 +327,7 @@ class ExperimentResult:
     charts: tuple[Path, ...] = ()
 
     def lines(self) -> Iterator[str]:
-        """Yield our figures beside the paper's, and the findings, for people: means over seeds where there are some."""
+        """Yield our figures next to the paper's, and the findings, as text: means over seeds if there are any."""
         seeds = self.numbers.get('seeds', [self.numbers['seed']])
         yield f'over {len(seeds)} seeds: mean, and its interval of 95 %' if seeds[1:] else f'seed {seeds[0]}'
         for task, methods in self.numbers.get('tasks', {}).items():
@@ -371,11 +371,11 @@ class ExperimentResult:
 Run = Callable[[Experiment], ExperimentResult]
 
 
-# What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
+# What of `training` decides the label after a whole slide. The rest decides on early ends and on what is outside.
 DECISIVE_OF_TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
 # Values with which a parameter of evidence rule or learner changes nothing: stored digests are older than it.
 NEUTRAL = {'late_weight': 1.0, 'passes': 1}
-OWN_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
+SUITE_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
 
 
 def digest_of(recipe: str) -> str:
@@ -387,7 +387,7 @@ def digest_of(recipe: str) -> str:
         definition = load_recipe(recipe).as_mapping()
     except UnknownName:
         definition = load_roughness_recipe(recipe).as_mapping()
-    text = OWN_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
+    text = SUITE_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
     return hash_of(json.loads(text))
 
 
@@ -454,7 +454,7 @@ def _set(sliding: SimulatedSlide) -> dict[str, Any]:
 
 
 def _short_name(found: re.Match[str]) -> str:
-    """Return 'region_peaks' of 'texture_papers.jamali:RegionPeaks': in which module a class stands decides nothing."""
+    """Return 'region_peaks' of 'texture_papers.jamali:RegionPeaks': the module of a class decides nothing."""
     return re.sub(r'(?<!^)(?=[A-Z])', '_', found.group(1)).lower()
 
 
@@ -533,7 +533,7 @@ class PairSearch:
 
     @property
     def kind(self) -> tuple[str, str, tuple[str, ...], int]:
-        """What another search must share to begin with its individuals."""
+        """What must be equal in another search that begins with its individuals."""
         return self.task, self.method, self.pair, self.params.seed
 
 
@@ -578,10 +578,10 @@ def searched(protocol: PaperProtocol, experiment: Experiment) -> TunedRecipes:
     wanted = list(pair_searches(protocol, experiment))
     tuned = {}
     for key, recipe in recipes.items():
-        own = [one for one in wanted if (one.task, one.method) == key]
+        group = [one for one in wanted if (one.task, one.method) == key]
         task = next(one for one in protocol.tasks if one.name == key[0])
         scans = len(_training_scans(protocol, task, experiment.seed, quick=experiment.quick).labels)
-        tuned[key] = tuned_pairs(recipe, own[0].params, {one.pair: experiment.found[one] for one in own}, scans)
+        tuned[key] = tuned_pairs(recipe, group[0].params, {one.pair: experiment.found[one] for one in group}, scans)
     return tuned
 
 
@@ -596,7 +596,7 @@ def _gathered(
 
 
 def recipe_of(method: Method) -> Recipe:
-    """Return the recipe as the protocol asks for it."""
+    """Return the recipe as the protocol defines it."""
     recipe = load_recipe(method.recipe)
     inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
     learner: Any = recipe.learner
@@ -624,9 +624,9 @@ def evaluate_method(
     """Learn from the slides of each split and evaluate all; `more` are features of each slide, (n_slides, n)."""
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     trained, owner = slides.extract(to_learn, views)
-    asked, slide = slides.extract(recipe.feature_set, views)
+    tested_values, slide = slides.extract(recipe.feature_set, views)
     if more is not None:
-        trained, asked = np.hstack((trained, more[owner])), np.hstack((asked, more[slide]))
+        trained, tested_values = np.hstack((trained, more[owner])), np.hstack((tested_values, more[slide]))
     learner = of_examples(recipe.learner, slides.names(to_learn, views), slides.surfaces)
     windows = recipe.feature_set.windows
     rows_of = trained_on[:, owner] if training == BY_SPLIT else np.ones((1, len(owner)), dtype=bool)
@@ -635,7 +635,7 @@ def evaluate_method(
     for number, rows in enumerate(rows_of):
         predictor = fitted_predictor(learner, trained[rows], slides.codes[owner[rows]], owner[rows])
         decided[number] = decided_by_slide(
-            predictor(asked), len(slides.codes), recipe.evidence, windows.hop_s / windows.length_s
+            predictor(tested_values), len(slides.codes), recipe.evidence, windows.hop_s / windows.length_s
         )
     taken_s = (time.perf_counter() - began) / len(rows_of)
     known = trained_on if training == BY_SPLIT else np.zeros(decided.shape, dtype=bool)
@@ -643,7 +643,7 @@ def evaluate_method(
 
 
 def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
-    """Return the task with fewer slides: so many over each surface, as equally as may be among the visits."""
+    """Return the task with fewer slides: this many over each surface, as equally as may be among the visits."""
     each = max(1, count // len(task.visits))
     visits = tuple(replace(visit, count=min(visit.count, each)) for visit in task.visits)
     return replace(task, visits=visits)
@@ -654,12 +654,12 @@ VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 
 
 def over_seeds(run: Run, name: str, experiment: Experiment, count: int, digests: Mapping[str, str]) -> ExperimentResult:
-    """Run an experiment with so many seeds, each alike, and add means and intervals over them to the first's result.
+    """Run an experiment with this many seeds, each alike, and add means and intervals over them to the first's result.
 
-    Each seed is kept in the folder `seeds`; what is there already, with the digests of now, is not run again.
+    Each seed is kept in the folder `seeds`; what is there already, with the present digests, is not run again.
     """
     if count < 2:
-        raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')
+        raise InvalidParameter(f'{count} seeds were requested; two or more are needed for an interval over seeds')
     seeds = [replace(experiment, seed=experiment.seed + number) for number in range(count)]
     first, *others = [_kept(run, name, one, digests) for one in seeds]
     return replace(first, numbers=with_seeds(first.numbers, [one.numbers for one in others]))
@@ -685,14 +685,14 @@ def _kept(run: Run, name: str, experiment: Experiment, digests: Mapping[str, str
 
 
 def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the numbers of the first seed with mean and interval over all seeds beside each figure and finding."""
+    """Return the numbers of the first seed with mean and interval over all seeds next to each figure and finding."""
     numbers: dict[str, Any] = json.loads(json.dumps(first))
     runs = [numbers, *others]
     numbers['seeds'] = [run['seed'] for run in runs]
     for task, methods in numbers.get('tasks', {}).items():
         for method, figures in methods.items():
             same = [run['tasks'][task][method] for run in runs]
-            _add(figures, [one['test'][0] for one in same], share=True)
+            _add(figures, [one['test'][0] for one in same], fraction=True)
             figures['means'] = {
                 key: mean_over_seeds([one[key] for one in same]).as_json()
                 for key in ('learning', 'unclassified')
@@ -700,7 +700,7 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
             }
             for kind in ('conditions', 'sets'):
                 for name, part in figures.get(kind, {}).items():
-                    _add(part, [one[kind][name]['test'][0] for one in same], share=True)
+                    _add(part, [one[kind][name]['test'][0] for one in same], fraction=True)
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
             of_seeds = [run['regressors'][regressor] for run in runs]
@@ -740,9 +740,9 @@ def mean_over_seeds(values: Sequence[float]) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
-def _add(figures: dict[str, Any], found: Sequence[float], *, share: bool = False) -> None:
-    """Add values and interval of the seeds, which is cut where no share can lie."""
+def _add(figures: dict[str, Any], found: Sequence[float], *, fraction: bool = False) -> None:
+    """Add values and interval of the seeds, which is cut to the range of fractions."""
     if len(found) > 1:
         figures['by_seed'] = list(found)
         interval = mean_over_seeds(found).as_json()
-        figures['over_seeds'] = [min(max(value, 0.0), 1.0) for value in interval] if share else interval
+        figures['over_seeds'] = [min(max(value, 0.0), 1.0) for value in interval] if fraction else interval

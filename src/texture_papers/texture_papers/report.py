@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the papers beside ours: tables, charts, and whether the claims hold."""
+"""Figures of the papers next to ours: tables, charts, and whether the claims hold."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from texture_papers.protocol import (
     MethodResult,
     MethodResults,
     PaperProtocol,
-    apart,
+    difference,
     digest_of_row,
     mean,
     outcomes,
     searched,
-    share,
     versions,
+    wilson,
 )
 from texture_simulation.scene import load_scene
 
@@ -47,63 +47,63 @@ def higher(claim: str, first: MethodResult, second: MethodResult) -> Finding:
 
 def higher_elsewhere(claim: str, first: MethodResult, second: MethodResult) -> Finding:
     """Check that more slides of one kind are recognised than of another kind."""
-    gain = apart(first.right(), second.right())
+    gain = difference(first.right(), second.right())
     return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain)
 
 
 def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
     """Check that slides of one condition are recognised less often than all others."""
     here = outcome.conditions == condition
-    loss = apart(outcome.right(~here), outcome.right(here))
+    loss = difference(outcome.right(~here), outcome.right(here))
     names = dict.fromkeys(outcome.conditions.tolist())
-    shares = {name: outcome.right(outcome.conditions == name).mean() for name in names}
-    reported = ', '.join(f'{name} {100 * value:.1f} %' for name, value in shares.items())
+    accuracies = {name: outcome.right(outcome.conditions == name).mean() for name in names}
+    reported = ', '.join(f'{name} {100 * value:.1f} %' for name, value in accuracies.items())
     return Finding(claim, reported, loss)
 
 
 def kept_in(claim: str, outcome: MethodResult, changed: str, reference: str) -> Finding:
     """Check that slides of one condition are recognised at most five points less often than those of another."""
     here, before = (outcome.right(outcome.conditions == name) for name in (changed, reference))
-    reported = f'{percent(share(here))} against {percent(share(before))}, {100 * GRANTED:g} points granted'
-    return Finding(claim, reported, apart(here, before).less(-GRANTED))
+    reported = f'{percent(wilson(here))} against {percent(wilson(before))}, {100 * GRANTED:g} points granted'
+    return Finding(claim, reported, difference(here, before).less(-GRANTED))
 
 
-def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
+def at_least(claim: str, outcome: MethodResult, limit: float) -> Finding:
     """Check that a figure is reached; undecided where the interval holds it."""
-    return Finding(claim, percent(outcome.test), outcome.test.less(border))
+    return Finding(claim, percent(outcome.test), outcome.test.less(limit))
 
 
 def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Finding:
-    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused."""
-    own = sum((outcome.taken_for(*pair) for pair in pairs), start=np.zeros(1))
+    """Check that surfaces of these pairs are confused more often than those of the next most confused pairs."""
+    confused = sum((outcome.taken_for(*pair) for pair in pairs), start=np.zeros(1))
     others = [pair for pair in outcome.pairs() if frozenset(pair) not in {frozenset(one) for one in pairs}]
     rivals = sum((outcome.taken_for(*pair) for pair in others[: len(pairs)]), start=np.zeros(1))
-    lead = mean(own - rivals)
+    lead = mean(confused - rivals)
     named = ' and '.join('/'.join(pair) for pair in others[: len(pairs)])
-    here = f'{_of_errors(own, outcome)} of all errors; next: {named} with {_of_errors(rivals, outcome)}'
+    here = f'{_of_errors(confused, outcome)} of all errors; next: {named} with {_of_errors(rivals, outcome)}'
     return Finding(claim, here, lead)
 
 
 def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
     """Check that one surface is recognised more often than the others together."""
     here = outcome.codes == outcome.surfaces.index(surface)
-    gain = apart(outcome.right(here), outcome.right(~here))
+    gain = difference(outcome.right(here), outcome.right(~here))
     reported = (
         f'{100 * outcome.right(here).mean():.1f} % right, of the others {100 * outcome.right(~here).mean():.1f} %'
     )
     return Finding(claim, reported, gain)
 
 
-def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Finding:
-    """Check that two surfaces are taken for each other in fewer than a share of their slides."""
+def seldom(claim: str, outcome: MethodResult, pair: Pair, limit: float) -> Finding:
+    """Check that two surfaces are confused in fewer than a fraction of their slides."""
     of_pair = np.isin(outcome.codes, [outcome.surfaces.index(name) for name in pair])
-    taken = share(outcome.taken_for(*pair, of=of_pair))
-    below = Interval(border - taken.value, border - taken.high, border - taken.low)
-    return Finding(claim, f'{percent(taken)} of their slides, fewer than {100 * border:g} % needed', below)
+    taken = wilson(outcome.taken_for(*pair, of=of_pair))
+    below = Interval(limit - taken.value, limit - taken.high, limit - taken.low)
+    return Finding(claim, f'{percent(taken)} of their slides, fewer than {100 * limit:g} % needed', below)
 
 
 def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Sequence[Pair]) -> Finding:
-    """Check that by the first method more slides are taken for a surface that is not alike than by the second."""
+    """Check that the first method confuses more slides with a dissimilar surface than the second."""
     novel = [one.wrong() - sum((one.taken_for(*pair) for pair in alike), start=np.zeros(1)) for one in (first, second)]
     more = mean(novel[0] - novel[1])
     reported = ' against '.join(f'{100 * part.mean():.1f} %' for part in novel)
@@ -117,7 +117,7 @@ def built_in(why: str, *findings: Finding) -> Iterator[Finding]:
 
 
 def percent(part: Interval) -> str:
-    """Return a share with its interval."""
+    """Return a fraction with its interval."""
     return f'{100 * part.value:.1f} % ({100 * part.low:.1f} to {100 * part.high:.1f})'
 
 
@@ -126,7 +126,7 @@ def _of_errors(part: Array, outcome: MethodResult) -> str:
     return f'{100 * part.sum() / wrong:.0f} %' if wrong else 'none'
 
 
-SHARES, ERRORS = ('test slides recognised (%)', 100.0), ('mean error (grades)', 1.0)
+ACCURACIES, ERRORS = ('test slides recognised (%)', 100.0), ('mean error (grades)', 1.0)
 
 
 def figures_chart(
@@ -134,7 +134,7 @@ def figures_chart(
     title: str,
     path: str | Path,
     drawn: str,
-    unit: tuple[str, float] = SHARES,
+    unit: tuple[str, float] = ACCURACIES,
 ) -> Path:
     """Draw the figure of each method: the paper's as a cross, the simulated with its interval."""
     heights = [len(methods) + 1 for methods in panels.values()]
@@ -249,18 +249,16 @@ def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = Fa
 
 
 def _by_condition(outcome: MethodResult) -> dict[str, Any]:
-    """Return the share recognised under each condition in which slides were tested."""
+    """Return the accuracy under each condition in which slides were tested."""
     names = dict.fromkeys(outcome.conditions[outcome.tested].tolist())
     return {
-        'conditions': {name: {'test': share(outcome.right(outcome.conditions == name)).as_json()} for name in names}
+        'conditions': {name: {'test': wilson(outcome.right(outcome.conditions == name)).as_json()} for name in names}
     }
 
 
 def _by_set(method: Method, outcome: MethodResult) -> dict[str, Any]:
     """Return the fraction recognised of the slides over each set of surfaces."""
-    return {
-        'sets': {name: {'test': share(right_of(outcome, surfaces)).as_json()} for name, surfaces in method.sets.items()}
-    }
+    return {'sets': {name: {'test': wilson(right_of(outcome, of)).as_json()} for name, of in method.sets.items()}}
 
 
 def right_of(outcome: MethodResult, surfaces: Sequence[str]) -> Array:
@@ -289,8 +287,8 @@ def charts_of(protocol: PaperProtocol, numbers: Mapping[str, Any], name: str, ou
         for method in task.methods:
             figures = numbers['tasks'][task.name][method.name]
             panels[task.name][method.name] = (method.paper.test, _interval(figures))
-            for part, own in figures.get('sets', {}).items():
-                panels[task.name][f'{method.name}: {part}'] = (None, _interval(own))
+            for part, cell in figures.get('sets', {}).items():
+                panels[task.name][f'{method.name}: {part}'] = (None, _interval(cell))
     return (
         figures_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png', drawn(numbers)),
     )

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Roughness by dynamic tactile sensing (Rispal et al.): three regressors of grades.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 slide
     Paper: 0.15 m/s, 2.5 N, against the ridges, 700 ms, of which 500 are transformed (IV.B, V.A).
@@ -18,7 +18,7 @@ ANN 1
     Here: The output, cut off at 1 and 5.
 ANN 5, SVM 5
     Paper: A boolean for each grade; the mean of those that fire, 0 if none does (IV.C).
-    Here: The same, but none firing is no grade; figures count it apart, and as 0.
+    Here: The same, but none firing is no grade; figures count it separately, and as 0.
 people
     Paper: 30 people, 25 textures, 15 to train and 10 to test, whole grades (III, table I).
     Here: The same: `ets_roughness.csv`.
@@ -55,14 +55,14 @@ Grader = Callable[[Array], tuple[Array, Array]]
 
 
 def _without_std(grades: Array) -> tuple[Array, Array]:
-    """Return grades and their standard deviations, which the paper's regressors do not know."""
+    """Return grades and their standard deviations, which the paper's regressors do not give."""
     return grades, np.zeros_like(grades)
 
 
 def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
     """Return the mean of the grades that fired, (...,) of (..., 5); NaN where none did.
 
-    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C, where 0 stands
+    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C, where 0 denotes
     for none.
     """
     count = votes.sum(axis=-1)
@@ -75,7 +75,7 @@ def grade_membership(grades: Array) -> NDArray[np.bool_]:
     return np.rint(grades)[:, None] == GRADES
 
 
-# One of so many windows of each texture tells when to stop: MATLAB holds out 15 %.
+# One of this many windows of each texture decides when to stop: MATLAB holds out 15 %.
 HELD_OUT = 7
 
 
@@ -106,7 +106,7 @@ def _held_out(textures: Codes) -> Any:
 class Ann1:
     """A network with a hidden layer and one linear output, the grade.
 
-    The paper's text says that the hidden layer is linear, which leaves a linear model whatever its number of neurons.
+    The paper's text states that the hidden layer is linear, which leaves a linear model whatever its number of neurons.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
@@ -117,7 +117,7 @@ class Ann1:
         low=1,
         high=200,
     )
-    iterations: int = param(50, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    iterations: int = param(50, 'Largest number of training iterations.', low=1, high=10_000)
     seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
@@ -136,12 +136,12 @@ VOTE_THRESHOLD = 0.5  # the networks are trained 0 and 1, and their output is ro
 
 @dataclass(frozen=True)
 class Ann5(Ann1):
-    """A network for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
+    """A network per grade that answers yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
 
-    iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
 
     def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
         """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""
@@ -157,7 +157,7 @@ class Ann5(Ann1):
 
 @dataclass(frozen=True)
 class Svm5:
-    """An RBF machine for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
+    """An RBF machine per grade that answers yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """

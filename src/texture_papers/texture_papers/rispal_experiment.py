@@ -51,7 +51,7 @@ from texture_simulation.sensor_models import SENSORS
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """What a model says of windows, (n,) each; NaN where it gives no grade."""
+    """Grades of windows by a model, (n,) each; NaN where it gives no grade."""
 
     grades: Array
     stds: Array
@@ -69,7 +69,7 @@ class Answers:
         )
 
     def figures(self) -> dict[str, Any]:
-        """Return error, spread within a texture, share without a grade, and how often the 90 % interval holds."""
+        """Return error, spread within a texture, fraction without a grade, and how often the 90 % interval holds."""
         given = np.isfinite(self.grades)
         errors = np.abs(self.grades - self.true)
         within = errors <= NORMAL_90 * self.stds
@@ -78,7 +78,7 @@ class Answers:
             'error_of_the_mean': self._error_of_the_mean(),
             'std': self._spread(),
             'without_grade': float(1.0 - given.mean()),
-            # the paper writes 0 for no grade, and does not say whether it counts
+            # the paper writes 0 for no grade, and does not state whether it counts
             'error_none_as_0': float(np.where(given, errors, self.true).mean()),
             'coverage_90': float(within[given].mean()) if given.any() else None,
             'by_texture': {name: round(error, 4) for name, error in self.error_by_texture().items()},
@@ -136,7 +136,7 @@ class SimulatedTextures:
     def extract(
         self, features: FeatureSet, textures: Sequence[str], count: int, speed_m_s: float, force_n: float
     ) -> LabelledFeatures:
-        """Return one window of so many scans over each texture."""
+        """Return one window of this many scans over each texture."""
         events = [event for texture in textures for event in self.events(texture, count, speed_m_s, force_n)]
         vectors = features.extract_many(events)
         return LabelledFeatures.from_vectors(vectors, {event.exploration_id: event.surface for event in events})
@@ -172,19 +172,19 @@ class SimulatedTextures:
         return self.extract(recipe.feature_set, textures, count, speed_m_s, force_n)
 
     def ask(self, model: RoughnessModel, examples: LabelledFeatures) -> Answers:
-        """Return what a model says of each window."""
+        """Return the grade of each window by a model."""
         grades, stds = model.grade(examples.values)
         true = np.array([self.grades.of(label) for label in examples.labels])
         return Answers(grades, model.calibration.window_std(stds), true, examples.labels.tolist())
 
     def ask_both(self, model: RoughnessModel, recipe: RoughnessRecipe) -> dict[str, Answers]:
-        """Return what a model says of the textures that it was trained on ('seen'), and of the others ('unseen')."""
+        """Return the grades by a model of its training textures ('seen'), and of the others ('unseen')."""
         parts = {'seen': self.grades.used_for(TRAIN), 'unseen': self.grades.used_for(TEST)}
         return {part: self.ask(model, self.examples(recipe, textures)) for part, textures in parts.items()}
 
 
 def errors_chart(numbers: Mapping[str, Any], out: Path) -> Path:
-    """Draw the error of each regressor, the means over seeds, beside the paper's."""
+    """Draw the error of each regressor, the means over seeds, next to the paper's."""
     panels = {
         f'{part} textures': {
             name: (paper[part], Interval(*numbers['regressors'][name][part]['over_seeds']))
@@ -206,7 +206,7 @@ ByTexture = Mapping[str, Mapping[str, float]]
 def grades_chart(
     panels: Mapping[str, Mapping[str, ByTexture]], textures: Sequence[str], title: str, path: str | Path
 ) -> Path:
-    """Draw the estimates of each texture beside its human grade, a panel for each head (the paper's Fig. 7).
+    """Draw the estimates of each texture next to its human grade, a panel for each head (the paper's Fig. 7).
 
     The thick bar is one standard deviation over the windows, the thin one the 90 % interval of a window.
     """
@@ -423,7 +423,7 @@ def _rows(examples: LabelledFeatures, rows: Any) -> LabelledFeatures:
 
 
 def _thinned(examples: LabelledFeatures, count: int) -> LabelledFeatures:
-    """Return the first so many windows of each texture."""
+    """Return the first `count` windows of each texture."""
     kept = np.concatenate([np.flatnonzero(examples.labels == name)[:count] for name in dict.fromkeys(examples.labels)])
     return _rows(examples, kept)
 

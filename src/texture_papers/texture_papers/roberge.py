@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures.
 
-What the paper says and what is done here, element by element:
+What the paper describes and what is done here, element by element:
 
 slide
     Paper: 500 ms at 0.10, 0.15, 0.20 m/s and 1, 2.5, 5 N; ten textures: 10 cm at 0.125 m/s and 2 N (IV.A, V.A).
-    Here: The same in the presets, 50 ms longer, so that an arm that answers late covers it, too.
+    Here: The same in the presets, 50 ms longer, so that a late arm also covers it.
 transform
     Paper: The signal less its mean, 1024 values from 0 to 500 Hz (III.B).
     Here: The same: 2048 points at 1 kHz.
@@ -17,17 +17,17 @@ integral, length
     Paper: Equations 1 and 2.
     Here: The same: `SignalEnergy`, `ArcLength`.
 network
-    Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not told.
+    Paper: Sigmoid hidden layer, linear output, rounded, one for each pair (III.C). Its training is not given.
     Here: `AnnPairs`, trained as by MATLAB's default.
 machine
-    Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not told.
+    Paper: One for each pair, with box constraint and kernel scale of MATLAB (III.C, IV). Its kernel is not given.
     Here: `SvmPairs` with the RBF kernel.
 decision
     Paper: Most pairs; a tie is unclassified (III.C).
     Here: The same: `pairs_won`.
 vote
     Paper: Five parts of one scan of 500 ms, at least three equal (III.C, IV.B.1).
-    Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a decision of its own.
+    Here: The newest five windows of 0.1 s; on a longer slide every 0.5 s is a separate decision.
 parts of a circle
     Paper: 1 to 9, most votes; 7 or 9 in almost all cases (IV, IV.B.2).
     Here: 7 of 70 ms for all pairs.
@@ -41,7 +41,7 @@ variables
     Here: `…-pairs`: those found for the first seed of the experiment, in the size that the file names. The other
         recipes have one set for all pairs.
 standardisation
-    Paper: Not told.
+    Paper: Not given.
     Here: Features have zero mean and unit variance.
 friction
     Paper: The next question (VI).
@@ -308,9 +308,9 @@ def _step(network: Network, values: Array, targets: Array, damping: float) -> tu
     error = float(residual @ residual) / len(residual)
     slope = slope_of(residual)
     diagonal = np.diag_indices_from(curvature)
-    own = curvature[diagonal]
+    undamped = curvature[diagonal]
     while damping <= MAX_DAMPING:
-        curvature[diagonal] = own + damping
+        curvature[diagonal] = undamped + damping
         solved: Array = np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64)
         stepped = network.moved(step_of(solved))
         if _error(stepped, values, targets) < error:
@@ -393,11 +393,11 @@ def fitted_predictor(learner: Any, X: Array, y: Codes, groups: Codes) -> Predict
     return cast(Predictor, learner.predictor(learner.fit(X, y, groups).parameters))
 
 
-def decided_by_slide(scores: Array, n_slides: int, rule: EvidenceRule, hop_share: float) -> Codes:
-    """Return what each slide is taken for by all its windows, (n_slides,) of (n_slides · n_windows, n_labels)."""
+def decided_by_slide(scores: Array, n_slides: int, rule: EvidenceRule, hop_ratio: float) -> Codes:
+    """Return the label of each slide by all its windows, (n_slides,) of (n_slides · n_windows, n_labels)."""
     n_labels = scores.shape[1]
     evidence = rule.window_evidence(log_softmax(scores)).reshape(n_slides, -1, n_labels).swapaxes(0, 1)
-    means, counts = followed(rule, evidence.reshape(len(evidence), -1), min(hop_share, 1.0))
+    means, counts = followed(rule, evidence.reshape(len(evidence), -1), min(hop_ratio, 1.0))
     posterior = rule.log_posterior(means[-1].reshape(n_slides, n_labels), counts[-1], 1.0)
     decided: Codes = posterior.argmax(axis=1)
     decided[(posterior == posterior.max(axis=1, keepdims=True)).sum(axis=1) > 1] = UNDECIDED
@@ -461,7 +461,7 @@ class SvmPairs:
 
 
 ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair
-# One of so many is held out of each network's training to stop it: MATLAB holds out 15 %.
+# One of this many is held out of each network's training to stop it: MATLAB holds out 15 %.
 HELD_OUT = 7
 
 
@@ -480,7 +480,7 @@ class AnnPairs:
         low=1,
         high=200,
     )
-    iterations: int = param(30, 'Largest number of training iterations; more take longer to train.', low=1, high=10_000)
+    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
     seed: int = param(0, 'Seed of the initial weights; equal seeds give equal models.', low=0)
 
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
@@ -506,7 +506,7 @@ class AnnPairs:
 
 
 def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
-    """Return which examples tell when to stop: every seventh slide of a label, or example if there are few slides."""
+    """Return which examples decide when to stop: every seventh slide of a label, or example if there are few slides."""
     held = np.zeros(len(y), dtype=bool)
     for code in np.unique(y):
         rows = np.flatnonzero(y == code)
@@ -516,7 +516,7 @@ def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
     return held
 
 
-TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have variables of their own'
+TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have separate variables'
 KEYS = ('learner', 'pairs')
 PAIR_KEYS = ('pair', 'inputs', 'learner')
 # What decides a pair.
@@ -555,9 +555,9 @@ class TunedPair:
 
 @dataclass(frozen=True)
 class TunedPairs:
-    """A machine or network for each pair of textures, each with its own features and parameters; most pairs won.
+    """A machine or network for each pair of textures, each with separate features and parameters; most pairs won.
 
-    The inputs of the recipe hold the features of all pairs; each pair is trained on, and sees, those of its own inputs.
+    The inputs of the recipe hold the features of all pairs; each pair is trained on, and sees, those of its inputs.
     A pair that is not listed has all features and the common learner.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
@@ -608,7 +608,7 @@ class TunedPairs:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         if self.pairs and (len(self.names), len(self.labels)) != (X.shape[1], int(y.max()) + 1):
             raise InvalidParameter(
-                'the pairs of the recipe have variables of their own, and the names of the features and textures are '
+                'the pairs of the recipe have separate variables, and the names of the features and textures are '
                 "not known; train with `texture train`, or call the learner's `of_examples` first"
             )
         tuned = {frozenset(pair.labels): pair for pair in self.pairs}
@@ -647,9 +647,9 @@ class TunedPairs:
 
     def _columns(self, pair: TunedPair) -> Codes:
         """Return the numbers of the features that a pair sees."""
-        own = tuple(f'{topic}/' for topic in pair.inputs)
-        columns = np.flatnonzero([name.startswith(own) for name in self.names]) if own else np.arange(len(self.names))
-        for topic in own:
+        prefixes = tuple(f'{topic}/' for topic in pair.inputs)
+        columns = np.flatnonzero([not prefixes or name.startswith(prefixes) for name in self.names])
+        for topic in prefixes:
             if not any(name.startswith(topic) for name in self.names):
                 known = ', '.join(dict.fromkeys(name.split('/')[0] for name in self.names))
                 raise InvalidParameter(

@@ -20,7 +20,7 @@ from texture_papers.protocol import (
     MethodResults,
     PaperProtocol,
     RecognitionTask,
-    apart,
+    difference,
     evaluate_method,
     halves,
     hash_of,
@@ -45,7 +45,7 @@ from texture_simulation.friction import sliding_coefficient
 from texture_simulation.path import SimulatedSlide
 from texture_simulation.scene import Scene, load_scene
 
-# The paper's sizes; the search for parts goes on from that for whole scans, and has half of the paper's halves.
+# The paper's sizes; the search for parts continues from that for whole scans, and has half of the paper's halves.
 FULL, OF_PARTS, OF_TEN = SearchParams(20, 30, 20), SearchParams(10, 10, 10), SearchParams(13, 10, 20)
 LINEAR_S = 0.5
 LINEAR_SLIDES = 'linear slides'
@@ -64,7 +64,7 @@ METHODS = (
 
 
 def linear_findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section IV.B.1 tells."""
+    """Check the claims of section IV.B.1."""
     ann, svm, ann_vote, svm_vote = (outcomes[LINEAR_SLIDES, name] for name in (ANN, SVM, ANN_VOTE, SVM_VOTE))
     lift_ann, lift_svm = ann_vote.right() - ann.right(), svm_vote.right() - svm.right()
     more = mean(lift_svm - lift_ann)
@@ -118,7 +118,7 @@ ALONG = '0 degrees'
 
 
 def circular_findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section IV.B.2 tells."""
+    """Check the claims of section IV.B.2."""
     circle_ann, circle_svm = outcomes[CIRCLES, 'ets-circular-ann'], outcomes[CIRCLES, 'ets-circular-svm']
     line_ann, line_svm = outcomes[LINES, 'ets-linear-ann'], outcomes[LINES, 'ets-linear-svm']
     return [
@@ -136,7 +136,7 @@ def circular_findings(outcomes: MethodResults) -> list[Finding]:
         Finding(
             'fewer slides of a circle are unclassified, SVM (5.2 to 13.4 %)',
             f'{100 * circle_svm.unclassified:.1f} against {100 * line_svm.unclassified:.1f} %',
-            apart(line_svm.nothing(), circle_svm.nothing()),
+            difference(line_svm.nothing(), circle_svm.nothing()),
         ),
         *built_in(
             'which textures are alike was chosen',
@@ -198,7 +198,7 @@ FINE_ANN, FINE_SVM = 'ets-fine-ann', 'ets-fine-svm'
 
 
 def fine_findings(outcomes: MethodResults) -> list[Finding]:
-    """Check what section V tells."""
+    """Check the claims of section V."""
     ann, svm = outcomes[TEN_TEXTURES, FINE_ANN], outcomes[TEN_TEXTURES, FINE_SVM]
     return [
         at_least('fine textures are recognised, ANN (94.9 %)', ann, 0.949),

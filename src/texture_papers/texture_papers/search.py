@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The genetic search of Roberge et al. and Rispal et al.: features and learner, for each pair of textures too."""
+"""The genetic search of Roberge et al. and Rispal et al.: features and learner, also for each pair of textures."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def variables_of(recipe: str) -> tuple[str, ...]:
 
 
 def varied(base: Any, individual: Individual) -> Any:
-    """Return the recipe, of textures or of roughness, that an individual stands for."""
+    """Return the recipe, of textures or of roughness, that an individual encodes."""
     content = copy.deepcopy(base.as_mapping())
     section = content['inputs']['signal']
     names = (PEAKS, 'speed', *USED.values())
@@ -125,7 +125,7 @@ Score = Callable[[Any, Array, SlideArrays, Mask], HalfScore]
 
 
 def recognition(recipe: Any, values: Array, scans: SlideArrays, training: Mask) -> HalfScore:
-    """Return the shares of slides that are recognised."""
+    """Return the accuracies on slides."""
     codes = np.unique(scans.labels, return_inverse=True)[1]
     owner = np.repeat(np.arange(len(codes)), len(values) // len(codes))
     rows = training[owner]
@@ -325,7 +325,7 @@ def tuned_pairs(base: Any, params: SearchParams, found: Mapping[tuple[str, ...],
 
 
 def joined_recipe(recipes: Mapping[tuple[str, ...], Recipe], base: Recipe) -> Recipe:
-    """Return the recipe of one model in which each pair of textures has the features and the learner of its own recipe.
+    """Return the recipe of one model in which each pair of textures has the features and the learner of its recipe.
 
     Each input of a pair's recipe becomes one of the joined recipe, 'signal#1' and so on; equal ones are shared.
     """
@@ -339,6 +339,6 @@ def joined_recipe(recipes: Mapping[tuple[str, ...], Recipe], base: Recipe) -> Re
         pairs.append({'pair': list(pair), 'inputs': [name], 'learner': content['learner']})
     shared = base.as_mapping()
     learner = {'texture_papers.roberge:TunedPairs': {'learner': shared['learner'], 'pairs': pairs}}
-    about = f'{base.description} Each pair with variables of its own.'.strip()
+    about = f'{base.description} Each pair with separate variables.'.strip()
     return Recipe.from_mapping({**shared, 'description': about, 'inputs': inputs, 'learner': learner},
                                f'{base.name}-pairs')  # fmt: skip

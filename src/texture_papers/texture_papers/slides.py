@@ -33,7 +33,7 @@ CHUNK = 64  # windows described in one go: what they and their spectra take shou
 
 @dataclass(frozen=True)
 class View:
-    """One of the ways in which a trial measures a surface; the features of all views of a trial are joined."""
+    """One of the views in which a trial measures a surface; the features of all views of a trial are joined."""
 
     finger: int = 0
     turned_rad: float = 0.0
@@ -207,7 +207,7 @@ def _measured(
     sliding = replace(_sliding(visits, np.random.default_rng(seeds)), duration_s=duration_s)
     sliding = replace(sliding, direction_rad=sliding.direction_rad + view.turned_rad)
     touched = scene
-    if visits.radius_m:  # one object curved in another way
+    if visits.radius_m:  # one object with another curvature
         curved = replace(scene.surface(surface), shape=Curved(visits.radius_m))
         touched = replace(scene, surfaces={**scene.surfaces, surface: curved})
     return simulate_slide_streams(touched, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)

@@ -145,7 +145,7 @@ def test_without_an_explorer_each_folder_of_signals_is_a_namespace(tmp_path: Pat
     assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', namespace='finger1')] == ['signal']
 
 
-def test_only_the_stretch_asked_for_is_read(tmp_path: Path) -> None:
+def test_only_the_requested_stretch_is_read(tmp_path: Path) -> None:
     bag = write(tmp_path / 'bag', count=10)
     assert [log_ns - STAMP_NS for _, log_ns, _ in read_bag(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)] == [3, 4]
 
@@ -179,7 +179,7 @@ def test_a_bag_without_messages_of_the_suite_is_refused(tmp_path: Path) -> None:
         list(read_bag(tmp_path / 'bag'))
 
 
-# Writes batches, brings all but the last five to the disk, and ends as told.
+# Writes batches, brings all but the last five to the disk, and ends as requested.
 WRITER = """
 import os, resource, signal, sys
 import numpy as np
@@ -206,9 +206,9 @@ os.kill(os.getpid(), signal.SIGKILL)
 @pytest.mark.parametrize('most_bytes', [10**9, 40_000], ids=['killed', 'disk full'])
 def test_a_recording_that_was_cut_off_is_read_up_to_its_last_chunk(tmp_path: Path, most_bytes: int) -> None:
     command = [sys.executable, '-c', WRITER, str(tmp_path / 'bag'), str(most_bytes)]
-    said = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False).stdout.split()
+    printed = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False).stdout.split()
     read = [value.first_sample for _, _, value in read_bag(tmp_path / 'bag')]
-    assert read == [100 * number for number in range(int(said[-1]))]
+    assert read == [100 * number for number in range(int(printed[-1]))]
     assert (len(read) == 100) == (most_bytes > 40_000)
     assert find_bags([tmp_path]) == [tmp_path / 'bag']
 

@@ -19,7 +19,7 @@ N_FRAMES = 610
 def make_source(
     folder: Path, frame_time: np.ndarray | None = None, epochs: tuple[float, ...] = (1e9, 1e9 + 60)
 ) -> Path:
-    """Write two slides in the data set's format: PAC counts its frames, the slow columns hold their own number."""
+    """Write two slides in the data set's format: PAC counts its frames, slow columns hold their number."""
     frame_time = np.arange(N_FRAMES) * 0.01 if frame_time is None else frame_time
     n_frames = len(frame_time)
     frames = np.tile(np.arange(44), (n_frames, 1)).astype(np.int16)
@@ -115,7 +115,7 @@ def test_slides_follow_each_other_even_if_the_clock_went_back(tmp_path: Path) ->
 
 def test_the_sign_of_a_rectified_tone_is_restored() -> None:
     tone = np.sin(2 * np.pi * 130.0 * np.arange(2200) / 2200.0 + 0.3)
-    clear = np.abs(tone) > 0.1  # next to a zero crossing a curved line may be taken for either sign
+    clear = np.abs(tone) > 0.1  # next to a zero crossing a curved line may have either sign
     np.testing.assert_array_equal(restore_sign(np.abs(tone))[clear], tone[clear])
 
 

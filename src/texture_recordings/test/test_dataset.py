@@ -56,7 +56,7 @@ def test_slides_are_counted_for_each_surface_in_the_order_recorded_over_all_bags
     assert {slide.exploration_id for slide in find_slides([late, early], '2')} == {'early/2', 'late/0'}
 
 
-def test_a_slide_yields_its_own_messages_only(tmp_path: Path) -> None:
+def test_a_slide_yields_its_messages_only(tmp_path: Path) -> None:
     bags = [write(tmp_path / name, ['cork', 'felt', 'cork'], start_s=0) for name in 'ab']
     read = find_slides(bags, '1,3', topics=STREAMS)
     assert len(read) == 3

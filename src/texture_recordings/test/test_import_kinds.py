@@ -30,7 +30,7 @@ def csv(folder: Path, *columns: Any, names: str = 't,x', name: str = 'cork_1.csv
 
 
 def run(folder: Path, kinds: tuple[str, ...] = ('.csv', '.mat', '.h5', '.npz'), **content: Any) -> Any:
-    """Import what lies in a folder, by time in column t unless told otherwise."""
+    """Import what lies in a folder, by time in column t unless given otherwise."""
     unit, source = content.pop('unit', 's'), content.pop('source', folder)
     mapping = mapping_from({
         'files': '{material}_{run}.*',
@@ -98,7 +98,7 @@ def test_a_counter_that_rolls_over_goes_on_or_is_refused(tmp_path: Path, times: 
 
 
 @pytest.mark.parametrize('lengths', [(300, 300), (200, 200, 200), (100, 500), (500, 100), (570, 30), (590, 10)])
-def test_runs_that_were_appended_are_refused_or_slides_of_their_own(tmp_path: Path, lengths: tuple[int, ...]) -> None:
+def test_runs_that_were_appended_are_refused_or_separate_slides(tmp_path: Path, lengths: tuple[int, ...]) -> None:
     csv(tmp_path, np.concatenate([T[:count] for count in lengths]), X)
     with pytest.raises(InvalidData, match=r"row \d+, column 't': time goes back .*by: pause"):
         run(tmp_path)

@@ -29,7 +29,7 @@ def run_of(rng: np.random.Generator, rate_hz: float, first: int) -> np.ndarray:
 
 
 def stamped(rng: np.random.Generator, times: np.ndarray, rate_hz: float, faults: list[str]) -> np.ndarray:
-    """Return times as a buffer stamps them, of one size or read at any time, as a coarse clock does, too."""
+    """Return times as a buffer stamps them, of one size or read at any time, also as a coarse clock does."""
     if 'bursts' in faults:
         size = int(rng.integers(2, 12))
         rows = np.arange(len(times))
@@ -48,12 +48,12 @@ def damaged(rng: np.random.Generator, rate_hz: float, faults: list[str]) -> tupl
         run[:, 0] = stamped(rng, run[:, 0], rate_hz, faults)
     start_s = 0.0 if 'resets' in faults or rng.random() < 0.5 else float(rng.choice([1.7e9, 5.0, 12345.678]))
     rows = np.concatenate(runs) + np.array([start_s, 0.0])
-    for fault, share in (('drops', 0.05), ('heavy drops', 0.6)):
+    for fault, fraction in (('drops', 0.05), ('heavy drops', 0.6)):
         if fault in faults:
-            rows = rows[rng.random(len(rows)) > share * rng.random()]
-    for fault, share in (('repeats', 0.05), ('heavy repeats', 0.5)):
+            rows = rows[rng.random(len(rows)) > fraction * rng.random()]
+    for fault, fraction in (('repeats', 0.05), ('heavy repeats', 0.5)):
         if fault in faults:
-            rows = np.repeat(rows, 1 + (rng.random(len(rows)) < share * rng.random()), axis=0)
+            rows = np.repeat(rows, 1 + (rng.random(len(rows)) < fraction * rng.random()), axis=0)
     if 'twice' in faults:
         rows = np.repeat(rows, 2, axis=0)
     if 'swaps' in faults:

@@ -41,7 +41,7 @@ importlib.import_module(sys.argv.pop(1)).main()
 
 @contextmanager
 def alone(module: str, log: Path, **parameters: str) -> Iterator[subprocess.Popen]:
-    """Run a node by itself, and end it as Ctrl-C does."""
+    """Run a single node, and end it as Ctrl-C does."""
     given = [part for name, value in parameters.items() for part in ('-p', f'{name}:={value}')]
     command = [sys.executable, '-c', ALONE, module, '--ros-args', *given]
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
@@ -59,13 +59,13 @@ def alone(module: str, log: Path, **parameters: str) -> Iterator[subprocess.Pope
 
 
 def recorded(reports: list[DiagnosticArray]) -> int:
-    """Return how many samples the recorder says it has."""
+    """Return how many samples the recorder reports."""
     values = [value for report in reports for status in report.status for value in status.values]
     return max((int(value.value) for value in values if value.key == 'samples /signal'), default=0)
 
 
 def ended(reports: list[DiagnosticArray]) -> list[str]:
-    """Return the nodes that said that they ended."""
+    """Return the nodes that reported their end."""
     return [status.name for report in reports for status in report.status if has_ended(status)]
 
 
@@ -86,7 +86,7 @@ def recording(folder: Path) -> Iterator[tuple[LocalGraph, list[DiagnosticArray],
 
 
 def samples_in_order(bag: Path) -> int:
-    """Return how many samples a bag has, each of which has the value that its number says."""
+    """Return how many samples a bag has, each of which has the value of its number."""
     batches = [batch for _, _, batch in read_bag(bag, ('signal',))]
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
     return sum(len(batch.samples) for batch in batches)
@@ -96,8 +96,8 @@ def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_o
     with recording(tmp_path) as (graph, reports, record, sensor):
         graph.until(lambda: recorded(reports) > 300 or record.poll() is not None or sensor.poll() is not None)
         assert not ended(reports)
-    said = '\n'.join(log.read_text() for log in tmp_path.glob('*.log'))
-    assert (record.returncode, sensor.returncode) == (0, 0), said
+    logs = '\n'.join(log.read_text() for log in tmp_path.glob('*.log'))
+    assert (record.returncode, sensor.returncode) == (0, 0), logs
     assert samples_in_order(tmp_path / 'bag') > 300
 
 

@@ -137,7 +137,7 @@ def test_streams_of_other_names_transforms_logs_and_parameters_are_recorded_and_
         (
             'replay',
             {'bag': 'source', 'deadline_s': 0.2},
-            "nobody listens to 'signal' (waited 0.2 s)",
+            "nothing subscribes to 'signal' (waited 0.2 s)",
         ),
         ('replay', {'bag': 'source', 'slides': '7-9'}, 'there are 1 to 2'),
         ('record', {}, "parameter 'out' is ''"),

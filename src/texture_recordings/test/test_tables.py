@@ -90,7 +90,7 @@ def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: P
         "'2031-05-01, cork_thick, v20.csv', row 63, column 'all': 1 cells, 6 are needed",
         "'2031-05-01, linen, v20.csv', row 53, column 'acc_x': 'oops' is not a finite number",
     ]
-    assert sum(report.slides.values()) == 18  # a malformed row is no border
+    assert sum(report.slides.values()) == 18  # a malformed row does not end a slide
     samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
     assert np.isnan(samples[0]).any(axis=1).nonzero()[0].tolist() == [10, 20]
 

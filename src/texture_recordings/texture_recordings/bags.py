@@ -77,7 +77,7 @@ except ModuleNotFoundError as error:  # rosbags brings the others
 # it ended behind its last whole chunk.
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
-MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # a bag may unpack to so much, or to so many times its size
+MAX_UNPACKED_BYTES, MAX_RATIO = 200 * MB, 100  # largest unpacked size of a bag, and its ratio to the packed size
 CHUNK = 0x06
 CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
@@ -121,7 +121,7 @@ vars(rosbags.rosbag2.reader)['zstd'] = SimpleNamespace(
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
-    """A path from which only regular files are read, whoever opens them; files of text are short."""
+    """A path from which only regular files are read; files of text are short."""
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
@@ -186,7 +186,7 @@ def _has_end(file: BinaryIO) -> bool:
     if summary and checksum:
         file.seek(min(summary, size))
         if crc32(file.read()[:-CHECKSUM_FROM_END]) != checksum:
-            raise FileRefused('its index was altered: the checksum is another')
+            raise FileRefused('its index was altered: the checksum differs')
     file.seek(0)
     return True
 
@@ -261,11 +261,11 @@ def message_types(connection: Connection | None = None) -> Typestore:
     """Return message types by the definition that a bag stores for a connection, else those of ROS 2 and of sound."""
     definition = connection.msgdef if connection else None
     if connection and definition and definition.format is MessageDefinitionFormat.MSG:
-        own = get_typestore(Stores.EMPTY)
+        typestore = get_typestore(Stores.EMPTY)
         parsed = get_types_from_msg(definition.data, connection.msgtype)
         # Constants and defaults are left out: of a file nothing but names, as the grammar allows them, becomes code.
-        own.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
-        return own
+        typestore.register({name: ([], fields) for name, (_, fields, *_) in parsed.items()})
+        return typestore
     store = get_typestore(Stores.ROS2_JAZZY)
     for name, text in AUDIO.items():
         store.register(get_types_from_msg(text, name))
@@ -363,7 +363,7 @@ BROKEN = (
 
 
 class RawMessage(NamedTuple):
-    """One message as it lies in a bag."""
+    """One message as stored in a bag."""
 
     topic: str
     msgtype: str
@@ -372,7 +372,7 @@ class RawMessage(NamedTuple):
 
 
 def is_bag(path: Path) -> bool:
-    """Say whether something looks like a bag: a folder with metadata.yaml or that was cut off, or an MCAP file."""
+    """Return whether something looks like a bag: a folder with metadata.yaml or that was cut off, or an MCAP file."""
     whole = (path / 'metadata.yaml').is_file() or (path.is_file() and path.suffix == '.mcap')
     return whole or _cut_off_file(path) is not None
 
@@ -393,7 +393,7 @@ def _cut_off_file(path: Path) -> Path | None:
 
 
 def is_cut_off(path: Path) -> bool:
-    """Say whether a file of a bag has no end, as that of a recorder that was killed."""
+    """Return whether a file of a bag has no end, as that of a recorder that was killed."""
     for one in path.glob('*.mcap') if path.is_dir() else [path]:
         with open_regular(one, None) as file:
             if not _has_end(file):
@@ -491,9 +491,9 @@ def _read(
         for file in files:
             open_regular(file, None).close()
         with Reader(checked) as reader:
-            own = reader.connections if foreign else connections_below(path, reader.connections, namespace)
+            candidates = reader.connections if foreign else connections_below(path, reader.connections, namespace)
             names = topic_names(c.topic for c in reader.connections if c.msgtype in MESSAGES)
-            connections = [c for c in own if chosen(c, names.get(c.topic, c.topic))]
+            connections = [c for c in candidates if chosen(c, names.get(c.topic, c.topic))]
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)
@@ -514,7 +514,7 @@ def _files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
-    # As rosbags finds them: beside the metadata, wherever the entry says that they were.
+    # As rosbags finds them: next to the metadata, whatever folder the entry names.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
 
 
@@ -533,7 +533,7 @@ class Continuity:
 
     @property
     def losses(self) -> str:
-        """What was lost, in words, '' if nothing: of a restart, which numbers anew, nobody can tell how much."""
+        """What was lost, in words, '' if nothing; losses in a restart, which numbers from 0, are unknown."""
         lost, restarts = self.lost.total(), self.restarts.total()
         unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
         return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
@@ -588,7 +588,7 @@ def _offered(quality: Quality) -> Qos:
     return Qos(keep, quality.depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)
 
 
-# Of topics that the suite does not publish, or not under a name of its own. Who joins late gets all that is latched.
+# Of topics that the suite does not publish, or under a standard name. Late subscribers get all that is latched.
 LATCHED = Quality(100, reliable=True, latched=True)
 COMMON: Mapping[str, Quality] = {
     '/diagnostics': Quality(100, reliable=True, latched=False),
@@ -599,7 +599,7 @@ COMMON: Mapping[str, Quality] = {
 
 
 def quality_of(topic: str) -> Quality | None:
-    """Return the quality of service of a topic by its whole name; None if it is none that the suite knows."""
+    """Return the quality of service of a topic by its whole name; None if it is no topic of the suite."""
     if topic.endswith('_baseline'):
         return LATCHED
     return COMMON.get(topic, QUALITIES.get(short_name(topic)))
@@ -612,7 +612,7 @@ class BagWriter:
         self.path = Path(path)
         self._namespace = '/' + namespace.strip('/')
         self._connections: dict[tuple[str, str], Connection] = {}
-        self.qualities: dict[str, Quality] = {}  # of topics that `quality_of` does not know, as they were offered
+        self.qualities: dict[str, Quality] = {}  # of topics unknown to `quality_of`, as they were offered
         if self.path.exists():
             raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
         self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
@@ -623,7 +623,7 @@ class BagWriter:
             raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
         storage: Any = self._writer.storage
         self._storage = storage
-        # rosbags writes 0 for the checksum of a chunk, so that nobody could tell a whole chunk from one that the disk
+        # rosbags writes 0 for the checksum of a chunk, so that a whole chunk would look like one that the disk
         # has in part: the checksum is written over it.
         self._close_chunk = self._storage.close_chunk
         self._storage.close_chunk = self._close_with_checksum

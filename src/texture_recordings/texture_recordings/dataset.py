@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 HOPS = 4  # windows of the least distance overlap so often
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
-# Speeds and forces that differ by less are one condition: an arm does not keep to what it was asked for.
+# Speeds and forces that differ by less are one condition: an arm deviates from its request.
 SAME_RATIO, SAME_RAD = 1.05, 0.1
 
 
@@ -233,7 +233,7 @@ class SlideDataset:
         Raises
         ------
         InvalidData
-            If there is no such condition, or a slide does not tell it.
+            If there is no such condition, or a slide does not have it.
         """
         if name not in CONDITIONS:
             raise InvalidData(f"slides have no condition '{name}'; use one of {', '.join(CONDITIONS)}")
@@ -247,7 +247,7 @@ class SlideDataset:
         unknown = np.flatnonzero(np.isnan(values))
         if len(unknown):
             raise InvalidData(
-                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others do not tell their {name}; "
+                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others have no {name}; "
                 f'use slides that were recorded with it, or another condition'
             )
         return _grouped(values, circular=name == 'direction')
@@ -268,7 +268,7 @@ class SlideDataset:
         labels
             Surfaces; None for all.
         where
-            Says of a slide whether to keep it.
+            Whether to keep a slide.
 
         Returns
         -------
@@ -306,8 +306,8 @@ class SlideDataset:
         """Return the slides cut into parts at different places of their surface, which keep their numbers.
 
         The path of each surface is divided into equal lengths: along the longest extent of the reported positions;
-        where a slide tells none, by the distance from its start; without speeds, by the time. Slides that run the other
-        way are then counted from the other end. No window spans two parts, as each is a slide of its own.
+        where a slide has none, by the distance from its start; without speeds, by the time. Slides that run the other
+        way are then counted from the other end. No window spans two parts, as each is a separate slide.
 
         Slides over one track are one place, however many: only the parts of it show how far a training reaches.
 
@@ -335,12 +335,12 @@ class SlideDataset:
         if count < 2:
             raise InvalidData(f'slides are to be cut into {count} parts; 2 or more are needed')
         if cut := next((slide for slide in self.slides if slide.is_part or not slide.sliding), None):
-            why = 'is a part already' if cut.is_part else 'tells no time of sliding'
+            why = 'is a part already' if cut.is_part else 'has no time of sliding'
             raise InvalidData(f"slide '{cut.name}' in '{cut.bag}' {why}; cut whole slides with their states")
         runs: dict[str, list[Stretch]] = {}
         for surface in dict.fromkeys(slide.surface for slide in self.slides):
-            own = [slide for slide in self.slides if slide.surface == surface]
-            runs |= {slide.name: found for slide, found in zip(own, stretches(own, count), strict=True)}
+            of_surface = [slide for slide in self.slides if slide.surface == surface]
+            runs |= {slide.name: found for slide, found in zip(of_surface, stretches(of_surface, count), strict=True)}
         return SlideDataset(
             tuple(
                 part_of(slide, begin_ns, end_ns, f'{cell + 1}/{count}')
@@ -432,7 +432,7 @@ class SlideDataset:
     def tare_faults(self, feature_set: FeatureSet) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round, as the node warns.
 
-        Streams whose sensor has no name, as arrays from elsewhere, tell nothing.
+        Streams whose sensor has no name, as arrays from elsewhere, are ignored.
         """
         faults: dict[str, None] = {}
         for slide in self.slides:
@@ -478,7 +478,7 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
     """Return the windows of a slide and its end, as the feature extractor on the robot cuts them."""
     missing = [topic for topic in feature_set.topics if not slide.signals.get(topic)]
     if missing:
-        # The bag may hold streams that the recipe did not ask for.
+        # The bag may hold streams that the recipe does not use.
         in_bag = topics_in(slide.bag, slide.namespace) if is_bag(slide.bag) else slide.signals
         there = sorted(topic for topic in in_bag if topic not in missing and short_name(topic) in STREAMS)
         raise ModelMismatch(
@@ -545,8 +545,8 @@ def _grouped(values: Array, *, circular: bool) -> Array:
     """Return the rounded mean of the group of each value, (n,): groups end where neighbours in order differ."""
     order = np.argsort(values, kind='stable')
     ordered = values[order]
-    apart = np.diff(ordered) > (SAME_RAD if circular else (SAME_RATIO - 1.0) * np.abs(ordered[:-1]))
-    group = np.concatenate(([0], np.cumsum(apart)))
+    starts_group = np.diff(ordered) > (SAME_RAD if circular else (SAME_RATIO - 1.0) * np.abs(ordered[:-1]))
+    group = np.concatenate(([0], np.cumsum(starts_group)))
     if circular and group[-1] and ordered[0] + math.tau - ordered[-1] <= SAME_RAD:  # -π is π
         ordered = np.where(group == group[-1], ordered - math.tau, ordered)
         group[group == group[-1]] = 0

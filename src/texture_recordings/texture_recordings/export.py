@@ -105,7 +105,7 @@ def _rows(arrow: Any, samples: SlideSamples) -> dict[str, Any]:
 
 
 def _mapping(topic: str, samples: Sequence[SlideSamples]) -> Mapping[str, Any]:
-    """Return what `texture import table` must know of an exported file."""
+    """Return the mapping of an exported file for `texture import table`."""
     first, batch = samples[0], samples[0].slide.signals[topic][0]
     known = {
         name: {'column': column}

@@ -26,7 +26,7 @@ from texture_recordings.slides import parse_selection
 # A slide of the BioTac data set, and how the finger moved in it.
 
 FRAME_NS = 10_000_000  # a frame every 10 ms; its recorded times jitter by the host's scheduling
-# Every slide is cut to the length of the shortest material, or its length would tell the label. The finger runs at
+# Every slide is cut to the length of the shortest material, or its length would reveal the label. The finger runs at
 # speed from the first frame on.
 SLIDE_FRAMES = 600
 LONGEST_S = 1000.0  # of one slide; frames that are missing are counted, however many
@@ -120,7 +120,7 @@ def import_biotac20(source: str | Path, out: str | Path, slides: str = '', mater
 def _import_material(file: Path, out: Path, wanted: frozenset[int] | None) -> Path:
     recordings = list(_recordings(file, wanted))
     if not recordings:
-        raise InvalidData(f"'{file}' has none of the slides asked for; it has 1 to 40")
+        raise InvalidData(f"'{file}' has none of the requested slides; it has 1 to 40")
     ready_ns, next_frame = 0, 0
     with BagWriter(out) as bag:
         for recording in recordings:
@@ -274,7 +274,7 @@ class SlideSet:
             numbered = enumerate(sorted(found[surface]), 1)
             chosen = [slide for number, slide in numbered if wanted is None or number in wanted]
             if not chosen:
-                raise InvalidData(f"'{surface}' has none of the slides asked for; it has 1 to {len(found[surface])}")
+                raise InvalidData(f"'{surface}' has none of the requested slides; it has 1 to {len(found[surface])}")
             for order, key in chosen:
                 bags[self.session(surface, order)].append((key, surface, order))
         ordered = sorted(bags.items(), key=lambda item: item[0][1])
@@ -392,12 +392,12 @@ def _fabricslide_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlid
 # one `slides.npz` with a key `textureNNN/speedSSS/forceF.F` (mm/s, N over contact) for each slide. Slides are numbered
 # by speed, and by force within a speed. The recorded stamps jitter by half a sample while the samples are evenly spaced
 # (read so, the speeds agree better with each other): each slide is read as evenly spaced from its first stamp to its
-# last, and brought from its own rate (310 to 323 Hz) to 320 Hz by a cubic spline. `force_n` is that beyond contact.
+# last, and resampled from its rate (310 to 323 Hz) to 320 Hz by a cubic spline. `force_n` is that beyond contact.
 
 NTP21_TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
 RATE_HZ = 320.0
-SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would ask for any number of samples
+SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would need any number of samples
 
 
 def _ntp21_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
@@ -412,9 +412,9 @@ def evenly(samples: Array, duration_s: float) -> Array:
 
     if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
         raise ValueError(f'{len(samples)} samples lasted {duration_s:g} s, at {RATE_HZ:g} Hz')
-    own = np.linspace(0.0, duration_s, len(samples))
+    sample_times = np.linspace(0.0, duration_s, len(samples))
     grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
-    values: Array = CubicSpline(own, samples, axis=0)(grid)
+    values: Array = CubicSpline(sample_times, samples, axis=0)(grid)
     return values
 
 
@@ -425,16 +425,16 @@ def evenly(samples: Array, duration_s: float) -> Array:
 # with a key `date/Fabric/forceN/speedmms[/repeat]` for each slide. Slides of a fabric are numbered by date, then force,
 # speed and repeat. Direction: +π/2 for speeds above 0, −π/2 below. Forces are as the keys name them; those of 100 and
 # more (23 May) are hardly newtons. No rate is published. Rows of a slide grow by 28 (May) to 32 (February) m over the
-# speed in m/s; at 50 Hz that is a way of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
+# speed in m/s; at 50 Hz that is a distance of 0.56 to 0.64 m, and the same finger slides 0.594 m in fabricslide.
 
 NOMINAL_HZ = 50.0
-FREE_SHARE = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact
+FREE_FRACTION = 0.2  # of the load that is reached in a tenth of the slide: below, the finger is not in contact
 
 
 def _fingersense_slide(order: tuple[Any, ...], recorded: AnyArray) -> SteadySlide:
     _, force_n, speed_mm_s, _ = order
     load = recorded.mean(axis=1)
-    touching = np.flatnonzero(load > FREE_SHARE * np.quantile(load, 0.9))
+    touching = np.flatnonzero(load > FREE_FRACTION * np.quantile(load, 0.9))
     steady = range(int(touching[0]), int(touching[-1]) + 1) if len(touching) else None
     return SteadySlide(recorded, abs(speed_mm_s) / 1000.0, force_n, math.copysign(math.pi / 2, speed_mm_s), steady)
 
@@ -445,7 +445,7 @@ def _fingersense_session(_surface: str, order: Sequence[Any]) -> tuple[str, int]
 
 
 # --------------------
-# Data sets that `texture import` knows, each called as `import_biotac20` is.
+# Data sets of `texture import`, each called as `import_biotac20` is.
 
 Importer = Callable[..., list[Path]]
 IMPORTS: Mapping[str, Importer] = {
@@ -466,7 +466,7 @@ IMPORTS: Mapping[str, Importer] = {
         order=lambda date, fabric, force, speed, repeat: (fabric, (date, float(force), int(speed), int(repeat or 0))),
         slide=_fingersense_slide, session=_fingersense_session,
     ),
-    # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as it stands in the history of
+    # Contact sound of 29 textures that a tool strokes by hand (Strese et al. 2014), as stored in the history of
     # github shinolab/vibrotactile-autoencoder, joined into one file. The whole stroke counts as sliding; speed, force
     # and direction are unknown.
     'lmt29': SlideSet(

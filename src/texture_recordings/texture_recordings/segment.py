@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Give a bag the exploration states that its signals tell: for bags without them, or with wrong ones."""
+"""Find the exploration states of a bag from its signals: for bags without them, or with wrong ones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def segment_bags(
     surface: str = '',
     namespace: str | None = None,
 ) -> dict[Path, int]:
-    """Copy bags, their exploration states replaced by those that the signals tell; return the slides in each copy.
+    """Copy bags, their exploration states replaced by those found in the signals; return the slides in each copy.
 
     Surface, speed and force of a slide are those of the last state before its middle, if there is one. All other
     messages are copied as they are.
@@ -42,7 +42,7 @@ def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, na
     for topic, _, value in read_bag(path, (FAST_TOPIC, STATE_TOPIC), namespace):
         (reported if topic == STATE_TOPIC else signals).append(value)
     if not signals:
-        raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; record the vibration too")
+        raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; also record the vibration")
     found = segment_recording(signals, params, exploration_id=path.name)
     states = _labelled(found, sorted(reported, key=lambda state: state.stamp_ns), surface)
     _write(path, out, states, namespace)
@@ -72,7 +72,7 @@ def _labelled(
 
 
 def _write(path: Path, out: Path, states: Sequence[ExplorationState], namespace: str | None) -> None:
-    """Copy a bag, with other states: each is logged before the samples that it covers, as an explorer would tell it."""
+    """Copy a bag, with other states: each is logged before the samples that it covers, as by an explorer."""
     waiting = list(states)
     with BagWriter(out) as bag:
         prefix = ''

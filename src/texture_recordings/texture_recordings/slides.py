@@ -71,7 +71,7 @@ class LabelledSlide:
 
     @property
     def whole_name(self) -> str:
-        """Name of the slide of which this is a part; of a whole slide its own."""
+        """Name of the slide of which this is a part; of a whole slide its name."""
         return f'{self.surface}/{self.number}'
 
     @property
@@ -116,9 +116,9 @@ def _mean(values: Iterable[float]) -> float:
 
 
 # --------------------
-# How a slide was made, as the states of its exploration tell.
+# How a slide was made, according to the states of its exploration.
 
-STRAIGHT = 'linear_slide'  # of other motions, states do not tell all that is needed to make them again
+STRAIGHT = 'linear_slide'  # of other motions, states do not hold all that is needed to repeat them
 
 
 def motion_made(states: Sequence[ExplorationState]) -> SlideMotion | None:
@@ -149,7 +149,7 @@ class SlideSamples:
     Parameters
     ----------
     slide
-        Where it lies, its surface and number.
+        Its bag, surface and number.
     before : (m, n_channels)
         Samples before the slide began, in contact; often none.
     samples : (n, n_channels)
@@ -264,16 +264,16 @@ def find_slides(
 ) -> list[LabelledSlide]:
     """Return the labelled slides in bags, by bag and time, with the signals of topics; each bag is read once.
 
-    Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
+    Slides are counted separately for each surface, over all the bags, in the order in which they were recorded.
     """
     wanted = parse_selection(slides)
     paths = find_bags(bags)
     labelled = []
     for path in progress(paths, 'read bags', len(paths)):
-        own = _slides_of(path, namespace, topics)
-        if not own and len(paths) > 1:
+        slides_of_bag = _slides_of(path, namespace, topics)
+        if not slides_of_bag and len(paths) > 1:
             logging.getLogger(__name__).warning("the bag '%s' has no labelled slide, so nothing is taken from it", path)
-        labelled += own
+        labelled += slides_of_bag
     if not labelled:
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
@@ -327,7 +327,7 @@ def _begins(was: ExplorationState | None, now: ExplorationState) -> bool:
 
 
 def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
-    """Return slides numbered for each surface by itself from 1, in the order of their start."""
+    """Return slides numbered separately for each surface from 1, in the order of their start."""
     by_surface: defaultdict[str, list[LabelledSlide]] = defaultdict(list)
     for slide in slides:
         by_surface[slide.surface].append(slide)
@@ -398,18 +398,18 @@ def _ways(slides: Sequence[LabelledSlide], grids: Sequence[AnyArray]) -> tuple[l
     """Return how far along the path of their surface slides were at the times of grids, and where the path lies."""
     stamps = [np.array([state.stamp_ns for state in slide.sliding]) for slide in slides]
     points = [np.array([(state.x_m, state.y_m) for state in slide.sliding]) for slide in slides]
-    if all(np.isfinite(own).all() for own in points) and len({s.frame_id for x in slides for s in x.sliding}) == 1:
+    if all(np.isfinite(xyz).all() for xyz in points) and len({s.frame_id for x in slides for s in x.sliding}) == 1:
         together = np.concatenate(points)
         axis = np.linalg.svd(together - together.mean(axis=0), full_matrices=False)[2][0]
-        ways = [np.interp(grid, at, own @ axis) for grid, at, own in zip(grids, stamps, points, strict=True)]
+        ways = [np.interp(grid, at, xyz @ axis) for grid, at, xyz in zip(grids, stamps, points, strict=True)]
         return ways, min(map(np.min, ways)), max(map(np.max, ways))
     # Without positions all slides of a surface are taken to run over one track, from one end of it or the other.
     speeds = [np.array([state.speed_m_s for state in slide.sliding]) for slide in slides]
-    if not all(np.isfinite(own).all() for own in speeds):
-        speeds = [np.ones(len(own)) for own in speeds]
+    if not all(np.isfinite(speed).all() for speed in speeds):
+        speeds = [np.ones(len(speed)) for speed in speeds]
     ways = [
-        np.cumsum(np.r_[0.0, np.interp(grid, at, own)[:-1]]) * (STEP_NS / NANOSECONDS)
-        for grid, at, own in zip(grids, stamps, speeds, strict=True)
+        np.cumsum(np.r_[0.0, np.interp(grid, at, speed)[:-1]]) * (STEP_NS / NANOSECONDS)
+        for grid, at, speed in zip(grids, stamps, speeds, strict=True)
     ]
     length = float(np.median([way[-1] for way in ways]))
     turned = [math.cos(slide.direction_rad - slides[0].direction_rad) < 0.0 for slide in slides]  # NaN is not turned

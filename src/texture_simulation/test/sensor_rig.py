@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A sensor on its emulated device, whose samples encode their own index, so that every fault is detected."""
+"""A sensor on its emulated device, whose samples encode their index, so that every fault is detected."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def feed_tsf85(shape: tuple[int, ...]) -> Feed:
 
 
 def feed_biotac(slots: int, fingers: int) -> Feed:
-    """Return what feeds a board with frames of so many slots."""
+    """Return what feeds a board with frames of this many slots."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first * slots, (first + ticks) * slots) % 4096
@@ -89,7 +89,7 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
 
 
 def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
-    """Return what feeds so many channels alike, with numbers of this type."""
+    """Return what feeds this many channels alike, with numbers of this type."""
 
     def feed(device: Any, first: int, ticks: int) -> None:
         numbers = np.arange(first, first + ticks) % 30_000
@@ -208,7 +208,7 @@ class Rig:
             action()
 
     def read_s(self, seconds: float) -> dict[str, list[TactileSignal]]:
-        """Return, by topic, what comes until so many seconds of samples have; a device that is gone is opened again."""
+        """Return, by topic, what comes until this many seconds of samples have; a lost device is opened again."""
         topics: dict[str, list[TactileSignal]] = {}
         deadline_s = time.monotonic() + DEADLINE_S
         while sum(len(batch.samples) for batch in topics.get(self.case.topic, [])) < seconds * self.case.rate_hz:
@@ -242,7 +242,7 @@ class Rig:
         raise TimeoutError(f'{self._name}: no error came')
 
     def offsets(self, batches: Sequence[TactileSignal]) -> AnyArray:
-        """Return what each finite sample holds less what its index asks for: constant if each is in its place."""
+        """Return the difference of each finite sample and the value of its index: constant if each is in its place."""
         values = np.concatenate([batch.samples[:, 0] for batch in batches])
         indices = np.concatenate([np.arange(batch.first_sample, batch.next_sample) for batch in batches])
         offsets: AnyArray = (values - self.case.slope * indices) % self.case.modulus

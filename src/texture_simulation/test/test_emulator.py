@@ -28,7 +28,7 @@ DEADLINE_S = 15.0
 
 
 class Arm:
-    """Reports a finger that slides for ever along x, as emulated arms do."""
+    """Reports a finger that slides without end along x, as emulated arms do."""
 
     def __init__(self, emulator: FingerSender, speed_m_s: float = 0.1, force_n: float = 2.0) -> None:
         self._emulator, self._speed_m_s, self._force_n = emulator, speed_m_s, force_n

@@ -49,7 +49,7 @@ def test_the_driver_reads_the_emulators_frames() -> None:
     assert (serials.kind, serials.body) == (ord('S'), b'BT-1,,BT-3')
 
 
-def test_a_frame_is_what_the_protocol_says_byte_by_byte():
+def test_a_frame_is_what_the_protocol_defines_byte_by_byte():
     counts = np.array([[0x0102, -1], [0, 0x7F00]], dtype=np.int16)
     data = encode(SampledStream(kind=1, rate_hz=2500.0, columns=2, rows=2), 65_536 + 3, 2**32 + 0x04030201, counts)
     # Before stuffing: 01 01 0300 01020304 02 02 | 0201 FFFF 0000 007F | checksum, whose bits were worked by hand.

@@ -73,7 +73,7 @@ def test_the_stribeck_curve_falls_from_static_to_kinetic() -> None:
     assert found == pytest.approx([USUAL.static, at_one, USUAL.kinetic])
 
 
-def test_the_tip_moves_as_scipys_solver_says_of_the_equations_of_the_bristles() -> None:
+def test_the_tip_moves_as_scipy_solves_the_equations_of_the_bristles() -> None:
     friction, speed, force = StickSlip(), 0.1, 1.0
 
     def slope(_: float, state: np.ndarray) -> list[float]:
@@ -218,7 +218,7 @@ def test_every_sensor_senses_a_skin_that_hangs_and_lets_go(sensor: str) -> None:
     assert (smooth.std(axis=1) < 0.01 * hangs.std(axis=1)).all()
 
 
-def test_the_skin_lets_go_as_often_as_the_formula_of_slow_drag_says() -> None:
+def test_the_skin_lets_go_as_often_as_the_formula_of_slow_drag_predicts() -> None:
     scene = table(HANGS)
     measured = slides(scene, 1, 0.01, 1.5, 4.0)[0, :, 0]
     jumps = np.flatnonzero(np.abs(measured) > 0.5 * np.abs(measured).max()) / 1000
@@ -232,7 +232,7 @@ def test_slides_cut_out_of_longer_ones_begin_anywhere_in_the_cycle_and_a_seed_is
     assert np.abs(np.corrcoef(first)[np.triu_indices(3, 1)]).max() < 0.9
 
 
-def test_gliding_pulls_as_the_stribeck_curve_says_and_builds_up_without_a_jump() -> None:
+def test_gliding_pulls_as_the_stribeck_curve_predicts_and_builds_up_without_a_jump() -> None:
     values = {'static': 0.9, 'kinetic': 0.5, 'stribeck_m_s': 0.05, 'viscous_s_m': 0.1}
     for speed_m_s in (0.01, 0.05, 0.2):
         expected = 0.5 + 0.4 * np.exp(-((speed_m_s / 0.05) ** 2)) + 0.1 * speed_m_s

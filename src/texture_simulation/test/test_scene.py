@@ -60,7 +60,7 @@ SENSOR_OF = {
 
 
 @pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
-def test_a_scene_says_what_it_is_and_where_its_sizes_come_from(path: Path) -> None:
+def test_a_scene_documents_what_it_is_and_where_its_sizes_come_from(path: Path) -> None:
     scene, text = load_scene(str(path)), path.read_text(encoding='utf-8')
     assert scene.sensor in SENSORS
     assert scene.sensor == SENSOR_OF.get(path.stem, scene.sensor)
@@ -74,7 +74,7 @@ def test_all_terms_of_the_library_are_used_by_some_scene() -> None:
     assert used == set(KINDS.values())
 
 
-def test_grades_of_people_lie_apart_one_for_each_texture() -> None:
+def test_grades_of_people_are_separate_one_for_each_texture() -> None:
     with (find_file('ets_roughness', 'texture_simulation', 'config/grades', 'grades', '.csv')).open(
         encoding='utf-8'
     ) as file:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What every sensor that has a device must do, on that device emulated at the wire."""
+"""What every sensor that has a device must do, on that device emulated at protocol level."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def test_a_stall_of_the_line_delays_and_loses_nothing(make: Make, name: str) -> 
         batches += rig.sensor.read().get(rig.case.topic, [])
     rig.set(stalled=False)
     batches += rig.signal_s(0.4)
-    # On a machine that stalls, too, what was kept back may be more than the line takes at once.
+    # Also on a machine that stalls, what was kept back may be more than the line takes at once.
     assert lost_samples(batches) == 0 or rig.device.dropped_bytes
     assert len(set(rig.offsets(batches))) == 1
     assert max(abs(rig.lateness_s(batch)) for batch in batches[len(batches) // 2 :]) < 0.04

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Drivers on their emulated devices: what the contract of all sensors does not ask."""
+"""Drivers on their emulated devices: what the contract of all sensors does not cover."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advi
     assert 'sends no whole frames' in rig.fault()
 
 
-def test_all_fingers_of_a_board_have_topics_of_their_own(open_rig: Make) -> None:
+def test_all_fingers_of_a_board_have_separate_topics(open_rig: Make) -> None:
     rig = board(open_rig, serials=('BT-0', 'BT-1', ''), prefix='finger1/', fingers=(0, 1, 2))
     topics = rig.read_s(0.1)
     assert not topics['finger2/signal']

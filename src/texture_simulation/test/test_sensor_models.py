@@ -181,18 +181,18 @@ def test_the_load_wanders_over_the_fingertip_by_the_share_of_its_radius_in_both(
     assert BASELINE[0] < electrodes.max() < BASELINE[1]
 
 
-def test_a_finger_has_a_sensitivity_a_skin_and_a_noise_of_its_own() -> None:
+def test_a_finger_has_an_individual_sensitivity_skin_and_noise() -> None:
     spread = {'relative': 0.0, 'skin': 0.2, 'noise': 0.5}
     scene = object_of(RELIEF, effects={'finger_spread': spread, 'noise': {'fast_count': 1.0}})
     drawn = np.random.default_rng([SALT, 3]).standard_normal(3)
-    own = scene.of_finger(3)
-    assert own.contact.blur_m == pytest.approx(scene.contact.blur_m * np.exp(0.2 * drawn[1]))
-    assert own.contact.stiffness_n_m == pytest.approx(scene.contact.stiffness_n_m * np.exp(-0.2 * drawn[1]))
-    assert own.effects['noise'].fast_count == pytest.approx(np.exp(0.5 * drawn[2]))
-    assert own.surfaces is scene.surfaces
+    individual = scene.of_finger(3)
+    assert individual.contact.blur_m == pytest.approx(scene.contact.blur_m * np.exp(0.2 * drawn[1]))
+    assert individual.contact.stiffness_n_m == pytest.approx(scene.contact.stiffness_n_m * np.exp(-0.2 * drawn[1]))
+    assert individual.effects['noise'].fast_count == pytest.approx(np.exp(0.5 * drawn[2]))
+    assert individual.surfaces is scene.surfaces
 
 
-def test_two_fingers_measure_one_object_differently_where_they_are_told_to() -> None:
+def test_two_fingers_measure_one_object_differently_where_the_scene_defines_it() -> None:
     alike = [measured(object_of(RELIEF), finger)['signal'].std() for finger in (1, 2)]
     assert alike[0] == pytest.approx(alike[1], rel=1e-9)
     spread = object_of(RELIEF, effects={'finger_spread': {'relative': 0.2, 'skin': 0.2}})

@@ -63,7 +63,7 @@ def test_the_inertial_unit_is_published_as_imu_too(graph: LocalGraph, tmp_path: 
     assert imus[0].orientation_covariance[0] == -1.0  # no orientation
 
 
-def test_a_tare_is_asked_for_and_the_baseline_is_published_and_subtracted(graph: LocalGraph, tmp_path: Path) -> None:
+def test_a_tare_is_requested_and_the_baseline_is_published_and_subtracted(graph: LocalGraph, tmp_path: Path) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
         device.measure(np.full((ticks, 15), 0.25))
 
@@ -92,7 +92,7 @@ def test_a_tare_is_asked_for_and_the_baseline_is_published_and_subtracted(graph:
 def test_drift_saturation_and_a_dead_channel_are_named_on_diagnostics(
     graph: LocalGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One channel stands at the end of its range, one never changes, and one leaves its level while nothing touches."""
+    """One channel is at the end of its range, one never changes, and one leaves its level while nothing touches."""
     rng, drift = np.random.default_rng(0), [0]
 
     def feed(device: Any, first: int, ticks: int) -> None:
@@ -170,7 +170,7 @@ def make(graph: LocalGraph, tmp_path: Path) -> Iterator[Callable[[str], tuple[Ri
         yield make
 
 
-# One of each kind of topics: of a single finger, of several, and beside the signal.
+# One of each kind of topics: of a single finger, of several, and in addition to the signal.
 @pytest.mark.parametrize('name', ['tsf85', 'biotac_hand', 'pvdf', 'anyskin', 'tsf85_pair'])
 def test_a_life_from_configuring_to_cleaning_up(make: Any, name: str) -> None:
     rig, ear = make(name)

@@ -45,7 +45,7 @@ def read_s(sensor: SoundCard, seconds: float) -> list[TactileSignal]:
     return batches
 
 
-def test_a_card_is_read_at_its_rate_with_as_many_channels_as_asked_for(make: Callable[..., SoundCard]) -> None:
+def test_a_card_is_read_at_its_rate_with_as_many_channels_as_requested(make: Callable[..., SoundCard]) -> None:
     began_ns = time.time_ns()
     batches = read_s(make('{decimation: 12, channels: 2, unit: m/s², gain: 50.0}'), 1.0)
     first, last = batches[0], batches[-1]
@@ -111,7 +111,7 @@ def test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on(make: Cal
 
 
 class Blocks:
-    """What stands for the capture: hands over blocks by hand."""
+    """A mock of the capture: hands over blocks on request."""
 
     def __init__(self) -> None:
         self.waiting: list[AudioBlock] = []

@@ -46,7 +46,7 @@ def test_ridges_give_their_line_at_speed_over_pitch_at_all_speeds_and_angles(sen
 
 
 @pytest.mark.parametrize('hurst', [0.2, 0.5, 0.9])
-def test_random_roughness_falls_with_the_exponent_asked_for(hurst: float) -> None:
+def test_random_roughness_falls_with_the_requested_exponent(hurst: float) -> None:
     roughs = [SelfAffine(hurst=hurst, longest_m=6e-3, shortest_m=2e-4, seed=seed) for seed in range(16)]
     heights = np.concatenate([rough.sharp() for rough in roughs])
     power = (np.abs(np.fft.rfft(heights, axis=1)) ** 2).mean(axis=0)  # along lines
@@ -92,7 +92,7 @@ def test_what_a_contact_averages_weakens_ridges_as_the_gaussian_s_transfer_funct
 
 
 def odd_way(rate_hz: float, step_points: int) -> Trajectory:
-    """Return a way that stands, goes, turns round, lifts off, jumps, touches again, and is pressed with nothing."""
+    """Return a path that rests, moves, turns round, lifts off, jumps, touches again, and is pressed with nothing."""
     speed = [0.0, 0.1, -0.1, 0.1, 0.0, 0.3, 0.1, 0.0]
     force = [2.0, 2.0, 2.0, 0.0, 0.0, 5.0, 1e-9, 0.0]
     count = step_points * round(0.1 * rate_hz / step_points)
@@ -136,7 +136,7 @@ def height(term, blur_m=SHARP, x_m=PLACES, y_m=0.0):
     return Surface('one', (term,)).height_m(x_m, np.full_like(x_m, y_m), np.full_like(x_m, blur_m))
 
 
-def test_a_square_ridge_measured_sharply_is_as_high_and_as_wide_as_asked() -> None:
+def test_a_square_ridge_measured_sharply_is_as_high_and_as_wide_as_requested() -> None:
     measured = height(Grating(pitch_m=5e-3, depth_m=1e-4, shape='square', duty=0.3))
     assert np.median(measured[measured > 0]) - np.median(measured[measured < 0]) == pytest.approx(1e-4, rel=0.02)
     assert (measured > measured.mean()).mean() == pytest.approx(0.3, abs=0.02)

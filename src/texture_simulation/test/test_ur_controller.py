@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The emulated controller in its own time: the register handshake, the watchdog, the safety."""
+"""The emulated controller in virtual time: the register handshake, the watchdog, the safety."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Let the unmodified ur-rtde do all that the arm asks of it with the emulated controller; print the result as JSON.
+"""Let the unmodified ur-rtde do all that the arm needs from it with the emulated controller; print the result as JSON.
 
-A process of its own, because its constructors cannot be interrupted: python ur_session.py IP.
+A separate process, because its constructors cannot be interrupted: python ur_session.py IP.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated surfaces, contact and sensors, and devices emulated at the wire, so that drivers run unchanged.
+"""Simulated surfaces, contact and sensors, and devices emulated at protocol level, so that drivers run unchanged.
 
 Data in: a scene (YAML) with surfaces, finger and effects. Data out: the bytes of an emulated device, or labelled
 recordings, made offline and hundreds of times faster than real time.

@@ -17,7 +17,7 @@ from texture_simulation.surfaces import Surface
 MAX_TILT_RAD = 0.5
 START_TILT_RAD = 0.15  # assumption: how far the grip turns a finger to a curved object, at most, in either direction
 SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
-# A point of a fast path stands for the stretch up to the next: the texture is blurred by at least so much of the step.
+# A point of a fast path represents the stretch up to the next: the texture is blurred by at least so much of the step.
 # Half of the sampling rate is then measured to 17 %, what would be folded down to nearly 0 Hz to 0.1 %.
 MIN_BLUR_PER_STEP = 0.6
 
@@ -60,7 +60,7 @@ class SkinContact:
         self._drag = self._make_drag()
 
     def relocate(self) -> None:
-        """Let the sample lie otherwise from now on: no two touches meet the same place, unless the sample varies."""
+        """Move the sample: no two touches meet the same place, unless the sample varies."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._batch_shape, 1))
         if self._surface.variation is not None:  # then a place of the surface frame is a place of the sample
             self._x_m, self._y_m = np.zeros((2, *self._batch_shape, 1))
@@ -75,18 +75,18 @@ class SkinContact:
         return float(self._blur_and_stiffness(np.array([force_n]))[0][0])
 
     def placed(self, path: Trajectory) -> Trajectory:
-        """Return where the skin goes on the sample."""
+        """Return the path of the skin on the sample."""
         placed = path.moved(self._x_m, self._y_m)
         for apply in self._trajectory_filters:
             placed = apply(placed)
         return placed
 
     def variation_n(
-        self, placed: Trajectory, own_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
+        self, placed: Trajectory, skin_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
     ) -> Array:
         """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air."""
         if not len(placed):
-            return np.empty((*placed.x_m.shape[:-1], *np.shape(own_blur_m)[:-1], 0))
+            return np.empty((*placed.x_m.shape[:-1], *np.shape(skin_blur_m)[:-1], 0))
         force_n = constant(placed.force_n)
         blur_m, gain = self._blur_and_stiffness(force_n)
         blur_m = np.maximum(blur_m, MIN_BLUR_PER_STEP * self._steps_m(placed))
@@ -95,7 +95,7 @@ class SkinContact:
         x_m, y_m = placed.x_m, placed.y_m
         if offset_m is not None:
             x_m, y_m = x_m[..., None, :] + offset_m[0], y_m[..., None, :] + offset_m[1]
-            blur_m, gain = np.hypot(blur_m[..., None, :], own_blur_m), gain[..., None, :]
+            blur_m, gain = np.hypot(blur_m[..., None, :], skin_blur_m), gain[..., None, :]
         variation_n = gain * self._surface.height_m(x_m, y_m, blur_m)
         drag = self._drag  # may be replaced from another thread, where a sample is swapped
         if drag:
@@ -121,7 +121,7 @@ class SkinContact:
     def centre_m(self, placed: Trajectory) -> tuple[Array | float, Array | float]:
         """Return where on the fingertip the load is, x and y, (..., n) each; 0 on a plane.
 
-        Over a curved object the place wanders as the finger slides on: the normal of the object turns by the way over
+        On a curved object the place moves as the finger slides: its normal turns by the distance over
         the sum of both radii, as the finger keeps its direction.
         """
         radius_m, tip_m = self._surface.shape.radius_m, self._contact.tip_radius_m
@@ -133,7 +133,7 @@ class SkinContact:
         return x_m, y_m
 
     @property
-    def patch_share(self) -> float:
+    def patch_ratio(self) -> float:
         """How much smaller than on a plane the contact is, at most 1."""
         return self._contact.on(self._surface.shape.radius_m)
 
@@ -144,9 +144,9 @@ class SkinContact:
 
     def _blur_and_stiffness(self, force_n: Array) -> tuple[Array, Array]:
         """Return blur and stiffness at forces."""
-        share = self.patch_share
-        blur_m: Array = share * self._contact.blur_m * np.ones_like(force_n)
-        stiffness: Array = share * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
+        ratio = self.patch_ratio
+        blur_m: Array = ratio * self._contact.blur_m * np.ones_like(force_n)
+        stiffness: Array = ratio * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
         for growth in self._blur_growths:
             blur_m = blur_m * growth(force_n)
         for growth in self._gain_growths:

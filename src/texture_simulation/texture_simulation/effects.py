@@ -15,7 +15,7 @@ from texture_core.types import Array, Samples
 from texture_simulation.path import Trajectory, interpolated_field
 
 # --------------------
-# Where in the chain from slide to sample an effect acts is told by the method that it has:
+# Where in the chain from slide to sample an effect acts is defined by the method that it has:
 #
 # slide(speed_m_s, force_n, rng)              a slide begins: (count,) planned speeds and forces become others
 # start_path(rng, rate_hz, batch_shape)       where the skin goes: a `TrajectoryFilter`
@@ -59,12 +59,12 @@ class ForceGain:
 # --------------------
 # No two fingers of a kind are equally sensitive.
 
-SALT = 41  # so that the gain of a finger is drawn apart from its other traits
+SALT = 41  # so that the gain of a finger is drawn independently of its other traits
 
 
 @dataclass(frozen=True)
 class FingerSpread:
-    """Each individual of the sensor senses textures by a factor of its own more or less strongly."""
+    """Each individual of the sensor has an individual sensitivity to textures."""
 
     relative: float = param(0.1, 'Relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5)
     skin: float = param(
@@ -92,16 +92,14 @@ class FingerSpread:
 
 @dataclass(frozen=True)
 class Dropouts:
-    """Now and then all channels stand still for a moment: the converter repeats its last sample.
+    """Occasionally all channels freeze for a moment: the converter repeats its last sample.
 
     Samples that are missing altogether are a fault of the line: see devices/fingers.py.
     """
 
-    per_s: float = param(
-        0.5, 'How often a dropout occurs; a higher rate gives more dropouts.', unit='1/s', low=0.0, high=100.0
-    )
+    per_s: float = param(0.5, 'Rate of dropouts.', unit='1/s', low=0.0, high=100.0)
     length_s: float = param(
-        0.02, 'How long a dropout lasts; the last good sample is repeated during it.', unit='s', low=1e-3, high=1.0
+        0.02, 'Duration of a dropout, in which the last good sample is repeated.', unit='s', low=1e-3, high=1.0
     )
 
     def start_signal(
@@ -131,7 +129,7 @@ class Dropouts:
 
 
 # --------------------
-# The electronics' own noise.
+# Noise of the electronics.
 
 
 @dataclass(frozen=True)
@@ -163,19 +161,19 @@ FORGOTTEN = 8.0  # time constants after which nothing of a skid is left
 
 @dataclass(frozen=True)
 class Skids:
-    """Now and then the skin stays where it is for a moment while the finger goes on, then catches up.
+    """Occasionally the skin sticks for a moment while the finger moves on, then catches up.
 
-    A cheap stand-in for stick-slip, for slides of which some went wrong.
+    A cheap approximation of stick-slip, for slides of which some failed.
     """
 
     per_s: float = param(
         0.5,
-        'How often the skin sticks and jumps; a higher rate disturbs more slides.',
+        'Rate at which the skin sticks and jumps.',
         unit='1/s',
         low=0.0,
         high=20.0,
     )
-    length_s: float = param(0.05, 'How long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
+    length_s: float = param(0.05, 'Duration of sticking before the jump.', unit='s', low=1e-3, high=1.0)
 
     def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
         """Return what lets the skin lag behind the finger."""
@@ -208,7 +206,7 @@ class Skids:
 
 
 def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array:
-    """Return where the skin is: `weight` of the way back to where the last skid began, (..., n)."""
+    """Return the position of the skin: `weight` of the distance back to the beginning of the last skid, (..., n)."""
     began = np.take_along_axis(place_m, np.maximum(last, 0), axis=-1)
     began = np.where(last >= 0, began, held_m[..., None])
     return place_m + weight * (began - place_m)
@@ -217,12 +215,12 @@ def _lagging(place_m: Array, held_m: Array, last: Array, weight: Array) -> Array
 # --------------------
 # A robot is not quite as fast and does not press quite as hard as it should.
 
-MIN_SHARE = 0.05  # of what was wanted
+MIN_FRACTION = 0.05  # of the request
 
 
 @dataclass(frozen=True)
 class SlideError:
-    """Speed and force deviate from slide to slide (offline recordings; a simulated arm has errors of its own)."""
+    """Speed and force deviate from slide to slide (offline recordings; a simulated arm has other errors)."""
 
     speed: float = param(0.01, 'Relative standard deviation of the speed from slide to slide.', low=0.0, high=0.5)
     force: float = param(0.04, 'Relative standard deviation of the force from slide to slide.', low=0.0, high=0.5)
@@ -230,8 +228,8 @@ class SlideError:
     def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return speed and force as they become, of the same shape."""
         return (
-            speed_m_s * np.maximum(MIN_SHARE, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
-            force_n * np.maximum(MIN_SHARE, 1 + self.force * rng.standard_normal(force_n.shape)),
+            speed_m_s * np.maximum(MIN_FRACTION, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
+            force_n * np.maximum(MIN_FRACTION, 1 + self.force * rng.standard_normal(force_n.shape)),
         )
 
 
@@ -272,5 +270,5 @@ EFFECTS: Mapping[str, type] = {
     'unevenness': Unevenness,  # no sample is everywhere the same
     'finger_spread': FingerSpread,  # no finger is as sensitive as another
     'noise': Noise,  # of the electronics
-    'dropouts': Dropouts,  # moments in which the signal stands still
+    'dropouts': Dropouts,  # moments in which the signal is frozen
 }

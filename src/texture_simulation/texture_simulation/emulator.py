@@ -141,7 +141,7 @@ class EmulatorParams:
         high=1.0,
     )
     finger_pipe: str = param(
-        f'{DEVICES}/finger', 'Path of the named pipe that appears, on which the emulated arm tells where the finger is.'
+        f'{DEVICES}/finger', 'Path of the created named pipe, on which the emulated arm sends the finger state.'
     )
 
 
@@ -236,7 +236,7 @@ class Emulator:
         return {
             'samples': self._sensor.done,
             'skipped samples': self._sensor.skipped,
-            'bytes nobody took': self.device.dropped_bytes,
+            'unread bytes': self.device.dropped_bytes,
             'finger states': self._link.received,
             'refused finger states': self._link.refused,
         }

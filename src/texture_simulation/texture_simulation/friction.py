@@ -38,7 +38,7 @@ class Stribeck:
     kinetic: float = param(0.5, 'Coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
     stribeck_m_s: float = param(
         0.05,
-        'Stribeck speed over which friction falls from static to kinetic; larger values fall more slowly.',
+        'Stribeck speed over which friction falls from static to kinetic.',
         unit='m/s',
         low=1e-4,
         high=10.0,
@@ -90,8 +90,8 @@ class StickSlip(Stribeck):
 #     bend' = slip − σ0·|slip|·bend / g(slip)
 #
 # σ1 fades as the Stribeck curve does, which keeps friction passive at all speeds. What comes into contact when the
-# force grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend
-# stays when N falls. So a change of force adds no energy, and a new touch begins unbent by itself.
+# force grows comes unbent, and what leaves takes its part of the bending with it: bend·N stays when N grows, bend
+# stays when N falls. So a change of force adds no energy, and a new touch begins unbent.
 
 Value = Any  # a float, or an array over scans: the same formulas serve both
 
@@ -120,7 +120,7 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
     """Return a step with friction and damping at the new speed and the skin's spring at the old stretch.
 
     Friction at the new speed makes the bristles harmless however stiff they are; the spring at the old stretch keeps
-    the skin's own swing from being damped by the numbers. The new slip w = ±W solves a quadratic equation:
+    the natural oscillation of the skin from being damped numerically. The new slip w = ±W solves a quadratic equation:
 
         bend' = (bend + h·w) / (1 + q·W), q = h·σ0/g
         (mass/h + c + N·σ2)·w + N·(σ0·bend' + σ1·(bend' − bend)/h) = mass·slip/h + k·stretch + c·speed
@@ -154,7 +154,7 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
 def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
     """Return the longest semi-implicit step: h²·k = 4·m + 2·h·D + h²·N·σ0, with D all damping and σ0 only if sticking.
 
-    Only the skin's own swing limits it, and not even that while bristles stiffer than the skin hold.
+    Only the natural oscillation of the skin limits it, and not even that while bristles stiffer than the skin hold.
     """
     f = friction
     sticking = slip_m_s == 0.0
@@ -168,7 +168,7 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
 # --------------------
 # Longest step with which an integrator stays stable; longer steps are refused.
 
-MARGIN = 0.5  # share of the border up to which a step is accepted
+MARGIN = 0.5  # fraction of the limit up to which a step is accepted
 
 
 def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
@@ -182,7 +182,7 @@ def max_stable_step_s(friction: StickSlip, speed_m_s: float, force_n: float) -> 
 
 
 def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
-    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all."""
+    """Raise InvalidParameter if a step is longer than `MARGIN` of the limit, or not positive."""
     if not step_s > 0:
         raise InvalidParameter(f'a step of {step_s} s; it must be above 0')
     allowed_s = MARGIN * max_stable_step_s(friction, speed_m_s, force_n)
@@ -196,7 +196,7 @@ def check_step(friction: StickSlip, step_s: float, speed_m_s: float, force_n: fl
 # --------------------
 # Drag tips over a surface, step by step: one scan in plain floats, or many at once in arrays.
 
-FEW = 40  # scans; up to so many are faster one after another in floats than together in arrays
+FEW = 40  # scans; up to this number they are faster one after another in floats than together in arrays
 
 
 def drag(
@@ -241,8 +241,8 @@ def _one(
     stretch, slip, bend = start
     states: list[State] = []
     note = states.append
-    for speed, force, share in zip(speed_m_s, force_n, kept, strict=True):
-        stretch, slip, bend = state = step(stretch, slip, bend * share, speed, force)
+    for speed, force, fraction in zip(speed_m_s, force_n, kept, strict=True):
+        stretch, slip, bend = state = step(stretch, slip, bend * fraction, speed, force)
         note(state)
     return states
 
@@ -253,8 +253,8 @@ def _many(step: Step, start: Tip, speed_m_s: Array, force_n: Array, kept: Array)
     stretch, slip, bend = (np.array(np.broadcast_to(value, shape), dtype=np.float64) for value in start)
     states = np.empty((3, speed_m_s.shape[-1], *shape))
     drives = (np.ascontiguousarray(np.moveaxis(values, -1, 0)) for values in (speed_m_s, force_n, kept))
-    for i, (speed, force, share) in enumerate(zip(*drives, strict=True)):
-        stretch, slip, bend = states[:, i] = step(stretch, slip, bend * share, speed, force)
+    for i, (speed, force, fraction) in enumerate(zip(*drives, strict=True)):
+        stretch, slip, bend = states[:, i] = step(stretch, slip, bend * fraction, speed, force)
     return Tip(*np.moveaxis(states, 1, -1))
 
 
@@ -268,8 +268,8 @@ def coefficient(friction: Stribeck, speed_m_s: Array) -> Array:
     kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
     Source: Bo & Pavelescu 1982; Armstrong-Hélouvry et al. 1994.
     """
-    share: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
-    return friction.kinetic + (friction.static - friction.kinetic) * share
+    fraction: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
+    return friction.kinetic + (friction.static - friction.kinetic) * fraction
 
 
 def steady_force_n(friction: Stribeck, speed_m_s: Array, force_n: float) -> Array:
@@ -299,7 +299,7 @@ class TipDrag:
         self._forward: tuple[Array, Array] | None = None  # the direction that counts as forward, (..., 1)
 
     def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses beside the shape of the surface, (..., n), N."""
+        """Return the force that the sensor senses in addition to the shape of the surface, (..., n), N."""
         if not len(path):
             return np.zeros_like(path.x_m)
         speed_m_s, force_n = self._along(path), np.maximum(path.force_n, 0.0)
@@ -322,7 +322,7 @@ class TipDrag:
         return nothing, nothing, nothing, force_n
 
     def _along(self, path: Trajectory) -> Array:
-        """Return the speed at each point, (..., n); below 0 while the path goes back the way it came."""
+        """Return the speed at each point, (..., n); below 0 while the path reverses."""
         x_m, y_m = self._before[:2] if self._before else (path.x_m[..., :1], path.y_m[..., :1])
         dx_m, dy_m = np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)
         speed_m_s: Array = np.hypot(dx_m, dy_m) * self._rate_hz
@@ -339,7 +339,7 @@ class TipDrag:
         before = np.concatenate([np.zeros_like(last[..., :1]), last[..., :-1]], axis=-1)
         along = dx_m * np.take_along_axis(x, before, -1) + dy_m * np.take_along_axis(y, before, -1)
         signs: Array = np.cumprod(np.where(moving & (along < 0), -1.0, 1.0), axis=-1)
-        # What counts as forward stays, whatever way the tip goes at the end of the block.
+        # The forward direction stays, whatever the direction of the tip at the end of the block.
         end = last[..., -1:]
         forward_x, forward_y = (signs[..., -1:] * np.take_along_axis(place, end, -1) for place in (x, y))
         self._forward = forward_x, forward_y
@@ -350,8 +350,8 @@ class TipDrag:
         if self._substeps == 1:
             return values
         known = np.concatenate([before, values[..., :-1]], axis=-1)[..., None]
-        shares = np.arange(1, self._substeps + 1) / self._substeps
-        steps: Array = known + (values[..., None] - known) * shares
+        fractions = np.arange(1, self._substeps + 1) / self._substeps
+        steps: Array = known + (values[..., None] - known) * fractions
         return steps.reshape(*values.shape[:-1], -1)
 
 
@@ -378,7 +378,7 @@ class SlidingDrag:
         self._before: tuple[Array, Array] | None = None
 
     def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses, (..., n) N: of one sign, whichever way the finger goes."""
+        """Return the force that the sensor senses, (..., n) N: of one sign, for both directions of the finger."""
         if not len(path):
             return np.zeros_like(path.x_m)
         x_m, y_m = self._before or before_first(path)
@@ -390,7 +390,7 @@ class SlidingDrag:
 
 
 # --------------------
-# The kinds of friction by name, each off unless a surface asks for it, and what follows a finger with them.
+# The kinds of friction by name, each off unless a surface names it, and what follows a finger with them.
 
 FRICTIONS: Mapping[str, type] = {
     'sliding_friction': SlidingFriction,  # a Stribeck curve, without memory

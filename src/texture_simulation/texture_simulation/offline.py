@@ -118,7 +118,7 @@ def simulate_exploration(
     scene, surface
         What is touched; `surface` is the name, and becomes the label in the states.
     speed_m_s, force_n
-        As wanted. The finger's own differ from slide to slide if the scene has a `slide_error`.
+        As wanted. Those of the finger differ from slide to slide if the scene has a `slide_error`.
     slide_s
         Length of the steady part.
     start_ns
@@ -130,7 +130,7 @@ def simulate_exploration(
     radius_m
         Of a circle, travelled anticlockwise; 0 for a straight line.
     finger
-        Which individual of the sensor: each has traits of its own.
+        Which individual of the sensor: each has individual traits.
     exploration_id
         Id of the exploration in its states.
 
@@ -149,7 +149,7 @@ def simulate_exploration(
     )
     streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
     friction = scene.surface(surface).friction
-    # What a wrist sensor without errors would measure; NaN of a surface whose friction nobody states.
+    # What a wrist sensor without errors would measure; NaN of a surface whose friction is not defined.
     tangential_n = math.nan if friction is None else float(force[0] * sliding_coefficient(friction, speed)[0])
     slide = {
         'speed_m_s': speed_m_s,
@@ -238,7 +238,7 @@ class SlidePlan:
         low=0.001,
         high=1.0,
     )
-    force_n: float = param(2.0, 'Normal force; a larger force gives a stronger signal.', unit='N', low=0.05, high=20.0)
+    force_n: float = param(2.0, 'Normal force.', unit='N', low=0.05, high=20.0)
     slide_s: float = param(3.0, 'Duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
     direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
     fingers: int = param(
@@ -281,7 +281,7 @@ def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng
 def _slide(
     scene: Scene, plan: SlidePlan, start_ns: int, exploration_id: str, rng: np.random.Generator
 ) -> tuple[list[ExplorationState], dict[str, Iterable[TactileSignal]]]:
-    """Return the states of a slide, and the signals of all its fingers by topic, each finger with traits of its own."""
+    """Return the states of a slide, and the signals of all its fingers by topic, each finger with individual traits."""
     surface = exploration_id.rpartition('/')[0]
     signals: dict[str, Iterable[TactileSignal]] = {}
     for finger in reversed(range(plan.fingers)):

@@ -20,7 +20,7 @@ from texture_core.types import NANOSECONDS, AnyArray, Array, FingerState
 
 @lru_cache(maxsize=64)
 def _steady(sections: bytes) -> Array:
-    """Return the state of sections, (n_sections, 2), that 1 has passed for ever."""
+    """Return the state of sections, (n_sections, 2), that 1 has passed."""
     return np.asarray(signal.sosfilt_zi(np.frombuffer(sections).reshape(-1, 6)))
 
 
@@ -56,7 +56,7 @@ MAX_POINTS = 16  # from one reckoned point to the next
 
 
 def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_m: Array, within_m: float) -> AnyArray:
-    """Return a field at places along ways, (..., n), straight between places that are `within_m` apart or nearer.
+    """Return a field at places along ways, (..., n), straight between places at most `within_m` from each other.
 
     Between places h apart, a wave of wave number k is wrong by at most (k·h)²/8 of its amplitude.
     """
@@ -69,9 +69,9 @@ def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_
     values = field(x_m.take(knots, axis=-1), y_m.take(knots, axis=-1))
     points = np.arange(n_points)
     left = np.minimum(points // every, len(knots) - 2)
-    share = (points - knots[left]) / (knots[left + 1] - knots[left])
+    fraction = (points - knots[left]) / (knots[left + 1] - knots[left])
     rise = np.diff(values)
-    return np.asarray(values.take(left, axis=-1) + rise.take(left, axis=-1) * share)
+    return np.asarray(values.take(left, axis=-1) + rise.take(left, axis=-1) * fraction)
 
 
 # --------------------
@@ -100,8 +100,8 @@ class Trajectory:
 
 def straight(start: tuple[float, float, float], end: tuple[float, float, float], n_points: int) -> Trajectory:
     """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included."""
-    shares = np.arange(1, n_points + 1) / n_points
-    return Trajectory(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
+    fractions = np.arange(1, n_points + 1) / n_points
+    return Trajectory(*(first + (last - first) * fractions for first, last in zip(start, end, strict=True)))
 
 
 def before_first(path: Trajectory) -> tuple[Array, Array]:
@@ -137,7 +137,7 @@ class FingerTrack:
     def advance(self, until_ns: int, n_points: int, rate_hz: float) -> Trajectory:
         """Return the next `n_points` of the path, the last one at `until_ns`.
 
-        Between two calls speed and change of force are constant; an arm that was put elsewhere leaves no trace of the
+        Between two calls speed and change of force are constant; an arm that was repositioned leaves no trace of the
         way there.
         """
         end = self._expected(until_ns)

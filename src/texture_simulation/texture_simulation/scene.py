@@ -32,7 +32,7 @@ class Contact:
     )
     stiffness_n_m: float = param(
         2000.0,
-        'Force per height of the texture; larger values give stronger signals.',
+        'Force per height of the texture.',
         unit='N/m',
         low=1.0,
         high=1e6,
@@ -85,7 +85,7 @@ class Scene:
         return [self.effects[name] for name in EFFECTS if name in self.effects and hasattr(EFFECTS[name], stage)]
 
     def of_finger(self, finger: int) -> Scene:
-        """Return the scene as one individual of the sensor senses it: with a skin and a noise of its own."""
+        """Return the scene as one individual of the sensor senses it: with an individual skin and noise."""
         spread = self.effects.get('finger_spread')
         if spread is None:
             return self
@@ -105,7 +105,7 @@ class Scene:
 
 
 def load_scene(name_or_path: str) -> Scene:
-    """Return a scene that the package ships in config/scenes, or that stands in a file.
+    """Return a scene that the package ships in config/scenes, or that is in a file.
 
     Raises
     ------

@@ -97,7 +97,7 @@ class SensorModel:
         raise NotImplementedError
 
     def advance(self, path: Trajectory) -> Any:
-        """Return what the emulated device takes along the next piece of path: whole numbers, or values in units."""
+        """Return what the emulated device takes along the next section of path: whole numbers, or values in units."""
         raise NotImplementedError
 
     def _pressed_n(self, path: Trajectory) -> tuple[Trajectory, Array]:
@@ -180,7 +180,7 @@ class BioTacModel(SensorModel):
         self._band = self._filter(PAC_BAND)
         step = 1 - np.exp(-layout.frame_s / TOUCH_S)
         self._cool = Filter(np.array([[step, 0.0, 0.0, 1.0, step - 1, 0.0]]))
-        self._cooled: Array | None = None  # share of the fall of temperature, (..., 1)
+        self._cooled: Array | None = None  # fraction of the fall of temperature, (..., 1)
         row, column = np.divmod(np.arange(layout.electrodes)[:, None], COLUMNS)
         self._x_m = (column - (COLUMNS - 1) / 2) * ELECTRODE_PITCH_M
         self._y_m = (row - (layout.electrodes // COLUMNS) / 2) * ELECTRODE_PITCH_M
@@ -197,7 +197,7 @@ class BioTacModel(SensorModel):
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
 
     def advance(self, path: Trajectory) -> NDArray[np.uint16]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         streams = self.streams(path)
         frames = streams['signal_static']
         counts = np.empty((*frames.shape[:-1], len(self._layout.slots)), dtype=np.uint16)
@@ -232,7 +232,7 @@ class BioTacModel(SensorModel):
     def _electrodes(self, at: Trajectory) -> Array:
         """Return the electrodes at each frame, (..., n_electrodes, n_frames) counts: low where the load is."""
         force_n = at.force_n[..., None, :]
-        radius_m = self.touch.patch_share * BIOTAC_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
+        radius_m = self.touch.patch_ratio * BIOTAC_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
         x_m, y_m = (
             np.asarray(centre)[..., None, :] if np.ndim(centre) else centre for centre in self.touch.centre_m(at)
         )
@@ -263,7 +263,7 @@ def biotac_kind(layout: BioTacLayout) -> SensorKind:
 #
 # Four PVDF films and four strain gauges lie at random places in two layers of silicone. Each senses the pressure over
 # its place, the blunter the deeper it lies: a film its changes (the charge leaks), a gauge the pressure itself. All
-# pass a low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper tells none.
+# pass a low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper gives none.
 
 DAQ_RATE_HZ = daq.RATE_HZ
 # A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
@@ -301,7 +301,7 @@ class DaqModel(SensorModel):
         return {daq.TOPIC: VOLT_PER_COUNT * self._counts.exact(self._exact(path))}
 
     def advance(self, path: Trajectory) -> NDArray[np.int16]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         return self._counts.counts(self._exact(path), np.int16)
 
     def _exact(self, path: Trajectory) -> Samples:
@@ -331,16 +331,16 @@ DAQ_KIND = SensorKind(
 # --------------------
 # Forces on the elements of a finger with a slow array: normal and tangential, along a path.
 
-FRICTION = 0.5  # share of the normal force that drags the skin while it slides
+FRICTION = 0.5  # fraction of the normal force that drags the skin while it slides
 CREEP_M_S = 1e-3  # speed at which half of that is reached
 CROSSTALK = 0.1  # standard deviation of what an axis of an element senses of another one
-REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of the middle's share
+REACH_M = 5e-3  # distance from the middle at which an element bears e^-0.5 of the load of the middle
 
 
 class PressedElements:
     """Return what each element senses of the force on the skin.
 
-    The force spreads over the elements like a bell; each senses its share, blurred as it lies, and its axes are not
+    The force spreads over the elements like a bell; each senses its part, blurred by its depth; its axes are not
     quite at right angles. All these numbers are ours.
     """
 
@@ -350,8 +350,8 @@ class PressedElements:
         self._offset_m = x_m[:, None], y_m[:, None]
         self._blur_m = np.full((len(x_m), 1), blur_m)
         self._rate_hz = rate_hz
-        share = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
-        self._share = (share / share.sum())[:, None]
+        fraction = np.exp(-0.5 * (x_m**2 + y_m**2) / REACH_M**2)
+        self._fraction = (fraction / fraction.sum())[:, None]
         self._coupling: Array = np.eye(3) + CROSSTALK * made.standard_normal((len(x_m), 3, 3))
         self._before: tuple[Array, Array] | None = None
 
@@ -359,13 +359,13 @@ class PressedElements:
         """Return the force that each element senses along the next points of a path."""
         placed = touch.placed(path)
         pressed_n = placed.force_n[..., None, :] + touch.variation_n(placed, self._blur_m, self._offset_m)
-        normal_n = self._share * pressed_n
+        normal_n = self._fraction * pressed_n
         x, y = self._drag_directions(placed)
         forces_n = np.stack([x[..., None, :] * normal_n, y[..., None, :] * normal_n, normal_n], axis=-2)
         return np.asarray(self._coupling @ forces_n)
 
     def _drag_directions(self, placed: Trajectory) -> tuple[Array, Array]:
-        """Return the share of the normal force that drags along x and y, (..., n) each."""
+        """Return the fraction of the normal force that drags along x and y, (..., n) each."""
         x_m, y_m = self._before or before_first(placed)
         self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
         x_m_s = self._rate_hz * np.diff(placed.x_m, prepend=x_m)
@@ -419,7 +419,7 @@ class AnySkinModel(SensorModel):
         return {anyskin.SIGNAL: self.advance(path)}
 
     def advance(self, path: Trajectory) -> Array:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         forces_n = self._band(self._elements.forces_n(self.touch, path))
         by_channel = as_samples(forces_n[..., ANYSKIN_OVERSAMPLING - 1 :: ANYSKIN_OVERSAMPLING])
         return UT_PER_COUNT * self._counts.exact((self._unloaded_ut + UT_PER_N * by_channel) / UT_PER_COUNT)
@@ -445,11 +445,11 @@ ANYSKIN_KIND = SensorKind(
 # What the PVDF finger of Hu et al. 2014 measures while it goes along a path.
 #
 # The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses the
-# slow part. The gains are ours: the paper tells none.
+# slow part. The gains are ours: the paper gives none.
 
 # A point a sample: at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more.
 PVDF_PATH_RATE_HZ = pvdf.FILM_RATE_HZ
-# Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
+# Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant fraction.
 KEPT = math.exp(-1 / (pvdf.LEAK_S * PVDF_PATH_RATE_HZ))
 LEAK_SECTIONS = np.array([[1.0, -1.0, 0.0, 1.0, -KEPT, 0.0]])
 FILM_BAND = np.concatenate([filters.butter(2, 800.0, 'lowpass', fs=PVDF_PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
@@ -479,7 +479,7 @@ class PvdfModel(SensorModel):
         return {**fast, pvdf.FORCE_TOPIC: pvdf.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         _, force_n = self._pressed_n(path)
         film = self._fast.counts(self._charge(force_n), np.int16)
         return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
@@ -556,7 +556,7 @@ class Tsf85Model(SensorModel):
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        """Return what is measured along the next piece of path."""
+        """Return what is measured along the next section of path."""
         placed, force_n = self._pressed_n(path)
         dynamic = self._fast.counts(self._dynamic(force_n), np.int16)
         return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
@@ -570,7 +570,7 @@ class Tsf85Model(SensorModel):
     def _images(self, placed: Trajectory) -> Samples:
         at = placed.at(self._image_points(len(placed)))
         texture_n = self.touch.static_variation_n(at, TAXEL_BLUR_M, (self._taxel_x_m, self._taxel_y_m))
-        pressed_n = self._shares(at.force_n) * (at.force_n[..., None, :] + texture_n)
+        pressed_n = self._fractions(at.force_n) * (at.force_n[..., None, :] + texture_n)
         return self._baseline + STATIC_COUNTS_PER_N * np.swapaxes(pressed_n, -1, -2)
 
     def _image_points(self, n_points: int) -> NDArray[np.intp]:
@@ -587,8 +587,8 @@ class Tsf85Model(SensorModel):
         """Return the first tick of the static channel at or after a point of the path."""
         return math.ceil(point * self._static_rate_hz / TSF85_PATH_RATE_HZ)
 
-    def _shares(self, force_n: Array) -> Array:
-        """Return the share of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact, as Hertz'."""
+    def _fractions(self, force_n: Array) -> Array:
+        """Return the fraction of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact (Hertz)."""
         radius_m = TSF85_CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[..., None, :]
         dome = np.maximum(0.0, 1 - (self._taxel_x_m**2 + self._taxel_y_m**2) / radius_m**2)
         return dome / np.maximum(dome.sum(axis=-2, keepdims=True), 1e-9)
@@ -623,7 +623,7 @@ SENSORS: Mapping[str, SensorKind] = {
 
 
 # --------------------
-# Fingers that slide together, each an individual that touches a place of its own.
+# Fingers that slide together, each an individual that touches a separate place.
 
 
 class JoinedContacts:
@@ -657,7 +657,7 @@ class JoinedFingers:
         self.touch = JoinedContacts([model.touch for model in models])
 
     def advance(self, path: Trajectory) -> Any:
-        """Return what all measure along the next piece of path."""
+        """Return what all measure along the next section of path."""
         return self._join([model.advance(path) for model in self._models])
 
 

@@ -62,7 +62,7 @@ class PlaceVariation:
     def at(self, surface: str, x_m: Array, y_m: Array) -> tuple[Array, Array, Array, Array, Array]:
         """Return factors of level, blur and friction, and shifts of x and y in m, (..., n) each.
 
-        The fields are drawn by the name of the surface: each surface of a scene has its own.
+        The fields are drawn by the name of the surface: each surface of a scene has separate ones.
         """
         if not x_m.shape[-1]:
             return (np.ones_like(x_m), np.ones_like(x_m), np.ones_like(x_m), np.zeros_like(x_m), np.zeros_like(x_m))
@@ -96,7 +96,7 @@ def _field_waves(seed: int, length_m: float) -> tuple[Array, Array]:
 # --------------------
 # The profile across ridges that all have the same pitch, as its Fourier series.
 
-MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this share is left out
+MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this fraction is left out
 SHAPES = ('sine', 'square')
 
 
@@ -106,18 +106,18 @@ def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: fl
     Harmonic n is weakened by exp(−(2π·n·blur/pitch)²/2), the transfer function of the Gaussian.
     """
     cosine = np.cos(2 * np.pi / pitch_m * across_m)
-    first_share = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
+    first_fraction = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
     amplitudes = _amplitudes(pitch_m, shape, duty, float(blur_m.min(initial=pitch_m)))
-    height = amplitudes[0] * first_share * cosine
+    height = amplitudes[0] * first_fraction * cosine
     if len(amplitudes) == 1:
         return np.asarray(height)
     twice, wave, before = 2 * cosine, cosine, np.ones_like(cosine)
-    share, ratio, square = first_share, first_share**3, first_share**2
+    fraction, ratio, square = first_fraction, first_fraction**3, first_fraction**2
     for amplitude in amplitudes[1:]:
         # cos((n+1)φ) = 2·cos φ·cos nφ − cos((n−1)φ) and q^((n+1)²) = q^(n²)·q^(2n+1): far cheaper than cos and exp.
         wave, before = twice * wave - before, wave
-        share, ratio = share * ratio, ratio * square
-        height += amplitude * share * wave
+        fraction, ratio = fraction * ratio, ratio * square
+        height += amplitude * fraction * wave
     return np.asarray(height)
 
 
@@ -145,11 +145,9 @@ class Relief:
 
 @dataclass(frozen=True)
 class Cut(Relief):
-    """A relief as a tool cuts it: its depth and the cross-section of what stands out."""
+    """A relief as a tool cuts it: its depth and the cross-section of the ridges or posts."""
 
-    depth_m: float = param(
-        2e-4, 'Height above the grooves; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
-    )
+    depth_m: float = param(2e-4, 'Height above the grooves.', unit='m', low=0.0, high=0.01)
     shape: str = param('sine', "Cross-section, 'sine' or 'square'.", choices=SHAPES)
     duty: float = param(0.5, 'Fraction of the pitch that a square ridge, post or hollow takes.', low=0.05, high=0.95)
 
@@ -206,7 +204,7 @@ MEAN = {'sine': 0.5}
 class Grid(Cut):
     """Posts in rows and columns, or a net of ribs between hollows.
 
-    The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
+    The relief is a product of two profiles; a round Gaussian blurs each of them separately, so this is exact.
     """
 
     pitch_x_m: float = param(
@@ -224,9 +222,7 @@ class Grid(Cut):
         high=0.1,
     )
     angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
-    relief: str = param(
-        'posts', "What stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
-    )
+    relief: str = param('posts', "Raised part: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net'))
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions, (..., n)."""
@@ -235,7 +231,7 @@ class Grid(Cut):
         along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)
         across = profile(y_m * cosine - x_m * sine, blur_m, self.pitch_y_m, self.shape, self.duty)
         sign = 1.0 if self.relief == 'posts' else -1.0
-        # Less its own mean; in place, which costs half as much.
+        # Less its mean; in place, which costs half as much.
         along += mean
         across += mean
         along *= across
@@ -281,8 +277,8 @@ POINTS_PER_WAVE = 4  # of the shortest wave
 # The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(MIN_BLUR_M, MAX_BLUR_M, 10)  # tiles are made for these and interpolated between
-# Points under one blur, from which on a tile of its own is cheaper than mixing point by point.
-MIN_POINTS_FOR_OWN_TILE = 20_000
+# Points under one blur, from which on a separate tile is cheaper than mixing point by point.
+MIN_POINTS_FOR_TILE = 20_000
 TILE_POINTS = (SIDE + 1) ** 2
 
 
@@ -310,8 +306,8 @@ class RandomRelief(Seeded):
         cosine, sine = math.cos(TURN_RAD) / self.spacing_m, math.sin(TURN_RAD) / self.spacing_m
         rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
         level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
-        many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_OWN_TILE
-        if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_OWN_TILE <= rows.size:
+        many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_TILE
+        if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_TILE <= rows.size:
             height = _bilinear(_mixed(self, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
             return np.asarray(height, dtype=np.float64)
         low = level.astype(np.intp)
@@ -343,11 +339,11 @@ def _bilinear(tiles: AnyArray, number: NDArray[np.intp], rows: Array, columns: A
     return upper
 
 
-def _between(tiles: AnyArray, at: NDArray[np.intp], share: NDArray[np.float32]) -> AnyArray:
+def _between(tiles: AnyArray, at: NDArray[np.intp], fraction: NDArray[np.float32]) -> AnyArray:
     """Return values between points and those after them."""
     value, after = tiles.take(at), tiles[1:].take(at)
     after -= value
-    after *= share
+    after *= fraction
     value += after
     return value
 
@@ -358,9 +354,9 @@ def _mixed(random: RandomRelief, levels: tuple[float, ...]) -> AnyArray:
     tiles = []
     for level in levels:
         low = int(level)
-        share = level - low
+        fraction = level - low
         pair = _pairs(random)[low * TILE_POINTS : (low + 1) * TILE_POINTS].view(np.float32).reshape(-1, 2)
-        tiles.append(pair @ np.array([1.0 - share, share], dtype=np.float32))
+        tiles.append(pair @ np.array([1.0 - fraction, fraction], dtype=np.float32))
     return np.concatenate(tiles)
 
 
@@ -372,7 +368,7 @@ def _pairs(random: RandomRelief) -> AnyArray:
     """
     spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
     weak = [np.exp(-0.5 * (2 * np.pi * wave_1_m * blur_m) ** 2) for blur_m in BLURS_M]
-    blurred = [np.fft.irfft2(spectrum * share, s=(SIDE, SIDE)) for share in weak]
+    blurred = [np.fft.irfft2(spectrum * fraction, s=(SIDE, SIDE)) for fraction in weak]
     both = [sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]
     # One after the other, each with its first row and column again at its end.
     flat = [np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in both]
@@ -403,7 +399,7 @@ class Sandpaper(RandomRelief):
     )
     grain_height_m: float = param(
         5e-5,
-        'Mean height of a grain above the sheet; a larger height gives a stronger signal.',
+        'Mean height of a grain above the sheet.',
         unit='m',
         low=0.0,
         high=0.005,
@@ -422,8 +418,8 @@ class Sandpaper(RandomRelief):
         tops = np.zeros((SIDE, SIDE))
         count = round(self.cover * SIDE**2 / grain_points)
         np.add.at(tops, tuple(rng.integers(0, SIDE, (2, count))), rng.uniform(*SIZES, count))
-        away = np.minimum(np.arange(SIDE), SIDE - np.arange(SIDE))
-        dome = np.maximum(0.0, 1 - (away[:, None] ** 2 + away**2) / (POINTS_PER_GRAIN / 2) ** 2)
+        distance = np.minimum(np.arange(SIDE), SIDE - np.arange(SIDE))
+        dome = np.maximum(0.0, 1 - (distance[:, None] ** 2 + distance**2) / (POINTS_PER_GRAIN / 2) ** 2)
         height = self.grain_height_m * np.fft.irfft2(np.fft.rfft2(tops) * np.fft.rfft2(dome), s=(SIDE, SIDE))
         return np.asarray(height - height.mean())
 
@@ -441,7 +437,7 @@ class SelfAffine(RandomRelief):
 
     rms_m: float = param(
         1e-5,
-        'Standard deviation of the height; larger values give a stronger signal.',
+        'Standard deviation of the height.',
         unit='m',
         low=0.0,
         high=1e-3,
@@ -484,10 +480,10 @@ KNOT_M = 2.5e-4  # straight between such places the shift is wrong by 1 % at mos
 
 @dataclass(frozen=True)
 class Weave(Seeded):
-    """Two sets of yarns: those met when sliding along x stand `pitch_x_m` apart.
+    """Two sets of yarns: those met when sliding along x have the spacing `pitch_x_m`.
 
     Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
-    in a plain weave (`repeat` 2). Each wave is blurred by its own factor, which is exact. `irregular_m` shifts the
+    in a plain weave (`repeat` 2). Each wave is blurred by a separate factor, which is exact. `irregular_m` shifts the
     yarns by slow waves, as in linen: its lines are broader the finer they are.
     """
 
@@ -507,14 +503,14 @@ class Weave(Seeded):
     )
     thickness_x_m: float = param(
         1e-4,
-        'How far the yarns crossed along x stand out; larger values give a stronger signal.',
+        'Height of the yarns that a slide along x crosses.',
         unit='m',
         low=0.0,
         high=0.01,
     )
     thickness_y_m: float = param(
         1e-4,
-        'How far the yarns crossed along y stand out; larger values give a stronger signal.',
+        'Height of the yarns that a slide along y crosses.',
         unit='m',
         low=0.0,
         high=0.01,

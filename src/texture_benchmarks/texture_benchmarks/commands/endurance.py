@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     result = soak(options.duration, options.seed, lambda line: print(line, flush=True))
     requirements = result.numbers['requirements']
-    for asked, found in requirements.items():
-        print(f'{"holds" if found["holds"] else "FAILS"}: {asked}: {found["seen"]}')
+    for requirement, found in requirements.items():
+        print(f'{"holds" if found["holds"] else "FAILS"}: {requirement}: {found["seen"]}')
     print(f'  {result.write(options.out)}')
     return int(not all(found['holds'] for found in requirements.values()))

@@ -53,7 +53,7 @@ class Graph:
         self._context.try_shutdown()
 
     def publisher(self, topic: str) -> Any:
-        """Return a publisher on a topic of the suite: 'signal', or 'finger1/signal' in a namespace of its own."""
+        """Return a publisher on a topic of the suite: 'signal', or 'finger1/signal' in a separate namespace."""
         kind, qos, name = _in_namespace(topic)
         return self.node.create_publisher(kind, name, qos)
 
@@ -68,7 +68,7 @@ class Graph:
         deadline = time.monotonic() + deadline_s
         while not condition():
             if time.monotonic() > deadline:
-                raise DeviceError(f'{what}: nothing of it within {deadline_s:g} s; see what the nodes say')
+                raise DeviceError(f'{what}: nothing of it within {deadline_s:g} s; see the logs of the nodes')
             self._executor.spin_once(timeout_sec=POLL_S)
 
     def spin(self, seconds: float) -> None:
@@ -88,7 +88,7 @@ Timed = tuple[int, str, Any]  # when it is due, ns since the start; topic; data 
 
 
 class Streamer:
-    """Publish from a thread of its own."""
+    """Publish from a separate thread."""
 
     def __init__(self, graph: Graph, plan: Sequence[Timed]) -> None:
         publishers = {topic: graph.publisher(topic) for topic in {topic for _, topic, _ in plan}}
@@ -126,7 +126,7 @@ READY_WITHIN_S = 60.0
 DRIVER_S = 10.0
 BATCH_S = 0.01  # as the sensor node delivers
 SPEED_M_S, FORCE_N = 0.1, 2.0
-DOMAIN = 83  # of its own: what else runs on the machine must not listen
+DOMAIN = 83  # separate: other nodes on the machine must not subscribe
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ class LiveLatency:
     # (n_estimates,) From publishing the batch with the last sample of a window to receiving its estimate
     latency_s: Array
     expected: int  # Estimates that should have come
-    cpu: Mapping[str, float]  # Share of one core that each node used, 0 to 1
+    cpu: Mapping[str, float]  # Fraction of one core that each node used, 0 to 1
 
     def numbers(self) -> dict[str, Any]:
         """Return the figures."""
@@ -147,7 +147,7 @@ class LiveLatency:
             'median_ms': float(median),
             'p99_ms': float(p99),
             'longest_ms': float(1000 * self.latency_s.max()),
-            'cpu_percent': {name: round(100 * share, 1) for name, share in self.cpu.items()},
+            'cpu_percent': {name: round(100 * load, 1) for name, load in self.cpu.items()},
         }
 
 
@@ -172,17 +172,17 @@ def measure(model_path: Path, slide: LiveSlide, namespaces: Sequence[str] = ('',
             finger.start(graph, stack, model_path)
         streamer = Streamer(graph, sorted((timed for f in fingers for timed in f.plan()), key=lambda timed: timed[0]))
         _wait_for_nodes(graph, streamer, fingers, topics)
-        shares = _stream(graph, streamer, fingers, slide.slide_s + READY_WITHIN_S)
+        loads = _stream(graph, streamer, fingers, slide.slide_s + READY_WITHIN_S)
     windows = model.recipe.feature_set.windows
     expected = math.floor((slide.slide_s - windows.length_s) / windows.hop_s + 1e-6) + 1
     return {
-        finger.namespace: LiveLatency(np.array(finger.latency_s(streamer, topics, windows.length_s)), expected, share)
-        for finger, share in zip(fingers, shares, strict=True)
+        finger.namespace: LiveLatency(np.array(finger.latency_s(streamer, topics, windows.length_s)), expected, load)
+        for finger, load in zip(fingers, loads, strict=True)
     }
 
 
 def _wait_for_nodes(graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], topics: Sequence[str]) -> None:
-    """Wait until each node listens to what is streamed, and each classifier can be heard."""
+    """Wait until each node subscribes to the streams, and each classifier is discovered."""
     needed = [finger.topic(topic) for finger in fingers for topic in ('exploration', *topics)]
 
     def ready() -> bool:
@@ -196,7 +196,7 @@ def _wait_for_nodes(graph: Graph, streamer: Streamer, fingers: Sequence[_Finger]
 def _stream(
     graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], deadline_s: float
 ) -> list[Mapping[str, float]]:
-    """Stream until each finger has its final estimate; return the share of one core that each of its nodes used."""
+    """Stream until each finger has its final estimate; return the load of each of its nodes, 1 for one core."""
     before, began_s = [finger.cpu_s() for finger in fingers], time.monotonic()
     streamer.start()
     graph.wait_until(lambda: all(finger.ended for finger in fingers), deadline_s, 'the final estimates')
@@ -273,7 +273,7 @@ class _Finger:
 
 
 def driver_cpu() -> float:
-    """Return the share of one core that the sensor node uses, reading an emulated TSF-85."""
+    """Return the load of the sensor node, 1 for one core, reading an emulated TSF-85."""
     with tempfile.TemporaryDirectory() as folder:
         device = str(Path(folder) / 'tsf85')
         emulated = {'sensor_link': device, 'finger_pipe': str(Path(folder) / 'finger')}

@@ -169,7 +169,7 @@ def check(trials: Sequence[FaultTrial], counts: Mapping[str, int], memory: Seque
         'every vector is answered or counted': (f'{silent} not, {lost_vectors} counted', silent <= lost_vectors),
         'memory grows less than 1 %': (f'{grown:+.2%}, {len(old)} processes lived long enough', grown < GROWTH),
     }
-    return {asked: {'seen': seen, 'holds': holds} for asked, (seen, holds) in found.items()}
+    return {requirement: {'seen': seen, 'holds': holds} for requirement, (seen, holds) in found.items()}
 
 
 def figures(trials: Sequence[FaultTrial]) -> dict[str, Any]:
@@ -190,7 +190,7 @@ def figures(trials: Sequence[FaultTrial]) -> dict[str, Any]:
 
 
 class Rig(Graph):
-    """All nodes as processes, an operator who explores with them, and what befalls them; use it in a `with` block."""
+    """All nodes as processes, an operator who explores with them, and injected faults; use it in a `with` block."""
 
     def __init__(self, domain_id: int, given: Mapping[str, Mapping[str, Any]]) -> None:
         super().__init__(domain_id, 'watcher')
@@ -248,7 +248,7 @@ class Rig(Graph):
         self._forces.append((to_ns(wrench.header.stamp) / NANOSECONDS, math.hypot(force.x, force.y, force.z)))
 
     def start(self, name: str, more: Mapping[str, Any] = {}) -> None:
-        """Start a node, again if it runs; wait until an explorer answers, whom nobody hears while it connects."""
+        """Start a node, again if it runs; wait until an explorer answers, which it cannot do while it connects."""
         if name in self._nodes:
             self._nodes[name].stop()
         given = {**self._given[name], **more}
@@ -256,7 +256,7 @@ class Rig(Graph):
         node.__enter__()
         deadline_s = time.monotonic() + ANSWERS_S
         while name == 'explorer' and time.monotonic() < deadline_s:
-            with suppress(LaunchFailed):  # an answer to one whom it has not discovered yet is lost
+            with suppress(LaunchFailed):  # an answer to a client that is not discovered yet is lost
                 self._operator.stop()
                 return
         if name == 'explorer':
@@ -344,7 +344,7 @@ class Rig(Graph):
         return next(pid for pid in pids if GUARD in Path(f'/proc/{pid}/cmdline').read_text(errors='replace'))
 
     def _command(self, end_s: float) -> None:
-        """Command the arm, too, along the surface."""
+        """Also command the arm, along the surface."""
         publisher = self.node.create_publisher(TwistStamped, 'twist_controller/twist', 1)
         twist = TwistStamped()
         twist.header.frame_id, twist.twist.linear.y = 'base', 0.01
@@ -378,7 +378,7 @@ def soak(
         given: Mapping[str, Mapping[str, Any]] = {
             'emulator': {'scene': SCENE, 'seed': seed, 'sensor_link': device, 'finger_pipe': pipe},
             'sensor': {'device': device},
-            # It holds the last velocity for ever.
+            # It keeps executing the last velocity.
             'twist_controller': {'finger_pipe': pipe, 'start_height_m': 0.002, 'command_timeout_s': 0.0},
             'feature_extractor': {'recipe': card},
             'classifier': {'model': card},

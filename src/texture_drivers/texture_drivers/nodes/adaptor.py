@@ -27,7 +27,7 @@ def import_message(message_type: str) -> Any:
         return getattr(importlib.import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError) as error:
         raise InvalidParameter(
-            f"the mapping asks for '{message_type}', which cannot be imported ({error}); build the package with these "
+            f"the mapping needs '{message_type}', which cannot be imported ({error}); build the package with these "
             'messages and source it, or correct the type in the mapping'
         ) from error
 
@@ -67,7 +67,7 @@ class Adaptor(Node):
         self._diagnostics = Diagnostics(self, self._report)
 
     def _listen(self, topic: str, message_type: str, take: Callable[[Any, int], None]) -> None:
-        """Subscribe; a message is handed over with the time at which it was sent."""
+        """Subscribe; a message is passed on with the time at which it was sent."""
 
         def on_message(message: Any, info: Mapping[str, int]) -> None:
             self._received += 1

@@ -51,7 +51,7 @@ UNLOADED = frozenset(
 class SensorNodeParams(TareParams, SensorParams):
     """Parameters of the sensor node."""
 
-    sensor: str = param('tsf85', "Sensor that is read: a name of the catalogue, or 'module:Class' of your own.")
+    sensor: str = param('tsf85', "Sensor that is read: a name of the catalogue, or the 'module:Class' of a custom one.")
     autostart: bool = param(
         True, 'Configures and activates the node at start-up, so that no lifecycle manager is needed.'
     )
@@ -159,7 +159,7 @@ class SensorNode(PatientLifecycleNode):
         return message
 
     def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Tare, and answer when that is done or refused; called in a thread of its own."""
+        """Tare, and answer when that is done or refused; called in a separate thread."""
         watch, reader = self._watch, self._reader
         if reader is None or reader.fault:
             cause = 'the sensor delivers no samples; see its message on /diagnostics'
@@ -183,7 +183,7 @@ class SensorNode(PatientLifecycleNode):
             self._watch.set_unloaded(state.phase in UNLOADED)
 
     def _start_tare(self) -> threading.Event:
-        """Let the device set its own bias, if any, and then measure what is left; return what tells that it began."""
+        """Let the device remove its bias, if any, and then measure the rest; return the event of its start."""
         sensor, watch, begun = self._sensor, self._watch, threading.Event()
 
         def start() -> None:

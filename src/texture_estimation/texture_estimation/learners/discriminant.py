@@ -53,13 +53,13 @@ def linear_discriminant(
     means = _sums(X, y, counted, n_labels)
     centre = means.mean(axis=0)
     rest = X - means[y]
-    shares = counted / n_labels
-    covariance = (rest.T * shares) @ rest
+    place_weights = counted / n_labels
+    covariance = (rest.T * place_weights) @ rest
     if stretches is not None and stretch_weight:
         places = np.unique(np.stack([y, stretches]), axis=1, return_inverse=True)[1].reshape(-1)
-        own = np.bincount(places, shares)
-        between = _sums(rest, places, shares, len(own)) / own[:, None]
-        covariance += stretch_weight * (between.T * own) @ between
+        totals = np.bincount(places, place_weights)
+        between = _sums(rest, places, place_weights, len(totals)) / totals[:, None]
+        covariance += stretch_weight * (between.T * totals) @ between
     scale = np.sqrt(np.diag(covariance))
     scale[scale <= CONSTANT * (1.0 + np.abs(centre))] = np.inf
     correlations = shrunk_covariance(covariance / np.outer(scale, scale), shrinkage)
@@ -165,7 +165,7 @@ OUTERMOST = 0.05  # of the windows lie below the trained range, and as many abov
 
 
 class ForceDiscriminantPredictor:
-    """The layer of the nearest force; what lies outside the trained forces counts less."""
+    """The layer of the nearest force; windows outside the trained forces count less."""
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         self.weights, self.offsets, self.log_forces, self.trained = (
@@ -202,8 +202,8 @@ class ForceDiscriminant(Discriminant):
     """A shrunk discriminant for each range of forces, and less weight for windows outside the trained forces.
 
     Amplitude and spectrum of a vibration change with the force, and on a surface that is not level the force changes
-    from place to place. A window is therefore judged by what was trained near its force, and one that was made far from
-    any trained force says little. Differences between the places along a slide count more in the covariance than what
+    from place to place. A window is therefore classified by what was trained near its force, and one recorded far from
+    any trained force carries little information. Differences between places along a slide count more than what
     varies at one place. Needs the feature `force`; without it there is one discriminant for all.
 
     Source: Fisher 1936; Friedman 1989; Hatch et al. 2006; Cleveland & Devlin 1988, "Locally weighted regression", for
@@ -236,7 +236,7 @@ class ForceDiscriminant(Discriminant):
     reach: float = param(
         0.1,
         'How fast a window counts less outside the trained forces: 1 / e where the logarithm of the force is so '
-        'far outside; a smaller one trusts the trained forces alone.',
+        'far outside; a smaller one relies on the trained forces alone.',
         low=0.01,
         high=1e6,
     )
@@ -265,7 +265,7 @@ class ForceDiscriminant(Discriminant):
         middles = np.quantile(forces, (np.arange(self.ranges) + 0.5) / self.ranges)
         blind = X.copy()
         if self.column != UNBOUND:
-            blind[:, self.column] = 0.0  # what is constant tells nothing
+            blind[:, self.column] = 0.0  # constant features carry no information
         stretches = stretches_of(groups, STRETCHES)
         layers = [
             linear_discriminant(

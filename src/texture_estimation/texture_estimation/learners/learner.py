@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner is, and the folds, standardisation and log-probabilities that learners share."""
+"""The interface of learners, and their common folds, standardisation and log-probabilities."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Codes = NDArray[np.intp]
 
 
 # From features (..., n_features) to log-probabilities up to a constant of the window, (..., n_labels), as plain arrays.
-# One with a hidden layer has a method `activations` besides, which gives its outputs (..., n_hidden).
+# One with a hidden layer also has a method `activations`, which gives its outputs (..., n_hidden).
 Predictor = Callable[[Array], Array]
 
 
@@ -30,7 +30,7 @@ def hidden_layer(predictor: Predictor) -> Callable[[Array], Array] | None:
 
 
 def trust(predictor: Predictor, X: Array) -> Array:
-    """Return how much each window counts in its slide, (...) of (..., n_features), above 0; 1 if it does not say.
+    """Return how much each window counts in its slide, (...) of (..., n_features), above 0; 1 if not declared.
 
     A predictor that was trained under some conditions has a method of this name.
     """
@@ -52,7 +52,7 @@ class Fitted:
         How the probabilities were calibrated, in words for the model's card.
     folds
         Of each part of the slides their numbers, and the parameters fitted without them, calibrated like the final
-        ones; () if the learner does not say.
+        ones; () if the learner does not declare it.
     trusted : (n,) or None
         How much each example counts in its slide, by the learner that has not seen it; all the same if None.
     temperature
@@ -107,7 +107,7 @@ def column_of(names: Sequence[str], feature: str) -> int:
 
 
 def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
-    """Return the names of the keyword arguments that `fit` of a learner takes besides the examples.
+    """Return the names of the keyword arguments that `fit` of a learner takes in addition to the examples.
 
     A learner declares them in its class variable `extras`: 'augmented' for copies of the slides to draw from,
     'parts' for the sessions, places or fingers whose slides are held out together. Most learners take none.
@@ -116,7 +116,7 @@ def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
 
 
 # --------------------
-# Divide examples for cross-validation so that no slide is on both sides.
+# Divide examples for cross-validation so that no slide is in training and test.
 
 
 def assign_folds(y: Codes, groups: Codes, count: int, parts: Codes | None = None) -> tuple[Codes, str] | None:
@@ -165,7 +165,7 @@ def _numbered(groups: Codes) -> Codes:
 
 
 def held_out_scores(fit: Callable[[NDArray[np.bool_]], Predictor], X: Array, folds_of: Codes, count: int) -> Array:
-    """Return what is said of each example by a predictor that has not seen its part, (n, count)."""
+    """Return the output for each example of a predictor that was not trained on its fold, (n, count)."""
     found = np.empty((len(X), count))
     for part in np.unique(folds_of):
         held = folds_of == part
@@ -217,7 +217,7 @@ def fit_in_folds(
 # --------------------
 # Bring features to zero mean and unit variance, as plain arrays.
 
-# A deviation below this share of the largest value is rounding: the feature is constant.
+# A deviation below this fraction of the largest value is rounding: the feature is constant.
 ROUNDING = 1e-13
 
 
@@ -233,7 +233,7 @@ def standardisation(values: Array) -> tuple[Array, Array]:
 
 
 # --------------------
-# Features that say how a window was made, and not what of.
+# Features that describe how a window was recorded, and not the surface.
 
 FORCE = 'force'  # ends the name of the feature
 NOT_COMPARED = (FORCE,)

@@ -27,7 +27,7 @@ BLOCK = 16  # batches that are drawn at once
 
 @dataclass(frozen=True, eq=False)
 class AugmentedExamples:
-    """What a learner draws besides the examples of the undisturbed slides."""
+    """What a learner draws in addition to the examples of the undisturbed slides."""
 
     values: Inputs
     codes: Codes
@@ -70,7 +70,7 @@ class AugmentedBatches:
         self._drawn: list[tuple[Inputs, Codes]] = []
 
     def draw(self, count: int) -> tuple[Inputs, Codes]:
-        """Return so many inputs, (count, n_features), and their labels, (count,); the same count at each call."""
+        """Return `count` inputs, (count, n_features), and their labels, (count,); the same count at each call."""
         if not self._drawn:
             self._drawn = self._draw_block(count)
         return self._drawn.pop()
@@ -156,7 +156,7 @@ RATE = 2e-3
 MEAN_DECAY, SQUARE_DECAY = 0.9, 0.999  # Kingma & Ba's
 TINY = 1e-8
 NOISE_TABLE = 1 << 20
-CALIBRATION_SHARE = 0.5  # of the passes, that a network for the calibration makes
+CALIBRATION_FRACTION = 0.5  # of the passes, that a network for the calibration makes
 HIDDEN_LAYER, OUTPUT_LAYER = 0, 2  # of the weights; their offsets follow them
 # Of one network, steps times features and labels: larger trainings make fewer passes, so that they end within minutes.
 # The shipped recipes come to 3 to 5 millions with 20 textures of 40 slides.
@@ -202,9 +202,7 @@ class Mlp:
     decay: float = param(
         0.01, 'Weight decay, divided by the number of examples; a larger one smooths more.', low=0.0, high=1e6
     )
-    epochs: int = param(
-        60, 'Number of passes over the training examples; more take longer to train.', low=1, high=100_000
-    )
+    epochs: int = param(60, 'Number of passes over the training examples.', low=1, high=100_000)
     folds: int = param(
         5,
         'Number of cross-validation folds for the calibration; more folds take longer to train.',
@@ -252,8 +250,8 @@ class Mlp:
 
         def fit(held: NDArray[np.bool_]) -> dict[str, Array]:
             rest = augmented.without(np.unique(groups[held])) if augmented else None
-            share = CALIBRATION_SHARE if augmented and held.any() else 1.0
-            return self._fit(X[~held], y[~held], n_labels, rest, share)
+            fraction = CALIBRATION_FRACTION if augmented and held.any() else 1.0
+            return self._fit(X[~held], y[~held], n_labels, rest, fraction)
 
         return fit_in_folds(fit, self.predictor, X, y, groups, folds=self.folds, parts=parts, tempered=TEMPERED)
 
@@ -263,11 +261,11 @@ class Mlp:
         return MlpPredictor(parameters)
 
     def _fit(
-        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
+        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, fraction: float = 1.0
     ) -> dict[str, Array]:
-        """Return the layers after a share of the steps, with the standardisation worked into them."""
+        """Return the layers after a fraction of the steps, with the standardisation worked into them."""
         mean, scale = X.mean(axis=0), X.std(axis=0)
-        scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
+        scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # constant features carry no information
         inputs, rng = np.empty(X.shape, np.float32), np.random.default_rng(self.seed)
         for rows in chunks(*X.shape):
             inputs[rows] = (X[rows] - mean) / scale
@@ -276,7 +274,7 @@ class Mlp:
             if augmented
             else _Batches(inputs, y, rng)
         )
-        weights = self._descend(drawn, inputs.shape, n_labels, rng, share)
+        weights = self._descend(drawn, inputs.shape, n_labels, rng, fraction)
         hidden, hidden_offset, output, output_offset = (part.astype(np.float64) for part in weights)
         hidden /= scale[:, None]
         return {
@@ -286,21 +284,21 @@ class Mlp:
             'output_offset': output_offset,
         }
 
-    def _steps(self, n_examples: int, work: int, share: float) -> int:
-        """Return the number of batches, fewer where each costs much: with so many features and labels."""
-        passes, most = math.ceil(share * self.epochs), round(share * MAX_WORK / work)
+    def _steps(self, n_examples: int, work: int, fraction: float) -> int:
+        """Return the number of batches, fewer where each costs much: with this many features and labels."""
+        passes, most = math.ceil(fraction * self.epochs), round(fraction * MAX_WORK / work)
         return min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
 
     def _descend(
         self, drawn: AugmentedBatches | _Batches, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator,
-        share: float,
+        fraction: float,
     ) -> Weights:  # fmt: skip
-        """Return the weights after this share of all passes over so many examples, (n, n_features)."""
+        """Return the weights after this fraction of all passes over the examples, (n, n_features)."""
         n_examples, n_features = shape
         network = MlpTraining(n_features, self.hidden, n_labels, rng)
         # Noise is cut from a table at random places: a new number for each input took a fifth of the training.
         table = np.float32(self.noise) * rng.standard_normal(max(NOISE_TABLE, 4 * BATCH * n_features), dtype=np.float32)
-        steps = self._steps(n_examples, n_features + n_labels, share)
+        steps = self._steps(n_examples, n_features + n_labels, fraction)
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))
             start = rng.integers(len(table) - inputs.size + 1)
@@ -373,7 +371,7 @@ class MlpTraining:
         np.add.reduce(error, axis=0, out=self.slopes[3])
 
     def step(self, rate: float) -> None:
-        """Change the weights along the slopes, each at its own pace (Kingma & Ba 2015)."""
+        """Update the weights along the gradients, with adaptive rates (Kingma & Ba 2015)."""
         weights, slopes, means, squares, change, spread = self._vectors
         self._count += 1
         pace = rate * math.sqrt(1 - SQUARE_DECAY**self._count) / (1 - MEAN_DECAY**self._count)

@@ -40,7 +40,7 @@ NODES = (
     'DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode', 'TreeNode',
     'RandomStateNode',
 )  # fmt: skip
-# What an estimator holds beside estimators, arrays and plain values; its trees are checked before they are used.
+# What an estimator holds next to estimators, arrays and plain values; its trees are checked before they are used.
 ESTIMATOR_PARTS = (
     'sklearn.calibration._CalibratedClassifier',
     'sklearn.neural_network._stochastic_optimizers.AdamOptimizer',
@@ -74,7 +74,7 @@ def unpacked(content: NDArray[np.uint8]) -> Any:
 def _check_parts(content: bytes) -> list[str]:
     """Return the types in it; raise ModelMismatch or FileRefused unless skops, which counts nothing, may read it.
 
-    A member may be named by many nodes, each of which makes an array of its own; and some kinds of node would read
+    A member may be named by many nodes, each of which makes a separate array; and some kinds of node would read
     archives within the archive, or call functions.
     """
     found = set()
@@ -236,14 +236,14 @@ class SklearnLearner:
 
     @classmethod
     def from_recipe(cls, values: Mapping[str, Any], where: str) -> SklearnLearner:
-        """Build from the section of a recipe: the key `estimator`, and the estimator's own parameters.
+        """Build from the section of a recipe: the key `estimator`, and the parameters of the estimator.
 
         Parameters
         ----------
         values
             The section.
         where
-            Where it stands, for the sentence of an error.
+            Where it is listed, for the error message.
 
         Raises
         ------
@@ -333,7 +333,7 @@ def _classifier(name: str) -> Any:
     if not PUBLIC_CLASS.fullmatch(name):
         raise InvalidParameter(
             f'estimator is {safe_repr(name)}; a public class of scikit-learn such as {EXAMPLE} is needed; '
-            "one of your own is a Learner on PYTHONPATH, 'learner: {module:Class: {}}' (docs/extending.md)"
+            "a custom one is a Learner on PYTHONPATH, 'learner: {module:Class: {}}' (docs/extending.md)"
         )
     module, cls_name = name.split(':')
     try:
@@ -350,7 +350,7 @@ def _classifier(name: str) -> Any:
 def _classifies(cls: Any, is_classifier: Any) -> bool:
     try:
         return bool(is_classifier(cls()))
-    except TypeError:  # it needs other estimators; what asks for it says so
+    except TypeError:  # it needs other estimators; the caller reports it
         return hasattr(cls, 'predict')
 
 

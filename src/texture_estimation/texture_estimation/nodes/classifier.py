@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Node that classifies the touched surface and adds new textures, and what it shares with the roughness estimator."""
+"""Node that classifies the touched surface and adds new textures, and the base class of the roughness estimator."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class EstimatorNode(Node):
     estimate: ClassVar[tuple[type, str]]  # message and topic
     no_model: ClassVar[str]
     activity: ClassVar[str]
-    vectors_unused: ClassVar[str]  # what is said when there are new faults
+    vectors_unused: ClassVar[str]  # status message when there are new faults
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
@@ -75,7 +75,7 @@ class EstimatorNode(Node):
         return self._evidence.update(vector)
 
     def _facts(self) -> Mapping[str, Any]:
-        """Return what the report says besides faults."""
+        """Return the content of the report in addition to faults."""
         return {}
 
     def _faults(self) -> Mapping[str, int]:

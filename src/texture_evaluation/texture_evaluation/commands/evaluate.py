@@ -30,12 +30,12 @@ from texture_recordings.dataset import SlideDataset, cut_slide
 def _configure_evaluate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('model', help='a trained model')
     parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
-    parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
+    parser.add_argument('--json', metavar='FILE', help='also write the figures there')
     add_slides(parser)
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    """Evaluate, print the figures, and write them if asked to."""
+    """Evaluate, print the figures, and write them with --json."""
     refuse_inputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
     report = evaluate(model, options.bags, options.slides)
@@ -56,12 +56,12 @@ def _evaluate(options: argparse.Namespace) -> int:
 def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'split',
-        help='how slides are divided: stratified:5, leave-one-out:speed, leave-one-out:place:4 (quarters of the path), '
+        help='how slides are split: stratified:5, leave-one-out:speed, leave-one-out:place:4 (quarters of the path), '
         'chronological:0.75 or random:20',
     )
-    parser.add_argument('recipe', help='name of a shipped recipe, or path of your own; more may follow')
+    parser.add_argument('recipe', help='name of a shipped recipe, or path of a recipe; more may follow')
     parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
-    parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
+    parser.add_argument('--json', metavar='FILE', help='also write the figures there')
     parser.add_argument('--chart', metavar='FILE', help='draw the recipes there; .png, .svg or .pdf')
     parser.add_argument(
         '--jobs', type=core_count, default=1, metavar='N', help='folds computed at once; -1: one per core'
@@ -72,7 +72,7 @@ def _configure_cross_validate(parser: argparse.ArgumentParser) -> None:
 
 
 def _cross_validate(options: argparse.Namespace) -> int:
-    """Cross-validate one recipe or several, print tables and comparisons, and write and draw them if asked to."""
+    """Cross-validate one recipe or several, print tables and comparisons, and write and draw them on request."""
     split = parse_split(options.split, options.seed)
     names, bags = recipes_and_bags([options.recipe, *options.bags])
     # Files that cannot be written or would be lost are refused before hours of training, not after them.
@@ -122,7 +122,7 @@ def _is_bags(text: str, recipes: set[str]) -> bool:
     return path.is_dir() or path.suffix == '.mcap' or (text not in recipes and path.suffix != '.yaml')
 
 
-evaluate_ = Command('say how good a model is on labelled bags', _configure_evaluate, _evaluate)
+evaluate_ = Command('evaluate a model on labelled bags', _configure_evaluate, _evaluate)
 cross_validate_ = Command(
     'train and test recipes on splits of labelled bags', _configure_cross_validate, _cross_validate
 )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""`texture panel`: say what a panel of people grades as rough, and how far they agree."""
+"""`texture panel`: evaluate the grades of a panel of people, and their agreement."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Examine the panel, print what it says, and write it if asked to."""
+    """Evaluate the panel, print the results, and write them with --out."""
     ratings = read_ratings(options.ratings, options.scale)
     print('\n'.join(summary(report_of(ratings))))
     for file in write_panel(ratings, options.out) if options.out else ():
@@ -48,14 +48,14 @@ def run(options: argparse.Namespace) -> int:
 def summary(report: Mapping[str, Any]) -> list[str]:
     """Return the figures in lines for people."""
     textures, violations = report['textures'], report['protocol_violations']
-    lines = [f'{report["raters"]} people, {len(textures)} textures; {report["note"] or "grades as they stand"}']
+    lines = [f'{report["raters"]} people, {len(textures)} textures; {report["note"] or "grades as given"}']
     width = max(map(len, textures))
     lines += [
         f'  {name:<{width}}  {one["mean"]:.2f} ± {_number(one["std"])}   '
         f'votes {" ".join(f"{count:3d}" for count in one["votes"])}'
         for name, one in textures.items()
     ]
-    lines += [f'{told}: {_number(report[name])}' for name, told in NAMED.items()]
+    lines += [f'{title}: {_number(report[name])}' for name, title in NAMED.items()]
     lines.append(f'protocol: {"kept" if not violations else f"not kept in {len(violations)} points"}')
     lines += [f'  {sentence}' for sentence in violations[:SHOWN_VIOLATIONS]]
     more = len(violations) - SHOWN_VIOLATIONS

@@ -19,7 +19,7 @@ from texture_evaluation.train import train_from_bags, train_grades_from_bags
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument(
-        'recipe', help='name of a shipped recipe, such as default, or roughness with --grades, or path of your own'
+        'recipe', help='name of a shipped recipe, such as default, or roughness with --grades, or path of a recipe'
     )
     parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
     parser.add_argument(
@@ -31,7 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Train, save, and say what was trained."""
+    """Train, save, and report what was trained."""
     _check_place(Path(options.out), replace=options.force)
     if options.grades:
         graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
@@ -55,24 +55,22 @@ def _check_place(out: Path, *, replace: bool) -> None:
 
 
 def summary(model: TextureModel, out: Path) -> list[str]:
-    """Return what a model knows and how well it did on what was held out, in lines."""
+    """Return the labels of a model and its held-out accuracy, in lines."""
     training = model.training
     accuracy = training['held_out_window_accuracy']
-    held_out = (
-        'nothing could be held out' if accuracy is None else f'{100 * accuracy:.1f} % of the held-out windows right'
-    )
+    held_out = 'nothing was held out' if accuracy is None else f'{100 * accuracy:.1f} % accuracy of held-out windows'
     kinds = len(model.next_touch_model.motions) if model.next_touch_model else 0
     return [
         f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        *(f'this fraction is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
+        *(f'this accuracy is of {note}' for note in [training['calibration']] if note.endswith('too confident')),
         *_unfit(model),
         *_uneven(model.acceptance.domain.slides),
         *training.get('tare', []),
         *filter(
             None, [model.acceptance.reason or model.acceptance.decided_reason, model.acceptance.domain.reach_reason]
         ),
-        *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
+        *([f'{kinds} kinds of slides over each, from which `texture identify` can choose'] if kinds else []),
         _saved_as(out),
     ]
 
@@ -86,13 +84,13 @@ def _unfit(model: TextureModel) -> list[str]:
     accuracy = training['held_out_window_accuracy']
     if accuracy is not None and labels > 1 and accuracy <= chance + margin:
         warnings.append(
-            f'warning: {100 * accuracy:.1f} % of the held-out windows is not above chance, {100 * chance:.1f} % of '
-            f'{labels} surfaces; use a recipe for this sensor and rate, or look at the labels'
+            f'warning: {100 * accuracy:.1f} % accuracy of held-out windows is not above chance, {100 * chance:.1f} % '
+            f'of {labels} surfaces; use a recipe for this sensor and rate, or check the labels'
         )
     if training['windows'] > training.get('samples', training['windows']):
         warnings.append(
             f'warning: {training["windows"]} windows overlap more than the {training["samples"]} samples that exist; '
-            'use a recipe with longer hops, or look at the rate of the recording'
+            'use a recipe with longer hops, or check the rate of the recording'
         )
     return warnings
 
@@ -103,14 +101,14 @@ def _uneven(slides: Mapping[str, int]) -> list[str]:
     if 2 * fewest > most or not most:
         return []
     few = ', '.join(label for label, count in slides.items() if count == fewest)
-    return [f'few slides of {few}: {fewest}, of others up to {most}; record as many of each']
+    return [f'few slides of {few}: {fewest}, of others up to {most}; record equally many of each']
 
 
 def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
     """Return the training set and the held-out errors of a roughness model, in lines."""
     training = model.training
     error = training.get('held_out_error')
-    held_out = 'nothing could be held out' if error is None else f'{error:.2f} grades off on textures held out in turn'
+    held_out = 'nothing was held out' if error is None else f'{error:.2f} grades mean error on held-out textures'
     return [
         f"recipe '{model.recipe.name}' trained on the grades of {training['textures']} textures",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',

@@ -42,9 +42,9 @@ def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: i
 
 
 def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
-    """Return the densities as their shares of cosines, then of sines, (..., 2 · bins, n_segments).
+    """Return the densities as their parts of cosines, then of sines, (..., 2 · bins, n_segments).
 
-    Each half lies in one piece of memory, which makes the sum of both three times as fast as side by side.
+    Each half lies in one block of memory, which makes the sum of both three times as fast as side by side.
     """
     cut = segments(rows, segment, step)
     parts: Array = _transform(cut.shape[-1], segment, bins, rate_hz) @ cut.swapaxes(-1, -2)
@@ -74,7 +74,7 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
 
 
 def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
-    """Return the densities of the segments of windows; features that ask for the same share them."""
+    """Return the densities of the segments of windows; features with equal parameters share them."""
     return windows.shared(
         ('densities', segment, step, bins),
         lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
@@ -124,7 +124,7 @@ def hann(length: int) -> Array:
 def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
     """Return the matrix (2 · bins, length) that takes a segment to the square roots of its densities.
 
-    Rows are cosines, then sines, tapered. Their own mean is removed, which removes that of the segment: with the
+    Rows are cosines, then sines, tapered. Their mean is removed, which removes that of the segment: with the
     taper w and a wave e, Σ w e (s - mean(s)) = Σ (w e - mean(w e)) s.
     """
     taper = hann(length)
@@ -142,7 +142,7 @@ def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
 # --------------------
 # The spectrum of windows over waves per metre of the surface: frequency over speed, so that no speed moves a line.
 
-PADDING = 4  # lines stand so much closer than the window alone resolves, and bands may be narrower than a line
+PADDING = 4  # lines are closer than the window alone resolves by this factor, and bands may be narrower than a line
 
 
 def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) -> Array:
@@ -218,7 +218,7 @@ def welch_spectrum(windows: WindowBatch, points: int, rate_of_change: bool) -> t
 
 
 def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> Array:
-    """Return at which frequencies the lines would stand at another speed, (..., 1, n_lines); 0 m/s: where they stand.
+    """Return the frequencies of the lines at another speed, (..., 1, n_lines); 0 m/s: their frequencies as measured.
 
     A wave of the surface met at f is met at f · speed_m_s / v at that speed; NaN if that is unknown or not above 0.
     """
@@ -232,7 +232,7 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
 
 @lru_cache(maxsize=64)
 def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
-    """Return the frequency of each line, (segment / 2,) Hz, and the share of its density that its integral has."""
+    """Return the frequency of each line, (segment / 2,) Hz, and the fraction of its density that its integral has."""
     hertz: Array = np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment)
     integration: Array = 1.0 / (2.0 * np.pi * hertz) ** 2
     for array in (hertz, integration):
@@ -293,7 +293,7 @@ class LowFftBins(Feature):
 
     bins: int = param(
         32,
-        'Number of FFT bins, from the first above 0 Hz; more bins reach higher frequencies.',
+        'Number of FFT bins, from the first above 0 Hz.',
         low=1,
         high=512,
     )
@@ -396,7 +396,7 @@ class PeakToMedianPower(Feature):
     """Logarithm of the power of the strongest segment over that of the median or of the weakest one.
 
     A finger that sticks and slips is still and then jumps; over an even texture all events are alike. The weakest event
-    tells a single skid: being still for a tenth of the window does not move the middle.
+    responds to a single skid: being still for a tenth of the window does not move the middle.
 
     Examples
     --------
@@ -438,9 +438,9 @@ LEAST_RATIO = 1e-3  # added before the logarithm: a lag without any power gives 
 
 @dataclass(frozen=True)
 class PowerAutocorrelation(Feature):
-    """Log of the mean product of the squared signal and itself some samples later, over its mean squared; of steps too.
+    """Log of the mean product of the squared signal and itself some samples later, over its mean squared, and of steps.
 
-    0 where the one says nothing of the other, above where bursts last so long, below where they keep such a distance.
+    0 where they are independent, above where bursts last so long, below where they keep such a distance.
     The gain of the sensor changes nothing.
 
     Examples
@@ -449,7 +449,7 @@ class PowerAutocorrelation(Feature):
     >>> clicks[::12] = 1.0
     >>> feature = PowerAutocorrelation()
     >>> values = dict(zip(feature.names, feature(WindowBatch(clicks, rate_hz=100.0))[0].tolist()))
-    >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks are 12 samples apart, never 8
+    >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks have a spacing of 12 samples, never 8
     True
     """
 
@@ -503,9 +503,7 @@ class ShortTimeFourier(Feature):
     [2, 6]
     """
 
-    parts: int = param(
-        4, 'Number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
-    )
+    parts: int = param(4, 'Number of equal time segments of the window.', low=1, high=256)
     bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
 
     @property

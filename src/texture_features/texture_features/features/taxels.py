@@ -24,7 +24,7 @@ from texture_features.windows import FLOOR, Feature, WindowBatch, centred, first
 # --------------------
 # Log shares: how the load is distributed over the taxels, with its sign.
 
-FREE_SHARE = 0.01  # of the load, below which a channel counts as free: its noise says nothing
+FREE_FRACTION = 0.01  # of the load, below which a channel counts as free: only noise
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class LogShares(Feature):
         levels = np.add.reduce(rows, axis=-1) / rows.shape[-1]
         sizes = np.abs(levels)
         total = np.add.reduce(sizes, axis=-1, keepdims=True)
-        shares = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
-        logs = np.sign(levels) * np.log(np.maximum(shares, FREE_SHARE) / FREE_SHARE)
+        fractions = np.divide(sizes, total, out=np.zeros_like(sizes), where=total > 0.0)
+        logs = np.sign(levels) * np.log(np.maximum(fractions, FREE_FRACTION) / FREE_FRACTION)
         centred: Array = logs - np.add.reduce(logs, axis=-1, keepdims=True) / logs.shape[-1]
         return centred[..., None]
 
@@ -146,7 +146,7 @@ MOST_CORRELATION = 0.98  # beyond, the transform of a correlation would grow wit
 class DifferenceCorrelation(Feature):
     """Correlations between the channels' differences over some lags, Fisher-transformed; one for each pair of channels.
 
-    Levels and their shares tell how a finger is mounted and how it was tared that day. Which channels change together
+    Levels and their shares depend on how a finger is mounted and was tared that day. Which channels change together
     while a surface passes, over a short and over a longer lag, changes less from day to day. The mean difference, which
     is drift, is left out. n channels give n (n - 1) / 2 pairs: meant for arrays of some twenty taxels.
 
@@ -205,15 +205,15 @@ class DifferenceCorrelation(Feature):
 
 
 # --------------------
-# The load on the whole array: whether it is that of the training, not what lies under it.
+# The load on the whole array: whether it is that of the training, not the surface.
 
 
 @dataclass(frozen=True)
 class LoadLevel(Feature):
     """Logarithm of the mean square over all channels and samples: the load of a tared array, squared.
 
-    For the domain of a model and for its novelty detector: a load that no session of the training showed is told from
-    those that it showed. Networks and discriminants are trained without it, as it tells the day and not the surface.
+    For the domain of a model and for its novelty detector, which reject a load outside those of the training
+    sessions. Networks and discriminants are trained without it, as it depends on the day.
 
     Examples
     --------
@@ -256,7 +256,7 @@ class SpatialBandPower(WelchPower):
     [2, 2, 2]
     """
 
-    bands: int = param(4, 'Number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
+    bands: int = param(4, 'Number of spatial frequency bands.', low=1, high=128)
     longest_m: float = param(
         2e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
     )
@@ -279,14 +279,14 @@ class SpatialBandPower(WelchPower):
         """Return log(mean density + floor) of each band."""
         densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         speed = windows.moving_m_s[..., None, None, None]
-        # Line n, from 0, stands for the stretch from n to n + 1; edges are in lines, too.
+        # Line n, from 0, covers the stretch from n to n + 1; edges are also in lines.
         edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
         high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
         line = _numbers(len(hertz) + 1)
         inside = np.minimum(np.maximum(line, low), high)
-        share = inside[..., 1:] - inside[..., :-1]
-        mean = np.add.reduce(share * densities[..., None, :], axis=-1) / (high - low)[..., 0]
+        fraction = inside[..., 1:] - inside[..., :-1]
+        mean = np.add.reduce(fraction * densities[..., None, :], axis=-1) / (high - low)[..., 0]
         # Density per wave per metre: the same power on a stretch that is speed times narrower.
         return np.log(mean * speed[..., 0] + FLOOR)
 
@@ -316,9 +316,9 @@ def _edges_1_m(feature: SpatialBandPower) -> Array:
 class SpatialBands(Feature):
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
-    Bands are equally wide in octaves, over the whole window: a grating of pitch λ stands in the band of 1/λ whatever
+    Bands are equally wide in octaves, over the whole window: a grating of pitch λ is in the band of 1/λ whatever
     the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
-    measures what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is
+    may depend on how a surface was mounted; `mean_spatial_bands` does not. NaN if the speed is
     unknown or 0.
 
     Examples
@@ -332,7 +332,7 @@ class SpatialBands(Feature):
     [True, True]
     """
 
-    bands: int = param(32, 'Number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
+    bands: int = param(32, 'Number of spatial frequency bands.', low=2, high=512)
     longest_m: float = param(
         33e-3, 'Longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1e3
     )
@@ -390,12 +390,12 @@ class MeanSpatialBands(SpatialBands):
 
 
 # --------------------
-# How much the surface, as measured, changes within a short way.
+# How much the surface, as measured, changes within a short distance.
 
 
 @dataclass(frozen=True)
 class SpatialVariation(WelchPower):
-    """Logarithm of the mean square difference between places `lag_m` apart along the way of the finger.
+    """Logarithm of the mean square difference between places at a distance of `lag_m` along the path of the finger.
 
     In nerves the rougher surface makes neighbouring fibres differ more; here one channel meets the places one after
     the other, lag_m / speed apart in time. The mean square is 2·∫ S(f)·(1 - cos(2πf·lag_m/speed)) df, so that no lag
@@ -408,7 +408,7 @@ class SpatialVariation(WelchPower):
     >>> wave = np.sin(2 * np.pi * 100.0 * np.arange(1280) / 1280.0)[:, None]  # at 0.1 m/s: waves of 1 mm
     >>> window = WindowBatch(wave, 1280.0, np.array(0.1))
     >>> half, whole = (SpatialVariation(lag_m=lag_m, rate_of_change=False)(window).item() for lag_m in (5e-4, 1e-3))
-    >>> np.exp(half).round(1).item(), whole < half - 3  # (2 · amplitude)² / 2; places a wave apart are alike
+    >>> np.exp(half).round(1).item(), whole < half - 3  # (2 · amplitude)² / 2; places at a distance of a wave are alike
     (2.0, True)
     """
 

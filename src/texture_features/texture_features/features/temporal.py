@@ -50,7 +50,7 @@ def _differences(rows: Array) -> Array:
 
 @dataclass(frozen=True)
 class Force(Feature):
-    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say.
+    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not report it.
 
     Examples
     --------
@@ -267,7 +267,7 @@ class Moments(Feature):
 
 @dataclass(frozen=True)
 class Speed(Feature):
-    """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say.
+    """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not report it.
 
     Examples
     --------
@@ -316,7 +316,7 @@ class TemporalVariation(Feature):
 # --------------------
 # Time stretch: what a signal would have been at another speed.
 
-# A finger that hardly moves tells nothing of another speed, and must not ask for endless samples.
+# A finger that hardly moves gives no information on another speed, and must not need endless samples.
 LARGEST_FACTOR = 10.0
 
 
@@ -337,12 +337,12 @@ class Stretched(Feature):
 
     @property
     def per_channel(self) -> bool:  # type: ignore[override]
-        """As the feature says."""
+        """As the feature defines it."""
         return self.feature.per_channel
 
     @property
     def per_pair(self) -> bool:
-        """As the feature says."""
+        """As the feature defines it."""
         return getattr(self.feature, 'per_pair', False)
 
     @property

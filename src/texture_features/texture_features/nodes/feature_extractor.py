@@ -100,15 +100,15 @@ class FeatureExtractor(Node):
         numbers = {**self._cutter.counts, 'invalid_messages': self._invalid}
         waiting = self._cutter.waiting_for
         if waiting:
-            return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
+            return 'WARN', f'no message yet on {", ".join(waiting)}', numbers
         dropped = self._cutter.dropped(time.monotonic())
         if dropped:
-            return 'WARN', f'nothing comes any more on {", ".join(dropped)}; no window can be cut without it', numbers
+            return 'WARN', f'no more messages on {", ".join(dropped)}; no window can be cut without it', numbers
         tare_faults = self._feature_set.tare_faults(self._tared)
         if tare_faults:
             return 'WARN', '; '.join(tare_faults), numbers
         new, self._reported = {name: total - self._reported.get(name, 0) for name, total in numbers.items()}, numbers
-        # Of a restart, which numbers anew, nobody can tell how much it lost.
+        # After a restart, which numbers from 0, the number of lost samples is unknown.
         unknown = 'unknown losses in a restart of a driver or bridge' if new['restarts'] else ''
         lost = f'{new["lost_samples"]} samples lost' if new['lost_samples'] else ''
         if sentence := ', and '.join(filter(None, (lost, unknown))):

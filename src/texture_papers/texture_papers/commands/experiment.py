@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         '--tune', action='store_true', help='search the variables of each pair of textures, or of a regressor, first'
     )
     parser.add_argument(
-        '--seeds', type=int, default=1, metavar='N', help='so many seeds from --seed on: mean and interval over them'
+        '--seeds', type=int, default=1, metavar='N', help='number of seeds from --seed on: mean and interval over them'
     )
     parser.add_argument(
         '--search',
@@ -35,7 +35,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--jobs', type=core_count, default=1, metavar='N', help='cores for the searches of --tune')
     parser.add_argument(
-        '--minutes', type=float, default=math.inf, metavar='M', help='end the searches then; the same command goes on'
+        '--minutes', type=float, default=math.inf, metavar='M', help='end the searches then; the same command continues'
     )
     add_seed(parser)
 

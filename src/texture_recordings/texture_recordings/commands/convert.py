@@ -80,7 +80,7 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
     if numbered := [name for name in report.slides if stems[re.sub(r'[ _-]?\d+$', '', name)] > 1]:
         print(
             f'surfaces that differ by a number alone: {", ".join(numbered)}; if it belongs to no label, give it a '
-            'field of its own in `files` of the mapping, such as {material}_{run:d}'
+            'separate field in `files` of the mapping, such as {material}_{run:d}'
         )
     return report.bags
 
@@ -88,7 +88,7 @@ def _import_mapped(options: argparse.Namespace) -> list[Path]:
 def _configure_segment(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('bags', nargs='+', help='bags, or folders of bags')
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the copies with the states found')
-    parser.add_argument('--surface', default='', metavar='NAME', help='label of all slides; else as the bag says')
+    parser.add_argument('--surface', default='', metavar='NAME', help='label of all slides; default: as in the bag')
     parser.add_argument('--namespace', default=None, metavar='NS', help='of the finger, if bags hold several')
     add_parameters(parser, SegmentationParams)
 
@@ -118,5 +118,5 @@ def _export(options: argparse.Namespace) -> int:
 
 
 export = Command('write labelled slides as Parquet, a row for each sample', _configure_export, _export)
-import_ = Command("turn other people's recordings into labelled bags", _configure_import, _import)
-segment = Command('find the slides in bags that do not tell them', _configure_segment, _segment)
+import_ = Command('convert third-party recordings into labelled bags', _configure_import, _import)
+segment = Command('find the slides in bags without exploration states', _configure_segment, _segment)

@@ -31,8 +31,8 @@ POLL_S = 0.2
 FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
 NOTHING = RawMessage('', '', 0, b'')
 EVENTS, EVENT = '/parameter_events', 'rcl_interfaces/msg/ParameterEvent'
-HEADER = 4  # bytes that tell the encoding of a message
-DISCOVERY_S = 0.5  # how often it is asked what else is published
+HEADER = 4  # bytes of the encoding of a message
+DISCOVERY_S = 0.5  # period of the search for other topics
 
 
 @dataclass(frozen=True)
@@ -65,13 +65,13 @@ class RecordNode(Node):
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
         self._namespace = self.get_namespace().rstrip('/')
-        self._seen: set[str] = set()  # topics that are recorded, or of which it was said that they are not
+        self._seen: set[str] = set()  # topics that are recorded, or whose omission was logged
         self._askers: dict[str, AsyncParameterClient] = {}  # of the nodes whose parameters are noted
         self._asked: defaultdict[str, bool] = defaultdict(bool)
         for topic in TOPICS.values():
             self._subscribe(self.resolve_topic_name(topic.name), topic.msgtype, topic.qos)
         self._diagnostics = Diagnostics(self, self._report)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)  # with use_sim_time the node's own may stand still
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # with use_sim_time the node's clock may stop
         self.create_timer(POLL_S, self._check, clock=steady)
         self.create_timer(DISCOVERY_S, self._find_more, clock=steady)
         self.get_logger().info(f"recording {', '.join(TOPICS)} to '{self._path}'")
@@ -98,7 +98,7 @@ class RecordNode(Node):
                     self._subscribe(name, types[0], offered[0] if offered else QoSProfile(depth=100))
                 else:
                     self._seen.add(name)
-                    self.get_logger().warning(f"'{name}' is not recorded: bags know no {types[0]}")
+                    self.get_logger().warning(f"'{name}' is not recorded: bags cannot hold {types[0]}")
         for name, namespace in self.get_node_names_and_namespaces():
             node = f'{namespace.rstrip("/")}/{name}'
             if node.startswith(f'{self._namespace}/') and node != self.get_fully_qualified_name():
@@ -110,7 +110,7 @@ class RecordNode(Node):
         depth = max(1, offered.depth)  # unknown of a publisher in another process: 0
         quality = Quality(depth, offered.reliability == reliable, offered.durability == latched)
         self._bag.qualities[name] = quality
-        # Deep queues: a burst must not be lost while the executor is busy. Volatile, but for what is said once for all:
+        # Deep queues: a burst must not be lost while the executor is busy. Volatile, but for what is published once:
         # of an exploration that was over before the recording began, the states alone would come.
         once = name in COMMON or name.endswith(('_baseline', '/model_info'))
         durability = offered.durability if once else DurabilityPolicy.VOLATILE
@@ -121,7 +121,7 @@ class RecordNode(Node):
             self.get_logger().info(f"recording '{name}'")
 
     def _note_parameters(self, node: str) -> None:
-        """Ask a node once for all its parameters, and write them as if it had just been given them."""
+        """Get all parameters of a node once, and write them as a parameter event."""
         client = self._askers.get(node)
         if client is None:
             client = self._askers[node] = AsyncParameterClient(self, node)
@@ -152,7 +152,7 @@ class RecordNode(Node):
             self._counts['dropped'] += 1
 
     def _write(self) -> None:
-        """Take messages from the queue to the disk until told to stop."""
+        """Write messages from the queue to the disk until stopped."""
         flushed_s = time.monotonic()
         while (message := self._next()) is not None:
             try:

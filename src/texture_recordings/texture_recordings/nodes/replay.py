@@ -48,7 +48,7 @@ class Schedule:
 
     @property
     def played_s(self) -> float:
-        """Seconds of the recording up to the last message asked for, with shortened pauses."""
+        """Seconds of the recording up to the last requested message, with shortened pauses."""
         return self._played_ns / NANOSECONDS
 
 
@@ -61,7 +61,7 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=5)
 
 @dataclass(frozen=True)
 class ReplayParams:
-    """What is published, how fast, and who must be listening."""
+    """What is published, how fast, and the required subscribers."""
 
     bag: str = param('', 'Bag, or the folder of bags, that is published.')
     rate: float = param(1.0, 'Playback rate relative to the recording; 2 is twice as fast.', low=0.01, high=1000.0)
@@ -76,7 +76,7 @@ class ReplayParams:
         low=0,
         high=100,
     )
-    deadline_s: float = param(30.0, 'How long to wait for the subscribers before giving up.', unit='s', low=0.0)
+    deadline_s: float = param(30.0, 'Time to wait for the subscribers.', unit='s', low=0.0)
     end_delay_s: float = param(
         0.0,
         'Time to wait after the last message, in which the last estimates come, before the node ends.',
@@ -107,7 +107,7 @@ class ReplayNode(Node):
         self.error: TextureError | None = None  # which ended the player
         self._player = threading.Thread(target=self._play, name='player')
         self._player.start()
-        # With use_sim_time the node's own time would end with the recording.
+        # With use_sim_time the node's time would end with the recording.
         self.create_timer(POLL_S, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def shutdown(self) -> None:
@@ -153,9 +153,9 @@ class ReplayNode(Node):
                 break
             if time.monotonic() > deadline:
                 raise DeviceError(
-                    f"nobody listens to '{missing[0]}' (waited {self._params.deadline_s:g} s), so nothing is played; "
-                    f'`texture launch replay bag:={self._params.bag}` starts what listens, too, and --namespace names '
-                    'nodes that run elsewhere'
+                    f"nothing subscribes to '{missing[0]}' (waited {self._params.deadline_s:g} s); "
+                    f'`texture launch replay bag:={self._params.bag}` also starts the subscribers, and --namespace '
+                    'names nodes that run elsewhere'
                 )
 
     def _wait_alone(self) -> None:
@@ -186,7 +186,7 @@ class ReplayNode(Node):
             self._clock_time.publish(ClockTime(clock=to_stamp(time_ns)))
 
     def _listeners(self) -> dict[str, int]:
-        """Return how many subscriptions there are; those of `features` tell that a classifier is ready, too."""
+        """Return how many subscriptions there are; those of `features` show that a classifier is also ready."""
         counts = {name: output.get_subscription_count() for name, output in self._outputs.items()}
         # Of several fingers the live graph may use one.
         signal = max(count for name, count in counts.items() if short_name(name) != 'exploration')

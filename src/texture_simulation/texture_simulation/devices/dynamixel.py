@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Dynamixel motors and a hand emulated at the wire."""
+"""Dynamixel motors and a hand emulated at protocol level."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class DynamixelMotors:
         for _ in range(steps):
             self._current = np.where(torque, np.clip(gain * (goal - self._angle), -most, most), 0.0)
             self._move(free)
-        # Without inertia the speed swings with each goal: who reads in step with the goals would always see half.
+        # Without inertia the speed swings with each goal: reads in step with the goals would always see half.
         passed_s = max(1, steps) * PHYSICS_S
         newest = (self._angle - before) / passed_s - self._shown_speed
         self._shown_speed = self._shown_speed + newest * (1.0 - math.exp(-passed_s / SPEED_FILTER_S))

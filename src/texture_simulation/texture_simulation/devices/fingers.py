@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Fingers emulated at the wire: encoders of their protocols and the devices that send them."""
+"""Fingers emulated at protocol level: encoders of their protocols and the devices that send them."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
 
 
 def framed(kind: int, version: int, sequence: int, time_us: int, *, shape: tuple[int, ...], body: bytes) -> bytes:
-    """Return a frame of a serial line of our own design; its number wraps at 16 bits, its time at 32.
+    """Return a frame of a serial line designed in this project; its number wraps at 16 bits, its time at 32.
 
     `shape` is rows and columns of what it holds.
     """
@@ -90,7 +90,7 @@ def stuff(content: bytes) -> bytes:
 
 
 # --------------------
-# What goes wrong on the way: with bytes, and with whole frames.
+# Faults in transmission: of bytes, and of whole frames.
 
 
 class ByteFaults(NamedTuple):
@@ -164,7 +164,7 @@ class PtyPort:
             ) from error
 
     def unplug(self) -> None:
-        """Make the device vanish, link and all; whoever has it open gets an error."""
+        """Remove the device and its link; readers that have it open get an error."""
         if self._ends is None:
             return
         name = os.ttyname(self._ends[1])
@@ -212,7 +212,7 @@ def _point_link(link: Path, target: str) -> None:
 class EmulatedDevice:
     """An emulated device on a pseudo-terminal.
 
-    It has no clock of its own: each kind is given the samples, and a caller of another pace than nominal makes it a
+    It has no clock: each kind is given the samples, and a caller of another pace than nominal makes it a
     device whose clock drifts.
     """
 
@@ -220,8 +220,8 @@ class EmulatedDevice:
         self.faults = ByteFaults()  # bytes lost, added, changed
         self.frame_faults = FrameFaults()  # frames left out or sent twice
         self.silent = False  # open but silent
-        self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
-        self.wrong_firmware = False  # sends what no driver knows
+        self.stalled = False  # keeps what it samples, and sends it all at once when it resumes
+        self.wrong_firmware = False  # sends unknown data
         self._port = PtyPort(link)
         self._rng = rng
         self._held_back = b''
@@ -238,7 +238,7 @@ class EmulatedDevice:
 
     @property
     def dropped_bytes(self) -> int:
-        """How many bytes nobody took."""
+        """How many bytes were not read."""
         return self._port.dropped_bytes
 
     def plug(self) -> None:
@@ -469,7 +469,7 @@ class EmulatedPvdf(EmulatedSampler):
 #
 # Packets: `9A 00 58 length payload`; payload items big-endian, item byte = type | finger << 2. Firmware from 1.1.7 on
 # stamps with 64 bits and sends an image when there is a new one; older firmware stamps with 16 bits and repeats the
-# images every millisecond in packets of their own.
+# images every millisecond in separate packets.
 
 Image = NDArray[np.uint16]
 
@@ -545,7 +545,7 @@ class EmulatedTsf85(EmulatedDevice):
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
         super().__init__(link, rng)
         self.started = False
-        self.ignored_starts = 0  # so many start commands to come do not help, as after an unclean end
+        self.ignored_starts = 0  # number of next start commands that are ignored, as after an unclean end
         self._encoder = Tsf85Encoder()
         self._received = b''
         self._clock_ms = 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Two rails and a pressing motor emulated at the wire."""
+"""Two rails and a pressing motor emulated at protocol level."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ LIFT_SPEED_M_S = 0.05
 
 ACCELERATION_M_S2 = 5.0  # of the stepper motors
 XY_COUNTS_M, Z_COUNTS_M = 200_000.0, 1_000_000.0  # encoder counts per metre: the defaults of the arm
-OVERLOAD_N = 14.0  # above this the firmware lifts the finger by itself
+OVERLOAD_N = 14.0  # above this the firmware lifts the finger
 RISE_M = 0.05  # of the pressing motor above the start
 
 
@@ -74,7 +74,7 @@ class RailsFirmware:
         self.watchdog_stops = self.bad_frames = 0
         self.position = np.array([0.0, 0.0, machine.start_height_m])
         self.velocity = np.zeros(3)
-        self.surface_m = 0.0  # height of what lies there
+        self.surface_m = 0.0  # height of the surface there
         self._flags = 0
         self._wanted = np.zeros(2)
         self._mode, self._value = HOLD, 0.0
@@ -190,23 +190,21 @@ def _checked(segment: bytes) -> bytes | None:
 
 
 # --------------------
-# What emulated robots share: finger states for the emulator; on a serial line a real-time thread and a plug.
+# Common to emulated robots: finger states for the emulator; on a serial line a real-time thread and a plug.
 
 
 @dataclass(frozen=True)
 class FingerPipeParams:
-    """Whom an emulated robot tells where its finger is."""
+    """Receiver of the finger state of an emulated robot."""
 
-    finger_pipe: str = param(
-        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
-    )
+    finger_pipe: str = param('', "Path of the named pipe for the finger position that the emulator reads; '' for none.")
 
 
 LineT = TypeVar('LineT', bound='EmulatedSerialRobot')
 
 
 class EmulatedSerialRobot:
-    """A robot in real time behind a device path, in a thread of its own; usable as a context."""
+    """A robot in real time behind a device path, in a separate thread; usable as a context."""
 
     def __init__(self, link: Path, finger_pipe: str) -> None:
         self.port = PtyPort(link)

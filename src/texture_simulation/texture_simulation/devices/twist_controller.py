@@ -20,14 +20,14 @@ from texture_simulation.devices.rails import ContactParams
 
 @dataclass(frozen=True)
 class TouchedSurfaceParams(ContactParams):
-    """Where the surface lies, and what else is there."""
+    """Position of the surface and of obstacles."""
 
     surface_x_m: float = param(0.4, 'X coordinate of the centre of the surface in the base frame.', unit='m')
     surface_y_m: float = param(0.0, 'Y coordinate of the centre of the surface in the base frame.', unit='m')
     surface_z_m: float = param(0.1, 'Z coordinate of the centre of the surface in the base frame.', unit='m')
     wall_m: float = param(
         2.0,
-        'X coordinate, in the surface frame, of a wall across the way of the finger.',
+        'X coordinate, in the surface frame, of a wall across the path of the finger.',
         unit='m',
         low=-2.0,
         high=2.0,
@@ -69,7 +69,7 @@ class TwistControllerParams(TouchedSurfaceParams):
 
     lag_s: float = param(
         0.02,
-        'Time after which a commanded velocity comes into effect; larger values make the arm later.',
+        'Time after which a commanded velocity comes into effect.',
         unit='s',
         low=0.0,
         high=0.2,
@@ -86,14 +86,14 @@ class TwistControllerParams(TouchedSurfaceParams):
     )
     max_acceleration_m_s2: float = param(
         10.0,
-        'Highest acceleration of the arm; larger values follow commands faster.',
+        'Highest acceleration of the arm.',
         unit='m/s²',
         low=0.1,
         high=150.0,
     )
     command_timeout_s: float = param(
         0.1,
-        'How long a command holds without a new one; 0 holds the last one for ever.',
+        'How long a command holds without a new one; 0 keeps executing the last one.',
         unit='s',
         low=0.0,
         high=5.0,
@@ -108,9 +108,7 @@ class TwistControllerParams(TouchedSurfaceParams):
     surface_rz_rad: float = param(
         0.0, 'Z component of the rotation vector of the surface in the base frame.', unit='rad'
     )
-    friction: float = param(
-        0.3, 'Coefficient of Coulomb friction; larger values drag the finger more.', low=0.0, high=3.0
-    )
+    friction: float = param(0.3, 'Coefficient of Coulomb friction.', low=0.0, high=3.0)
     tool_mass_kg: float = param(
         0.2, 'Mass of the tool, whose weight the force sensor shows.', unit='kg', low=0.0, high=20.0
     )

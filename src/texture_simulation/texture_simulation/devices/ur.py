@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""A UR controller emulated at the wire: RTDE, dashboard, program, and a robot in contact."""
+"""A UR controller emulated at protocol level: RTDE, dashboard, program, and a robot in contact."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
 
     ip: str = param(
         '127.0.0.2',
-        'Loopback address to listen on, as the ports are fixed; or a path, which stands for one of its own.',
+        'Loopback address to listen on, as the ports are fixed; or a path, from which an address is derived.',
     )
     version: str = param('5.12', 'Version of the emulated control software.', choices=tuple(VERSIONS))
     force_noise_n: float = param(0.02, 'Standard deviation of the noise of the force sensor.', unit='N', low=0.0)
@@ -135,7 +135,7 @@ class UrControllerParams(FingerPipeParams, TouchedSurfaceParams):
         100.0, 'Force above which the controller goes into a protective stop.', unit='N', low=1.0
     )
     unlock_delay_s: float = param(
-        5.0, 'How long a protective stop cannot be unlocked after it occurred.', unit='s', low=0.0, high=60.0
+        5.0, 'Time after a protective stop before it can be unlocked.', unit='s', low=0.0, high=60.0
     )
 
 
@@ -156,7 +156,7 @@ OFFSET_DIRECTION = np.array([0.4, -0.3, 0.866, 0.0, 0.0, 0.0])
 
 
 class SpeedMove:
-    """Gain a velocity and keep it (speedl); `done` when it will not move any further by itself."""
+    """Gain a velocity and keep it (speedl); `done` when it will not move any further."""
 
     def __init__(self, wanted: Array, acceleration: float) -> None:
         self.done = False
@@ -188,7 +188,7 @@ class EmulatedRobot:
     """Physics of the robot, step by step.
 
     `pose`, `velocity` and `force`, (6,), are of the fingertip in the base frame; the force is that of the surroundings
-    on the robot, as the sensor shows it. `motion` and `force_mode` move it. `speed_share` is the speed slider on the
+    on the robot, as the sensor shows it. `motion` and `force_mode` move it. `speed_fraction` is the speed slider on the
     pendant, 0 to 1, which the force mode does not obey.
     """
 
@@ -201,7 +201,7 @@ class EmulatedRobot:
         self.force: Array = np.zeros(6)
         self.motion = stop_move(HALT)
         self.force_mode: ForceMode | None = None
-        self.speed_share = 1.0
+        self.speed_fraction = 1.0
         self._params = params
         self._rng = rng
         self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
@@ -221,7 +221,7 @@ class EmulatedRobot:
         if self.force_mode is not None:
             led, velocity = self._comply(velocity, self.force_mode, step_s)
         self._unslowed = velocity
-        self.velocity = velocity = velocity - (1.0 - self.speed_share) * led
+        self.velocity = velocity = velocity - (1.0 - self.speed_fraction) * led
         self.pose = self.pose + velocity * step_s
         # The contact, and what the sensor makes of it.
         from_origin = self.pose[:3] - self.origin
@@ -256,14 +256,14 @@ class EmulatedRobot:
 
 
 # --------------------
-# The emulated controller without its network: registers, program, robot, safety, in steps of its own time.
+# The emulated controller without its network: registers, program, robot, safety, in steps of virtual time.
 
 STARTING_S = 0.05  # between the upload of a program and its start, in which the client clears its registers
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 FORCE_MODE_STOP = 10.0  # m/s², as in the script
 ENDED = object()
 MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
-# As it stands in the control script of ur-rtde; the client puts the number behind a comment.
+# As in the control script of ur-rtde; the client puts the number behind a comment.
 FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
 Steps = Iterator[None]
 
@@ -278,7 +278,7 @@ class Registers(NamedTuple):
 
 
 class EmulatedController:
-    """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
+    """A controller without a clock: each `tick` is one cycle of `step_s`."""
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
         self.version = VERSIONS[params.version]
@@ -324,9 +324,9 @@ class EmulatedController:
             self.protective_stop()
 
     def catch_up(self) -> None:
-        """Do a cycle that should have been done before; it is not the client who was silent in it.
+        """Do a cycle that should have been done before; it is not the client that was silent in it.
 
-        A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
+        A silent client gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
         """
         if self._excused_s < MAX_EXCUSED_S:
             self._excused_s += self.step_s
@@ -383,7 +383,7 @@ class EmulatedController:
         return True
 
     # What the control script of ur-rtde does, without being URScript. It looks at its command register, number 0 or
-    # 24, once per cycle. Realtime commands are obeyed in every cycle in which they stand there; others once, until the
+    # 24, once per cycle. Realtime commands are obeyed in every cycle in which they are there; others once, until the
     # client has written 0 in between. A command that is overwritten within a cycle is lost, as on the real controller.
 
     def _control_script(self) -> Steps:
@@ -422,7 +422,7 @@ class EmulatedController:
             speeding = robot.motion
             robot.end_force_mode()
             yield from self._stop(FORCE_MODE_STOP)
-            if not speeding.done:  # a speed goes on afterwards: its thread lives
+            if not speeding.done:  # a speed continues afterwards: its thread lives
                 robot.motion = speeding
         elif number == ScriptCommand.ZERO_FT_SENSOR:
             robot.zero_force()
@@ -440,7 +440,7 @@ class EmulatedController:
 
 
 class Session:
-    """One conversation with one client; `greeting` is said first, `package` unasked in each cycle."""
+    """One conversation with one client; `greeting` is sent first, `package` unrequested in each cycle."""
 
     greeting = b''
 
@@ -456,11 +456,11 @@ class Session:
         """Leave nothing behind."""
 
 
-# The dashboard: one line asks, one line answers. Beside the real commands it obeys the fault switches of the emulator:
-# `emulate protective stop`, `emulate silence SECONDS`, in which nobody is heard or answered, `emulate slow SECONDS`,
+# The dashboard: one line asks, one line answers. Next to the real commands it obeys the fault switches of the emulator:
+# `emulate protective stop`, `emulate silence SECONDS`, in which nothing is answered, `emulate slow SECONDS`,
 # which lets stops, the end of force control and zeroing be acknowledged so much later, `emulate speed SHARE`, as of
 # the slider on the pendant, and `emulate friction COEFFICIENT`, as of another sample under the finger.
-# `load NAME` and `play` start a program of somebody else, which takes no commands.
+# `load NAME` and `play` start a foreign program, which takes no commands.
 
 SERIAL_NUMBER = '20205500001'
 BANNER = b'Connected: Universal Robots Dashboard Server\n'
@@ -496,7 +496,7 @@ class DashboardSession(Session):
             'emulate protective stop': partial(_do, controller.protective_stop, 'Stopped'),
             'emulate silence': partial(_set, go_silent, 'seconds'),
             'emulate slow': partial(_set, partial(setattr, controller, 'acknowledge_s'), 'seconds'),
-            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_share'), 'shares'),
+            'emulate speed': partial(_set, partial(setattr, controller.robot, 'speed_fraction'), 'shares'),
             'emulate friction': partial(_set, partial(setattr, controller.robot, 'friction'), 'newtons per N'),
         }
 
@@ -534,7 +534,7 @@ END = b'\nend\n'
 
 
 class ScriptSession(Session):
-    """The conversation with one client, who sends programs in URScript and gets no answer."""
+    """The conversation with one client, which sends programs in URScript and gets no answer."""
 
     def __init__(self, controller: EmulatedController) -> None:
         self._controller = controller
@@ -599,7 +599,7 @@ INPUTS: Mapping[str, tuple[str, str, int]] = {
     'external_force_torque': ('VECTOR6D', '', 0),
 }
 
-# RTDE, protocol version 2: one session per connection, `package` is what it gets each cycle once it has asked for it.
+# RTDE, protocol version 2: one session per connection, `package` is what it gets each cycle once requested.
 
 HEADER = struct.Struct('>HB')
 PROTOCOL_VERSION = 2
@@ -761,7 +761,7 @@ class Server:
         except OSError as error:
             raise DeviceError(
                 f'the emulated UR controller cannot listen on {ip}:{port}: {error}; give each controller '
-                "a loopback address of its own, such as '127.0.0.3'"
+                "a separate loopback address, such as '127.0.0.3'"
             ) from error
         listener.setblocking(False)
         self._listeners[listener] = make_session
@@ -814,7 +814,7 @@ class Server:
 
 
 # --------------------
-# The emulated controller as a process of its own, whose argument is the JSON of its parameters.
+# The emulated controller as a separate process, whose argument is the JSON of its parameters.
 #
 # It cannot run in the process of its client: the constructors of ur-rtde hold Python's global lock until they are
 # answered.
@@ -871,7 +871,7 @@ class ControllerProcess:
         os.kill(self.pid, signal.SIGSTOP)
 
     def resume(self) -> None:
-        """Let it go on."""
+        """Resume it."""
         os.kill(self.pid, signal.SIGCONT)
 
     def stop(self) -> None:

@@ -19,7 +19,7 @@ from texture_simulation.devices.rails import EmulatedRails, FingerPipeParams, Ra
 
 @dataclass(frozen=True)
 class RailsLinkParams(FingerPipeParams):
-    """Where the rails are reached, and whom they tell where the finger is."""
+    """The device path of the rails, and the receiver of the finger state."""
 
     link: str = param(
         f'{DEVICES}/rails',

@@ -22,7 +22,7 @@ from texture_core.types import FingerSender
 from texture_simulation.devices.rails import FingerPipeParams
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
 
-COMMANDED_S = 0.3  # who commands an arm that moves does so more often
+COMMANDED_S = 0.3  # commands to a moving arm come more often
 LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
 
 
@@ -61,10 +61,10 @@ class ControllerTopicParams(FingerPipeParams):
 class TwistControllerNode(Node):
     """Follow TwistStamped, publish PoseStamped and WrenchStamped; all parameters but the topics may be changed.
 
-    The force on the finger as it is, in the base frame and without delay, stands on `true_wrench`.
+    The force on the finger as it is, in the base frame and without delay, is on `true_wrench`.
     """
 
-    shares_file = True  # of the explorer, which says where the surface is
+    shares_file = True  # of the explorer, which defines where the surface is
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('twist_controller', **kwargs)
@@ -89,7 +89,7 @@ class TwistControllerNode(Node):
         self._thread.start()
 
     def shutdown(self) -> None:
-        """Let time stand still, once nobody commands the arm any more.
+        """Stop the time once the arm is no longer commanded.
 
         Ctrl-C in the terminal of a launch also reaches this node, while the explorer lifts the finger. A real
         controller is no part of that launch.

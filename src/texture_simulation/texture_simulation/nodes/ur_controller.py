@@ -13,9 +13,9 @@ from texture_simulation.devices.ur import ControllerProcess, UrControllerParams
 
 
 class UrControllerNode(Node):
-    """Keep the emulated controller, a process of its own, for as long as the node lives."""
+    """Keep the emulated controller, a separate process, for as long as the node lives."""
 
-    shares_file = True  # of the explorer, which says where the surface is
+    shares_file = True  # of the explorer, which defines where the surface is
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('ur_controller', **kwargs)
