@@ -95,7 +95,7 @@ class TrialEnd(NamedTuple):
 
 
 class VirtualMachine:
-    """A robot that holds the last velocity for ever, over a plane at z = 0 of its base."""
+    """A robot that keeps executing the last velocity, over a plane at z = 0 of its base."""
 
     def __init__(self, trial: ForceTrial) -> None:
         self.now_ns = 1_000_000_000

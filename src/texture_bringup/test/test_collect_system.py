@@ -114,7 +114,7 @@ def test_a_cancelled_collection_keeps_its_slides_and_a_missing_patch_is_named(co
     answer = service.call_async(srv.Collect.Request(request=request))
     collector.until(answer.done)
     assert answer.result().result.error_code == CollectionError.INVALID_REQUEST
-    assert answer.result().result.message.startswith('no surface is taught: touch the corners')
+    assert answer.result().result.message.startswith('no surface patch is taught: touch the corners')
     operator.set_parameters('explorer', {'patch_x_high_m': 0.05})
 
 

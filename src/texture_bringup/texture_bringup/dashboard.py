@@ -307,13 +307,13 @@ def _guard(access: Access) -> Any:
 def _refusal(access: Access, guesses: Guesses, request: web.Request) -> web.StreamResponse | None:
     """Return why a request is refused, or the answer that turns a token in the address into a cookie."""
     if not access.is_our_host(request.headers.get('Host', '')):
-        return _said(403, 'this page is reached by another name; use the address that the dashboard printed')
+        return _said(403, 'the host name of this request is not accepted; use the address that the dashboard printed')
     changes = request.method != 'GET' or request.path == '/ws'
     if changes and not access.is_our_origin(request.headers):
         return _said(403, 'the request comes from another page; use the page of the dashboard')
     address = request.remote or ''
     if access.token and (wait_s := guesses.wait_s(address)):
-        return _said(429, f'too many wrong tokens came from {address}; the next is looked at in {wait_s:.0f} s')
+        return _said(429, f'too many wrong tokens came from {address}; the next is checked in {wait_s:.0f} s')
     given = request.query.get('token', '')
     if request.path == '/' and given and access.token and access.knows(given):
         answer = web.Response(status=303, headers={'Location': '/'})
@@ -335,7 +335,7 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
         try:
             asked = parse_json(await asyncio.wait_for(request.text(), REQUEST_S))
         except asyncio.TimeoutError:
-            return _said(408, f'the request did not come to its end within {REQUEST_S:g} s')
+            return _said(408, f'the request was not complete within {REQUEST_S:g} s')
         except ValueError:
             return _said(400, 'the request is not JSON')
         if not isinstance(asked, dict):

@@ -45,7 +45,7 @@ def free_domain() -> int:
     for domain_id in (*DOMAINS[first:], *DOMAINS[:first]):
         if all(_is_free(FIRST_PORT + PORTS_PER_DOMAIN * domain_id + FIRST_UNICAST + offset) for offset in (0, 1)):
             return domain_id
-    raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop something first')
+    raise LaunchFailed(f'every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use; stop another program first')
 
 
 def isolated(domain_id: int, environment: Mapping[str, str]) -> dict[str, str]:
@@ -68,7 +68,7 @@ def _free_port() -> int:
         with socket.socket() as probe, contextlib.suppress(OSError):
             probe.bind(('127.0.0.1', port))
             return int(probe.getsockname()[1])
-    raise LaunchFailed('no TCP port is free; stop something first')
+    raise LaunchFailed('no TCP port is free; stop another program first')
 
 
 # --------------------
@@ -234,7 +234,7 @@ def explore_patiently(
             break
         if not left:
             raise MotionAborted(f'the exploration of {request.surface} failed: {explored.message}')
-        tell(f'aborted: {explored.message}; once more')
+        tell(f'aborted: {explored.message}; trying again')
     return explored
 
 
@@ -309,7 +309,7 @@ def _explore(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> list[Slide]
         made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
         if expected == ACCEPTED and made.answer.texture.rejection is not Rejection.NONE:
             # By its calibration the model rejects one slide in 25 over trained surfaces.
-            progress.line(f'· {title:<28}{made.outcome}; once more')
+            progress.line(f'· {title:<28}{made.outcome}; trying again')
             made = Slide(request.surface, title, expected, *rig.explore(request, progress.line, ends))
         slides.append(made)
         progress.line(f'{"✓" if made.as_expected else "✗"} {title:<28}{made.outcome}')
@@ -345,7 +345,7 @@ def _report(slides: Sequence[Slide], out: Path, progress: ProgressLog) -> None:
     write_json({'slides': figures}, out / FIGURES)
     draw([slide for slide in slides if slide.expected], out / PICTURE)
     right = sum(slide.as_expected for slide in slides)
-    progress.section(f'Done: {right} of {len(slides)} answers as expected. Look at {out / PICTURE}')
+    progress.section(f'Done: {right} of {len(slides)} results as expected. Look at {out / PICTURE}')
     progress.line(f'training slides, models, answers and the log of the nodes are in {out}/')
 
 

@@ -60,7 +60,7 @@ class NodeStatuses:
             if ended:
                 colour, text = ENDED_COLOURS.get(level, 'red'), f'ended: {message}'
             elif time_s - said_s > SILENT_S:
-                colour, text = 'red', f'silent for {time_s - said_s:.0f} s; it said last: {message}'
+                colour, text = 'red', f'silent for {time_s - said_s:.0f} s; its last message: {message}'
             found.append({'name': name, 'colour': colour, 'message': text})
         return found
 

@@ -75,7 +75,7 @@ class ChildLauncher:
     def check(self) -> None:
         """Raise LaunchFailed, with what the log says, if the nodes have ended."""
         if self._process is not None and self._process.poll() is not None:
-            raise LaunchFailed(f'{self._reason()}; everything the nodes said is in {self.log}')
+            raise LaunchFailed(f'{self._reason()}; the output of all nodes is in {self.log}')
 
     def stop(self) -> None:
         """Stop the nodes and wait until none is left."""
@@ -92,7 +92,7 @@ class ChildLauncher:
         """Return the sentence of the log that names what went wrong: a node that died, else the last line."""
         lines = self.log.read_text(errors='replace').splitlines()
         deaths = [line.removeprefix('[launch] ') for line in lines if DEATH.fullmatch(line)]
-        return f'node {deaths[0]}' if deaths else (lines or ['the launcher ended without a word'])[-1]
+        return f'node {deaths[0]}' if deaths else (lines or ['the launcher ended without a message'])[-1]
 
 
 # --------------------
@@ -377,7 +377,7 @@ class Supervisor:
             process.send(number)
         if number is signal.SIGKILL:
             self._failed = True
-            self._say('[launch] nodes were killed that did not end; see whether the finger still presses')
+            self._say('[launch] nodes that did not end were killed; check whether the finger still presses')
 
     def _end(self, process: RunningNode, code: int) -> None:
         self._forget(process)
@@ -392,7 +392,7 @@ class Supervisor:
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, node, process.deaths + 1))
         elif needed and not stopping:
-            self._say(f'[launch] {node.label} is needed by the others, which are stopped now')
+            self._say(f'[launch] {node.label} is required by the other nodes, which are stopped now')
             self._cause = f'{node.label} {ending(code)}{f": {process.last}" * bool(code and process.last)}'
             self.stop()
 
@@ -583,7 +583,7 @@ def _refuse_special(given: Mapping[str, str]) -> None:
         if 'device' in name or not path.exists() or path.is_file() or path.is_dir():
             continue
         raise InvalidLaunch(
-            f"argument '{name}' is '{value}', which is no regular file and no folder; give the path of one"
+            f"argument '{name}' is '{value}', which is neither a regular file nor a folder; give the path of one"
         )
 
 
@@ -802,7 +802,7 @@ def _parameter(element: Element, scope: Scope) -> Path | dict[str, Any]:
             raise InvalidLaunch(f"<param name='{name}'>: {error}") from error
     path = Path(scope.expand(element.attrib['from']))
     if 'name' in element.attrib:
-        raise InvalidLaunch(f"<param from='{path}'> has a name, too; the file holds the names")
+        raise InvalidLaunch(f"<param from='{path}'> also has a name; the file holds the names")
     if not path.is_file():
         if path.parts[-4:-1] == ('texture_bringup', 'config', 'robots'):
             raise unknown_name(path.stem, [item.stem for item in path.parent.glob('*.yaml')], 'preset')

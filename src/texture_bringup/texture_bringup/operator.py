@@ -162,7 +162,7 @@ STEPS: Mapping[bool, Mapping[str, int]] = {
     True: {'unconfigured': Transition.TRANSITION_CONFIGURE, 'inactive': Transition.TRANSITION_ACTIVATE},
     False: {'active': Transition.TRANSITION_DEACTIVATE},
 }
-RESTARTED = 'the explorer was started again and knows of no such exploration; it was broken off'
+RESTARTED = 'the explorer was restarted and does not know this exploration, which was aborted'
 VANISHED = (
     'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
     'the output of the explorer'
@@ -183,7 +183,7 @@ class ExplorationResult:
 
     @property
     def success(self) -> bool:
-        """Whether the motion ended as requested."""
+        """Whether the motion was completed."""
         return self.error is ExplorationError.NONE
 
 
@@ -218,13 +218,14 @@ class Operator:
 
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
         """Wait until explorations can be asked for; the wait is shown after `quiet_s`."""
-        missing = 'no explorer answers; start one, such as the emulator with `texture launch emulator`'
-        self._until(self._explore.server_is_ready, deadline_s, missing, quiet_s=quiet_s)
+        advice = 'start one, such as the emulator with `texture launch emulator`'
+        with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
+            self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
 
     def wait_for_node(self, name: str, deadline_s: float) -> None:
         """Wait until a node of the namespace is there."""
         namespace = self._node.get_namespace()
-        missing = f"node '{namespace.rstrip('/')}/{name}' is not there; look at its output"
+        missing = f"node '{namespace.rstrip('/')}/{name}' was not found; look at its output"
         self._until(lambda: (name, namespace) in self._node.get_node_names_and_namespaces(), deadline_s, missing)
 
     def wait_for_signal(self, deadline_s: float) -> None:
@@ -243,7 +244,7 @@ class Operator:
             guard()
             return all(self.listeners(topic) >= number for topic in topics)
 
-        self._until(all_listen, LISTENERS_DEADLINE_S, f'nobody listens to {", ".join(topics)}')
+        self._until(all_listen, LISTENERS_DEADLINE_S, f'no node subscribes to {", ".join(topics)}')
         self._settle()
 
     def listeners(self, topic: str) -> int:
@@ -260,7 +261,7 @@ class Operator:
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
         accepted = self._explore.send_goal_async(action.Explore.Goal(request=to_msg(request)), on_feedback)
-        silent = 'the explorer takes no request; stop it, and see that it is alone'
+        silent = 'the explorer accepts no request; stop it, and check that no second one runs'
         self._until(accepted.done, ACCEPT_S, silent, MotionAborted)
         goal = accepted.result()
         endings = [goal.get_result_async()]
@@ -339,7 +340,7 @@ class Operator:
             request = ChangeState.Request(transition=Transition(id=STEPS[active][label]))
             answer = self._ask(ChangeState, f'{node}/change_state', request, (OFFERED_S, missing), (ANSWER_S, silent))
             if not answer.success:
-                raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output says why")
+                raise LaunchFailed(f"node '{node}' is {label} and refuses to change; its output gives the reason")
         return label
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
@@ -377,7 +378,7 @@ class Operator:
             msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
         )
         self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S,
-                    'nobody describes what is measured; is the feature_extractor running?')  # fmt: skip
+                    "no node publishes on 'features'; is the feature_extractor running?")  # fmt: skip
         self._settle()
         return vectors
 
@@ -462,10 +463,9 @@ class Operator:
         deadline_s: float,
         complaint: str,
         error: type[TextureError] = LaunchFailed,
-        quiet_s: float | None = None,
     ) -> None:
         deadline = time.monotonic() + deadline_s
-        with task(f'waiting; so far {complaint}', quiet_s=quiet_s):
+        with task(f'waiting: {complaint}'):
             while not condition():
                 if time.monotonic() > deadline:
                     raise error(f'{complaint} (waited {deadline_s:.0f} s)')
@@ -484,6 +484,6 @@ class Operator:
         if not ending.done():
             return (
                 f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at '
-                'the robot, and use its own stop if it moves'
+                'the robot, and use its emergency stop if it moves'
             )
         return f'the exploration has ended: {ending.result().result.result.message}'

@@ -57,7 +57,7 @@ def add_dask(parser: argparse.ArgumentParser) -> None:
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """Add `--seed`."""
-    parser.add_argument('--seed', type=int, default=0, help='seed of whatever is random')
+    parser.add_argument('--seed', type=int, default=0, help='random seed')
 
 
 def core_count(text: str) -> int:

@@ -82,7 +82,7 @@ def _import(name: str, kind: str) -> Any:
     parts = module.split('.')
     # Names come from files and over the network, too: modules that do something when imported are none of ours.
     if parts[0] in sys.stdlib_module_names or '__main__' in parts:
-        raise UnknownName(f"no {kind} '{name}': '{module}' is a part or a program of Python; name a module of your own")
+        raise UnknownName(f"no {kind} '{name}': '{module}' is a module of Python itself; name a module that you wrote")
     try:
         return getattr(importlib.import_module(module), attribute)
     except TextureError:
@@ -90,7 +90,7 @@ def _import(name: str, kind: str) -> Any:
     except Exception as error:  # whatever the user's module does when it is imported
         place = place_of(error, module)
         if place and module not in sys.modules:  # else it was imported, and lacks the attribute
-            raise UnknownName(f"no {kind} '{name}': its module fails with {place}; mend it there") from error
+            raise UnknownName(f"no {kind} '{name}': its module fails with {place}; correct it there") from error
         raise UnknownName(
             f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported from PYTHONPATH"
         ) from error
@@ -243,7 +243,7 @@ def read_array(file: IO[bytes]) -> AnyArray:
     except BROKEN_CONTENT as error:
         raise FileRefused(f'it has no array that can be read: {type(error).__name__}: {error}') from error
     if array.dtype.kind == 'U' and array.size and array.view(np.uint32).max(initial=0) > LAST_CHARACTER:
-        raise FileRefused('it promises texts, and holds what are not characters')
+        raise FileRefused('it is declared as text, and contains bytes that are not characters')
     return array
 
 
@@ -355,7 +355,7 @@ def parse_yaml(text: str) -> Any:
     # The tree of nodes has each alias once: values are counted before any is made.
     node = yaml.compose(text, yaml.SafeLoader)
     if node is not None and _count_values(node, {}) > MAX_VALUES:
-        raise ValueError(f'its aliases stand for more than {MAX_VALUES} values; write less')
+        raise ValueError(f'its aliases expand to more than {MAX_VALUES} values; reduce them')
     return yaml.safe_load(text)
 
 

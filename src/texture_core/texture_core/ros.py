@@ -213,7 +213,7 @@ def check_names(node: Any) -> None:
         if near and name not in elsewhere:
             raise InvalidParameter(
                 f"node '{node.get_name()}' has no parameter '{name}'; did you mean '{near[0]}'? Correct the name, or, "
-                "if it is another node's, give it in the section of that node"
+                'if it belongs to another node, give it in the section of that node'
             )
         node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
 

@@ -695,14 +695,14 @@ class FingerReceiver:
         except OSError as error:
             raise DeviceError(
                 f"the pipe '{path}' for the finger cannot be made: {error}; choose a path in a folder that you may "
-                'write to, where no other file stands'
+                'write to, where no other file exists'
             ) from error
         try:
             fcntl.flock(self._pipe, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             os.close(self._pipe)
             raise DeviceError(
-                f"another emulator has the pipe '{path}' for the finger; end it, or give this one a namespace"
+                f"another emulator uses the pipe '{path}' for the finger; end it, or give this one a namespace"
             ) from error
 
     def states(self, wait_s: float = 0.0) -> list[FingerState]:

@@ -69,7 +69,7 @@ def test_a_pause_of_this_machine_after_the_touch_makes_no_force_late(pause_s):
 
 
 def test_a_force_that_goes_on_to_rise_is_named():
-    assert stood(lambda s: 0.03 + s).startswith('the force went on to rise by 0.05 N while the finger stood')
+    assert stood(lambda s: 0.03 + s).startswith('the force continued to rise by 0.05 N while the finger was at rest')
 
 
 def test_a_harder_touch_than_the_declared_contact_allows_is_named():

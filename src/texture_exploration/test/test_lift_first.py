@@ -90,7 +90,7 @@ CHANGING = {
     'swings': (lambda reading: 2.0 * (reading.time_ns // 50_000_000 % 2), 'the force changed by 2.00 N'),
     'falls slowly': (
         lambda reading: -120.0 * reading.position[2],
-        'the force changed all the while the finger rose by 0.05',
+        'the force changed while the finger rose by 0.05',
     ),
 }
 

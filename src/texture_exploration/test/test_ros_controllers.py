@@ -256,7 +256,7 @@ def test_a_stale_pose_or_force_commands_zero_velocity_within_100_ms(robot, what)
     robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.02, 0.0)))
     first_ns = next(time_ns for time_ns, velocity in robot.sent if time_ns > begin_ns and not any(velocity))
     assert (first_ns - begin_ns) * 1e-9 <= 0.1
-    assert f'no {what} has come on' in robot.driven.state().fault
+    assert f'no {what} has arrived on' in robot.driven.state().fault
     assert not any(velocity != (0.0, 0.0, 0.0) for time_ns, velocity in robot.sent if time_ns >= first_ns)
 
 
@@ -265,7 +265,7 @@ def test_a_broadcaster_that_repeats_an_old_pose_counts_as_stale(robot):
     frozen = robot.newest_pose()
     robot.newest_pose = lambda: frozen
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert 'no pose has come' in robot.driven.state().fault
+    assert 'no pose has arrived' in robot.driven.state().fault
 
 
 def test_a_command_that_is_not_repeated_ends_in_zero_velocity(robot):
@@ -306,10 +306,10 @@ def test_a_controller_that_ends_is_named(robot):
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     robot.heard_by = 0
     robot.pass_time(0.01, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert "nobody listened on 'twist_controller/twist'" in robot.driven.state().unsafe
+    assert "no node subscribed to 'twist_controller/twist'" in robot.driven.state().unsafe
     assert robot.is_commanded_to_rest
     robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.02, 0.0)))
-    assert "nobody listens on 'twist_controller/twist' any more" in robot.driven.state().fault
+    assert "no node subscribes to 'twist_controller/twist' any more" in robot.driven.state().fault
     robot.heard_by = 1
     robot.driven.recover()
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
@@ -317,7 +317,7 @@ def test_a_controller_that_ends_is_named(robot):
 
 
 class BrokenLink(Robot):
-    """A controller that holds the last velocity for ever, and a link to it that breaks."""
+    """A controller that keeps executing the last velocity, and a link to it that breaks."""
 
     commands_arrive = True
 
@@ -413,13 +413,13 @@ def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger
     outcome, _ = robot.explore(SLIDE, TouchParams(), on_slide=lambda: gone_ns.append(robot.now_ns))
     assert gone_ns
     assert not outcome.success
-    assert 'listened on' in outcome.message
+    assert 'no node subscribed' in outcome.message
     assert outcome.lifted
     assert robot.arm.finger().force_n == 0.0
     assert robot.arm.finger().z_m > 0.001
 
 
-@pytest.mark.parametrize('why', ["'/other' commands the arm, too", 'the guard process has ended'])
+@pytest.mark.parametrize('why', ["'/other' also commands the arm", 'the guard process has ended'])
 def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger_lifted(why):
     robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
     robot.connect()
@@ -441,7 +441,7 @@ def test_a_process_that_was_told_to_end_waits_for_no_controller_and_commands_not
     told = threading.Event()
     told.set()
     monkeypatch.setattr('texture_exploration.arms.arm.ENDING', told)
-    with pytest.raises(DeviceError, match='given up, as this process was told to end'):
+    with pytest.raises(DeviceError, match='aborted, as this process was asked to end'):
         robot.driven.connect()
     assert not any(any(velocity) for _, velocity in robot.sent)
 
@@ -511,8 +511,8 @@ def test_a_late_arm_that_limits_its_speed_still_follows():
     [
         ({'frames': ('world', 'tool0_controller')}, 'the pose on .* is given in the frame'),
         ({'frames': ('base', 'wrist')}, 'the force on .* is given in the frame'),
-        ({'force_comes': False, 'heard_by': 0}, r"no force comes on .*; nobody listens on 'twist_controller/twist'"),
-        ({'unsafe_because': "'/other' commands the arm, too"}, 'commands the arm, too'),
+        ({'force_comes': False, 'heard_by': 0}, r"no force arrives on .*; no node subscribes to 'twist_controller"),
+        ({'unsafe_because': "'/other' also commands the arm"}, 'also commands the arm'),
     ],
 )
 def test_a_connection_that_may_not_be_is_refused_by_name_and_commands_nothing(found, said):
@@ -660,7 +660,7 @@ def noisy():
 def test_a_force_that_always_comes_half_a_second_late_by_its_stamp_is_refused_before_it_moves(noisy):
     noisy.hold_up_force(0.5)
     outcome, _ = noisy.explore(PRESS, TouchParams())
-    assert re.search(r'comes 50\d ms after its stamp, and 80 ms are allowed', outcome.message)
+    assert re.search(r'arrives 50\d ms after its stamp, and 80 ms are allowed', outcome.message)
     assert not any(any(velocity) for _, velocity in noisy.sent)
 
 
@@ -804,7 +804,7 @@ def test_a_check_commands_nothing_and_leaves_the_topics():
     robot.driven.check()
     assert (robot.sent, robot.closed) == ([], True)
     robot.pose_comes = False
-    with pytest.raises(DeviceError, match='no pose comes on'):
+    with pytest.raises(DeviceError, match='no pose arrives on'):
         robot.driven.check()
     assert robot.sent == []
 
@@ -863,7 +863,7 @@ def test_a_refused_switch_ends_the_connection_and_one_that_was_done_is_undone():
         robot.driven.connect()
     assert (robot.switched, robot.closed) == ([TAKEN], True)
     robot.pose_comes = False
-    with pytest.raises(DeviceError, match='no pose comes'):
+    with pytest.raises(DeviceError, match='no pose arrives'):
         robot.driven.connect()
     assert robot.switched[1:] == [TAKEN, GIVEN_BACK]
 

@@ -44,7 +44,7 @@ def test_an_approach_that_is_too_slow_says_so(table):
     table.arm.state = lambda: replace(state(), watchdog_s=0.9)
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.02))
     assert outcome.message.startswith('waited')
-    assert 'as the arm goes on for 900 ms when it hears nothing' in outcome.message
+    assert 'as the arm continues for 900 ms without a command' in outcome.message
 
 
 @pytest.mark.parametrize(('delay_s', 'allowed'), [(0.0, '0.125'), (0.02, '0.0514'), (0.05, '0.0273'), (0.1, '0.0153')])

@@ -688,7 +688,7 @@ def test_a_program_that_somebody_starts_meanwhile_is_a_fault_and_gets_no_command
         wait_for(lambda: arm.state().fault.startswith('its control program was stopped'))
         emulator.controller.ask('load external_control.urp')
         emulator.controller.ask('play')
-        wait_for(lambda: 'somebody else started one' in faulty(arm))
+        wait_for(lambda: 'another user started one' in faulty(arm))
         arm.close()
         assert emulator.controller.ask('programState') == 'PLAYING external_control.urp'
 

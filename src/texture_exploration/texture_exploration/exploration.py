@@ -153,7 +153,7 @@ class Exploration:
         self.exploration_id = exploration_id
         self.request = request
         self.outcome = ExplorationOutcome(
-            ExplorationError.INTERNAL, 'it broke off through an internal error; see the log', False, False
+            ExplorationError.INTERNAL, 'it was aborted by an internal error; see the log', False, False
         )
         self.ended = threading.Event()
         self.gaps = 0

@@ -114,7 +114,7 @@ class Explorer:
         self._lift_ends.set()
         with self._lock:
             self._released = True
-        self._end_motion('the explorer let go of the arm')
+        self._end_motion('the explorer released the arm')
         if not self.arm.keeps_start:
             self._home = None
 
@@ -165,9 +165,9 @@ class Explorer:
                 raise
             except Exception as error:  # a fault of a user's planner; nothing has moved
                 self.counts['refused'] += 1
-                told = place_of(error, request.motion.partition(':')[0]) or f'{type(error).__name__}: {error}'
+                why = place_of(error, request.motion.partition(':')[0]) or f'{type(error).__name__}: {error}'
                 raise MotionRefused(
-                    f"planning '{request.motion}' failed with {told}; mend it there", ExplorationError.INVALID_REQUEST
+                    f"planning '{request.motion}' failed with {why}; correct it there", ExplorationError.INVALID_REQUEST
                 ) from error
             self._current, self.lifted = exploration, False
             self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
@@ -292,11 +292,11 @@ class Explorer:
                     frame.place_to_base(state.position), frame.to_base((0.0, 0.0, 1.0)), frame.to_base((1.0, 0.0, 0.0))
                 )
             except InvalidData as error:
-                raise MotionRefused(f'the touch was not taken: {error}') from error
+                raise MotionRefused(f'the touch was not recorded: {error}') from error
             count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N'
             missing = TOUCHES - len(self._touches)
             if fit is None:
-                last = ', away from the others: it shows whether the first three are right' if missing == 1 else 's'
+                last = ', far from the others: it checks the first three' if missing == 1 else 's'
                 return f'{count}; touch the surface at {missing} more place{last}'
             arm.move_surface(fit.pose)
             self.patch = fit.patch
@@ -313,12 +313,12 @@ class Explorer:
         least_n = self.touch.contact_force_n
         if not self.arm.zeroed:
             raise MotionRefused(
-                'the touch was not taken: the force sensor is not zeroed, so it proves no contact; lift the finger by '
-                '10 mm, let it rest in the air for a second, and touch again'
+                'the touch was not recorded: the force sensor is not zeroed, so contact cannot be shown; lift the '
+                'finger by 10 mm, let it rest in the air for a second, and touch again'
             )
         if not force_n >= least_n:  # so NaN is no touch either
             raise MotionRefused(
-                f'the touch was not taken: the force is {force_n:.2f} N, and {least_n:g} N are needed '
+                f'the touch was not recorded: the force is {force_n:.2f} N, and {least_n:g} N are needed '
                 "('contact_force_n'); press the finger on the surface"
             )
 

@@ -124,7 +124,7 @@ class ForceLoopParams:
 
     loop_delay_s: float = param(
         0.008,
-        'Largest delay from a measured force to the motion that answers it; larger values lower the gain.',
+        'Largest delay from a measured force to the motion that responds to it; larger values lower the gain.',
         unit='s',
         low=0.0,
         high=0.1,
@@ -146,7 +146,7 @@ class ForceLoopParams:
     )
     touching_n: float = param(
         TOUCHING_N,
-        'Force above which the force control takes the finger for touching; it must exceed the noise of the '
+        'Force above which the force control treats the finger as in contact; it must exceed the noise of the '
         'force sensor. A larger force meets the surface harder.',
         unit='N',
         low=0.005,
@@ -267,13 +267,13 @@ class ForceLoop:
         self._heard, rose_n, met_n = True, fmean(last) - fmean(first), fmean(last) - self._touched_n
         most_n = params.touching_n + HARD * params.max_impact_n
         if rose_n > ROSE_SHARE * params.touching_n:
-            what = f'the force went on to rise by {rose_n:.2f} N while the finger stood on the surface'
+            what = f'the force continued to rise by {rose_n:.2f} N while the finger was at rest on the surface'
         elif met_n > most_n:
             what = f'the force rose by {met_n:.2f} N after the first touch, and {most_n:.2f} N are the most to expect'
         else:
             return
         self.doubt = (
             f"{what}: arm or force is later than 'loop_delay_s' of {1e3 * params.loop_delay_s:.0f} ms, or the contact "
-            f"stiffer than 'max_stiffness_n_m' of {params.max_stiffness_n_m:g} N/m; find what makes it late, such as a "
-            'filter, or declare it'
+            f"stiffer than 'max_stiffness_n_m' of {params.max_stiffness_n_m:g} N/m; find the cause of the delay, such "
+            'as a filter, or declare it'
         )

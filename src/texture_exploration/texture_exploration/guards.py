@@ -256,7 +256,7 @@ class ForceGuard:
         if size_n > 0.5 * self._limits.tangential_floor_n and back_s < BACK_S and helps:
             return self._back
         if self._back.normal_m_s < 0.0:
-            self.blocked = 'the force grew while the finger rose; see that nothing is above it, and the surface pose'
+            self.blocked = 'the force increased while the finger rose; check the space above it and the surface pose'
         self._back = None
         return command
 
@@ -326,4 +326,4 @@ class SignalWatch:
         if not silent:
             return ''
         named = ' and '.join(f"'{topic}'" for topic in silent)
-        return f'no samples have come on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'
+        return f'no samples on {named} for {max(silent.values()) * 1e3:.0f} ms; check the sensor and its node'

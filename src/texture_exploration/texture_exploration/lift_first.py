@@ -101,7 +101,7 @@ class Rise(Stage):
         risen_m = arm.position[2] - self._first.position[2]
         if risen_m > self._longest_m:
             raise MotionAborted(
-                f'the force changed all the while the finger rose by {risen_m:.3f} m; see that nothing touches it, and '
+                f'the force changed while the finger rose by {risen_m:.3f} m; check that nothing touches it, and '
                 "raise 'contact_force_n' above the noise of the force sensor",
                 ExplorationError.FORCE_SENSOR,
             )
@@ -123,7 +123,7 @@ class Rise(Stage):
         """Wait until the arm stands still, as it may not do yet after a fault; note place and force."""
         if self.elapsed_s(time_ns) > PROBE_TIMEOUT_S:
             raise MotionAborted(
-                'the arm moves although it was told to stand still; see who else moves it', ExplorationError.ARM_FAULT
+                'the arm moves although zero velocity is commanded; see what moves it', ExplorationError.ARM_FAULT
             )
         if math.dist(arm.position, self._first.position) > STILL_M:
             self._first, self._rest_ns = arm, time_ns
@@ -142,8 +142,8 @@ class Rise(Stage):
         if not astray and (up >= PROBE_M or (time_ns - self._start_ns) * 1e-9 < PROBE_TIMEOUT_S):
             return
         reason = (
-            f'the arm moved by ({1e3 * x:.2f}, {1e3 * y:.2f}, {1e3 * up:.2f}) mm in the frame of the surface where it '
-            'was told to rise along z; check the frame and the sign of its velocities'
+            f'the arm moved by ({1e3 * x:.2f}, {1e3 * y:.2f}, {1e3 * up:.2f}) mm in the frame of the surface although '
+            'a rise along z is commanded; check the frame and the sign of its velocities'
         )
         back = GoBack(self._first.force_vector_n, self._touch)
         raise Detour(reason, back) if astray else MotionAborted(reason)
@@ -173,8 +173,8 @@ class Rise(Stage):
         newly_n, before_n = math.dist(force_n, middle_n), math.dist(middle_n, self._forces_n[0])
         if height_m - self._heights_m[0] >= PROBE_M / 2 and newly_n > MET_GROWTH * before_n + noise_n:
             raise Detour(
-                f'the finger met something while it rose, the force changed by {newly_n:.2f} N; see what is above it, '
-                'and that the z axis of the surface points away from it',
+                f'the finger met something while it rose, the force changed by {newly_n:.2f} N; check what is above '
+                'it, and that the z axis of the surface points away from it',
                 GoBack(middle_n, self._touch),
             )
         last = max(0, bisect_right(self._heights_m, height_m - PROBE_M) - 1)
@@ -255,8 +255,8 @@ class CalmDown(Stage):
         met_n = math.dist(arm.force_vector_n, self._free_n)
         if met_n > self._touch.contact_force_n and not self._zeroed():
             raise Detour(
-                f'the finger met something while it rose for its force sensor to be zeroed, {met_n:.2f} N; see what is '
-                'above it, and that the z axis of the surface points away from it',
+                f'the finger met something while it rose for its force sensor to be zeroed, {met_n:.2f} N; check what '
+                'is above it, and that the z axis of the surface points away from it',
                 GoBack(self._free_n, self._touch),
             )
         if height_m - self._rest_m < self._touch.clearance_m:

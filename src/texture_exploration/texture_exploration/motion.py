@@ -104,8 +104,8 @@ class Motion:
             raise MotionRefused(
                 f'{motion}: speed_m_s is {along.speed_m_s:g}; a wall of {stiffness_n_m:g} N/m '
                 f"('approach_stiffness_n_m') could press with more than {WALL_SHARE * limit_n:g} N, {WALL_SHARE:g} "
-                f"times 'force_limit_n', until an arm that is {1e3 * arm.delay_s:.0f} ms late stands; allowed is at "
-                f'most {math.floor(allowed_m_s * 1e4) / 1e4:g} m/s',
+                f"times 'force_limit_n', until an arm that is {1e3 * arm.delay_s:.0f} ms late has stopped; allowed is "
+                f'at most {math.floor(allowed_m_s * 1e4) / 1e4:g} m/s',
                 field='speed_m_s',
             )
 
@@ -182,7 +182,7 @@ class Motion:
         """What happened, in one sentence."""
         if self._ended_ahead and not self._free_ahead:
             return f'{self._abort_reason}; the finger was not lifted'
-        return self._abort_reason or self._finish_reason or 'the motion ended as asked'
+        return self._abort_reason or self._finish_reason or 'the motion was completed'
 
     def _try_stage(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Return the command of the present stage; None if it is over, cannot go on, or there is none."""

@@ -241,8 +241,8 @@ def _check_linear_free_distance(
     if distance_m > allowed:
         allowed = min(allowed, MAX_DISTANCE_M)
         raise MotionRefused(
-            f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m to gain and lose '
-            f'speed leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m '
+            f'{request.motion}: distance_m is {stated(given, distance_m)}, which with {ramps:.3f} m for the ramps '
+            f'leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m '
             f'{limits.limits_ahead(home, request.direction_rad)}',
             ExplorationError.OUTSIDE_WORKSPACE,
             'distance_m',

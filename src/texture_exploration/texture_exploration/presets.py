@@ -88,7 +88,7 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
         values['direction_rad'] = math.radians(numbers['direction_deg'])
     if 'slide_s' in numbers:
         if 'speed_m_s' not in values:
-            raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', to tell how far to slide")
+            raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', from which the distance follows")
         values['distance_m'] = values['speed_m_s'] * numbers['slide_s']
     return ExplorationRequest(motion, use_start=bool({'start_x_m', 'start_y_m'} & values.keys()), **values)
 

@@ -195,7 +195,7 @@ class SafetyLimits:
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
             raise MotionRefused(
-                f'{request.motion} knows no {" and no ".join(given)}; leave it at 0',
+                f'{request.motion} does not use {" and ".join(given)}; leave it at 0',
                 ExplorationError.UNUSED_FIELD,
                 given[0],
             )
@@ -243,7 +243,7 @@ class SafetyLimits:
         if math.hypot(x, y) <= most_n:
             return ''
         return (
-            f'the force along the surface of {math.hypot(x, y):.2f} N is more than friction can be, {most_n:.2f} N '
+            f'the force along the surface of {math.hypot(x, y):.2f} N is more than friction allows, {most_n:.2f} N '
             f'under {normal_n:.2f} N: the finger met something, or its force is given in another frame; see '
             "'friction_limit' and 'tangential_floor_n'"
         )

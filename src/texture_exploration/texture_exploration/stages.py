@@ -145,8 +145,8 @@ class ApproachStage(Stage):
             heard_m_s = self._touch.approach_m_s(self._force_n, delay_s=arm.delay_s)
             self.timeout_s = self._limits.approach_timeout_s * heard_m_s / speed_m_s
             self.goal = (
-                f'the finger to meet the surface at {speed_m_s * 1e3:.2g} mm/s, as the arm goes on for '
-                f'{arm.watchdog_s * 1e3:.0f} ms when it hears nothing'
+                f'the finger to meet the surface at {speed_m_s * 1e3:.2g} mm/s, as the arm continues for '
+                f'{arm.watchdog_s * 1e3:.0f} ms without a command'
             )
         return ArmCommand(normal_m_s=-speed_m_s)
 
@@ -162,7 +162,7 @@ class ApproachStage(Stage):
             )
         raise MotionAborted(
             f'the finger met something from the side as it came down, {what}; if there is nothing, the force is given '
-            'in another frame than its name says'
+            'in another frame than the declared one'
         )
 
 
@@ -411,6 +411,6 @@ class LiftStage(Stage):
         grown_n = force_n - self._newly[1]
         if height_m - self._lowest_m > NEAR_M and grown_n > self._growth_n and not self._proven:
             raise MotionAborted(
-                f'the force grew from {self._newly[1]:.2f} to {force_n:.2f} N while the finger rose; see that nothing '
-                'is above it, the pose of the surface and the frame of the force'
+                f'the force grew from {self._newly[1]:.2f} to {force_n:.2f} N while the finger rose; check that '
+                'nothing is above it, the pose of the surface and the frame of the force'
             )

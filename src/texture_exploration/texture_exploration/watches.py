@@ -59,7 +59,7 @@ class ContactWatch:
         since = f' for {lost_s * 1e3:.0f} ms' if lost_s else ''
         raise ContactLost(
             f'the contact with the surface was lost{since}: the force is {self._force_now_n:.2f} N of '
-            f'{self._force_n:g} N; check that the surface goes on along the whole path, or raise '
+            f'{self._force_n:g} N; check that the surface continues along the whole path, or raise '
             "'lost_contact_s' if it is rough"
         )
 
@@ -117,7 +117,7 @@ class StallWatch:
             return
         raise MotionAborted(
             f'the finger stalled: in {self._touch.stall_s * 1e3:.0f} ms it moved by {made_m * 1e3:.2f} of '
-            f'{commanded_m * 1e3:.2f} mm; see what holds it, and whether the robot or its operator slows it down'
+            f'{commanded_m * 1e3:.2f} mm; check what blocks it, and whether the robot or its operator reduces its speed'
         )
 
 
@@ -182,21 +182,21 @@ class SlideWatch:
         if not abs(mean_n - asked_n) <= self._mean_force_fraction * asked_n:  # so NaN is none
             yield (
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_force_fraction:.0%} off the '
-                f'{asked_n:g} N that were asked for; slide more slowly, or check the force '
+                f'{asked_n:g} N requested; slide more slowly, or check the force '
                 'control of the arm'
             )
         mean_m_s = self._way_m / self._way_s if self._way_s else asked_m_s
         if not abs(mean_m_s - asked_m_s) <= touch.mean_speed_fraction * asked_m_s:
             yield (
                 f'the mean speed of the slide was {mean_m_s:.4f} m/s, more than {touch.mean_speed_fraction:.0%} off '
-                f"the {asked_m_s:g} m/s that were asked for ('mean_speed_fraction'); see what scales the speed of the "
+                f"the {asked_m_s:g} m/s requested ('mean_speed_fraction'); check what scales the speed of the "
                 'arm'
             )
         mean_n = self._tangential_sum_n / max(1, self._tangential_states)
         if mean_n > touch.mean_friction * asked_n:
             yield (
                 f'the mean force along the surface was {mean_n:.2f} N, and {touch.mean_friction * asked_n:.2f} N are '
-                f'allowed with {asked_n:g} N asked for; see whether the finger catches on something'
+                f'allowed with {asked_n:g} N requested; check whether the finger catches on something'
             )
         measured = (
             ('force', 'N', f'{asked_n:g} N', 'peak_force_fraction'),
@@ -207,7 +207,7 @@ class SlideWatch:
             if not peak <= most:
                 yield (
                     f'the {what} of the slide reached {peak:.3g} {unit}, and {most:.3g} {unit} are allowed with '
-                    f'{asked} asked for' + (f" ('{parameter}')" if parameter else '')
+                    f'{asked} requested' + (f" ('{parameter}')" if parameter else '')
                 )
 
     def _add_way(self, arm: ArmState) -> None:

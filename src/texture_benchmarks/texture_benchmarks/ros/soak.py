@@ -378,7 +378,7 @@ def soak(
         given: Mapping[str, Mapping[str, Any]] = {
             'emulator': {'scene': SCENE, 'seed': seed, 'sensor_link': device, 'finger_pipe': pipe},
             'sensor': {'device': device},
-            # It holds the last velocity for ever.
+            # It keeps executing the last velocity.
             'twist_controller': {'finger_pipe': pipe, 'start_height_m': 0.002, 'command_timeout_s': 0.0},
             'feature_extractor': {'recipe': card},
             'classifier': {'model': card},

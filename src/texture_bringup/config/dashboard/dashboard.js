@@ -309,7 +309,7 @@ async function ask(name, body) {
     const reply = await answer.json();
     say(reply.message, !reply.success);
   } catch (error) {
-    say(`'${name}' was not answered: ${error.message}`, true);
+    say(`'${name}' got no answer: ${error.message}`, true);
   }
 }
 
@@ -338,7 +338,7 @@ function connect() {
     connected = true;
     last = Date.now();
     say('');
-    loadMotions().catch(() => say('the list of motions did not come; load the page again', true));
+    loadMotions().catch(() => say('the list of motions did not arrive; reload the page', true));
   };
   socket.onmessage = (message) => {
     const frame = JSON.parse(message.data);
@@ -379,6 +379,6 @@ at('collect').addEventListener('submit', (event) => {
 document.querySelectorAll('[data-ask]').forEach((button) => button.addEventListener('click', () => ask(button.dataset.ask, {})));
 at('record').addEventListener('click', () => ask('record', { on: !at('record').dataset.on }));
 window.setInterval(() => {
-  if (!connected || Date.now() - last > SILENT_MS) say('nothing comes from the dashboard; is it still running?', true);
+  if (!connected || Date.now() - last > SILENT_MS) say('no data from the dashboard; is it still running?', true);
 }, SILENT_MS);
 connect();

@@ -47,7 +47,7 @@ NUMBERS = (
     ('turns', 'turns', 'N', 'turns, if the motion has some'),
     ('duration', 'duration_s', 'S', 'duration of an in-hand slide'),
 )
-UNLIKE = 'it resembles none of the known textures'
+UNLIKE = 'it resembles no trained texture'
 BAR = 24
 TIMEOUT_S = 300.0
 EXPLORER_S, SOON_S = 5.0, 1.0  # within which an explorer that runs is discovered, at most and usually
@@ -57,7 +57,7 @@ def _configure_explore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('motion', nargs='?', default='', help=f'how to move: {", ".join(MOTIONS)}')
     parser.add_argument('--preset', metavar='NAME', help='make all motions of a preset instead, such as ets-linear')
     parser.add_argument(
-        '--repeats', type=int, default=0, metavar='N', help='rounds through a preset (default: as many as it says)'
+        '--repeats', type=int, default=0, metavar='N', help='rounds through a preset (default: as the preset declares)'
     )
     parser.add_argument('--json', action='store_true', help='print each result as one line of JSON')
     for option, _, unit, meaning in NUMBERS:
@@ -265,7 +265,7 @@ def _identify(options: argparse.Namespace) -> int:
     known = model.next_touch_model
     if known is None:
         raise InvalidParameter(
-            f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
+            f"model '{model.name}' has no motions to choose from; train it on slides over every texture, two or more "
             'of each kind, in several directions or at several speeds or forces'
         )
     belief, number = known.uniform_log_prior, 0
@@ -430,4 +430,4 @@ identify = Command(
 collect = Command(
     'touch a surface at many places of the taught patch, and record labelled slides', _configure_collect, _collect
 )
-check = Command('slide over the reference plate, and say whether the finger is as trained', _configure_check, _check)
+check = Command('slide over the reference plate, and report whether the finger is as trained', _configure_check, _check)

@@ -34,7 +34,7 @@ def trigger(summary: str, service: str, advice: str = EXPLORER_MISSING) -> Comma
 stop = trigger(
     'end the exploration and lift the finger, from any phase',
     'explorer/stop',
-    'no explorer runs there; if the robot moves, use its own stop, and look whether the finger touches',
+    'no explorer runs there; if the robot moves, use its emergency stop and check whether the finger presses',
 )
 recover = trigger('free the arm from a fault', 'explorer/recover')
 lift = trigger('lift a finger that was left pressed on the surface', 'explorer/lift')
@@ -43,8 +43,8 @@ reboot = trigger(
     'explorer/reboot',
     "only the launch file 'hand' offers it; start that, or give its --namespace",
 )
-touch_surface = trigger('take one of the touches that find the surface', 'explorer/touch_surface', TOUCHES_MISSING)
-forget_touches = trigger('begin the touches that find the surface again', 'explorer/forget_touches', TOUCHES_MISSING)
+touch_surface = trigger('take one touch of the surface calibration', 'explorer/touch_surface', TOUCHES_MISSING)
+forget_touches = trigger('restart the touches of the surface calibration', 'explorer/forget_touches', TOUCHES_MISSING)
 tare = trigger(
     'tare a sensor that nothing touches',
     'sensor/tare',

@@ -184,7 +184,7 @@ def _ports() -> str:
     from serial.tools import list_ports
 
     found = [f'{port.device} ({port.description})' for port in list_ports.comports()]
-    return ', '.join(found) or 'none; plug the sensor in, and see whether its kernel driver is loaded'
+    return ', '.join(found) or 'none; plug the sensor in, and check whether its kernel driver is loaded'
 
 
 def _groups() -> str:
@@ -242,4 +242,4 @@ def _doctor(_options: argparse.Namespace) -> int:
 
 list_ = Command('list what can be chosen: sensors, motions, arms, recipes, surfaces', _configure_list, _list)
 info = Command('show what a bag or a model holds', _configure_info, _info)
-doctor = Command('show what of this machine matters: ports, groups, ROS, versions', lambda _parser: None, _doctor)
+doctor = Command('show what matters of this machine: ports, groups, ROS, versions', lambda _parser: None, _doctor)

@@ -17,7 +17,7 @@ from texture_core.config import param
 from texture_core.errors import DeviceError, LaunchFailed
 from texture_core.ros import declare, run
 
-STOPPED = threading.Event()  # this process was told to end
+STOPPED = threading.Event()  # this process was asked to end
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class BringUp(Node):
                     operator.wait_for_node(name, params.timeout_s)
                     state = operator.set_active(name, True) if name in lifecycle else 'there'
                 except LaunchFailed as error:
-                    later = f'; not activated or looked for: {", ".join(names[place:])}' if names[place:] else ''
+                    later = f'; not activated or not reached: {", ".join(names[place:])}' if names[place:] else ''
                     raise DeviceError(f'{error}{later}') from error
                 self.get_logger().info(f"'{name}' is {state}")
         self.get_logger().info(f'all nodes are up: {params.nodes}')

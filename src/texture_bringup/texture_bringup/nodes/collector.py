@@ -70,8 +70,8 @@ def collect_surface(
     low_x, high_x, low_y, high_y, low_n, high_n, high_m_s = operator.parameters('explorer', (*PATCH, *LIMITS))
     if not (low_x < high_x and low_y < high_y):
         raise InvalidData(
-            'no surface is taught: touch the corners of the surface by `texture touch-surface`, or give the explorer '
-            f'{", ".join(PATCH)}'
+            'no surface patch is taught: touch the corners of the surface with `texture touch-surface`, or give the '
+            f'explorer {", ".join(PATCH)}'
         )
     patch = Patch(low_x, high_x, low_y, high_y)
     plan = PlacePlan(surface, params, patch, (low_n, high_n), (LEAST_SPEED_M_S, high_m_s))

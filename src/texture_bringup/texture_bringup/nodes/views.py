@@ -187,7 +187,7 @@ class Views(Node):
 
     def _report(self) -> DiagnosticReport:
         watched = [publisher.topic_name for publisher, _, subscriptions in self._views if subscriptions]
-        said = f'shows {", ".join(watched)}' if watched else 'nobody looks, so nothing is computed'
+        said = f'shows {", ".join(watched)}' if watched else 'no subscriber, so nothing is computed'
         return 'WARN' if self._bad else 'OK', said, {'bad_messages': self._bad}
 
 

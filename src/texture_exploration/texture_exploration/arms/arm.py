@@ -43,9 +43,9 @@ class ArmState:
     force normal to the surface, positive when pressing; `along_n` that of the surroundings on the finger along x and y
     of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
     the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
-    cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
-    more; 0 if it does not say. `delay_s` passes from a force to the motion that answers it. `unsafe` says why it must
-    not go on although it obeys: it is to be lifted; '' if it may.
+    cannot move; '' if it can. Without further commands the arm keeps its last velocity for `watchdog_s` at most; 0 if
+    unknown. `delay_s` passes from a force to the motion that responds to it. `unsafe` says why the finger must be
+    lifted although the arm obeys; '' if it need not.
     """
 
     time_ns: int
@@ -141,7 +141,7 @@ class Arm:
 
     def recover(self) -> None:
         """Come free from a fault without being connected again; whoever calls it sees that the arm may move."""
-        raise DeviceError('this arm comes free from a fault only by being connected again')
+        raise DeviceError('this arm recovers from a fault only when it is connected again')
 
     def reboot(self) -> str:
         """Let go, reboot the motors that report an error, stay unconnected; return what was done."""
@@ -318,13 +318,13 @@ RUNTIME = Path(
 )  # one a host, for all users; no environment variable moves it, and no service has a private one
 DONE = b'.'
 LEAVE_S = 2.0
-ENDING = threading.Event()  # set once this process was told to end
+ENDING = threading.Event()  # set once this process was asked to end
 
 
 def give_up_when_ending() -> None:
-    """Raise DeviceError once this process was told to end; called by what waits for a robot to be ready."""
+    """Raise DeviceError once this process was asked to end; called by what waits for a robot to be ready."""
     if ENDING.is_set():
-        raise DeviceError('connecting was given up, as this process was told to end')
+        raise DeviceError('connecting was aborted, as this process was asked to end')
 
 
 def claim(resource: str, patience_s: float) -> int:
@@ -353,8 +353,8 @@ def claim(resource: str, patience_s: float) -> int:
                 continue
             os.close(lock)
             raise DeviceError(
-                f'another process on this machine commands the arm ({resource}), or its guard still brings it to rest: '
-                f"it holds '{path}', and fuser names it; end it first"
+                f'another process on this machine commands the arm ({resource}), or its guard still stops it: '
+                f"it holds '{path}', and fuser names the process; end it first"
             ) from error
         return lock
 
@@ -411,7 +411,7 @@ GUARD_NICENESS = -10  # before whatever else keeps the machine busy
 # Find out whether the finger is in free air, from the force while it rises.
 
 UNSTEADY = (
-    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
+    'its force sensor could not be zeroed: the force changed while the finger rose; check that nothing touches '
     "the finger, and raise 'zero_steady_n' above the noise of the sensor"
 )
 

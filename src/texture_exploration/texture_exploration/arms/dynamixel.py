@@ -55,8 +55,8 @@ FIRMWARE = 6  # address of its version, of one byte, in all control tables of pr
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
-GARBLED = 'answers with what cannot be read: is its id given to two motors, or the cable damaged?'
-RESET = 'has lost its torque: it was reset, as by a dip of its supply'
+GARBLED = 'answers with data that cannot be read: do two motors have this id, or is the cable damaged?'
+RESET = 'has lost its torque: it was reset, for example by a voltage drop'
 REMEDY = "; when it has cooled and nothing blocks it, reboot it (service '~/reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
@@ -224,10 +224,10 @@ class DynamixelBus:
         self.write(motor, register, value)
         kept = self.read_register(motor, register)
         if kept is None:
-            raise NoAnswer(f"{self._profile.owner(motor)} did not tell '{register}': it {SILENT}")
+            raise NoAnswer(f"{self._profile.owner(motor)} did not report '{register}': it {SILENT}")
         if kept != value:
             raise DeviceError(
-                f"{self._profile.owner(motor)} was told {value} for '{register}' and holds {kept}: what bounds its "
+                f"{self._profile.owner(motor)} was given {value} for '{register}' and holds {kept}: what bounds its "
                 f"force is not armed; update its firmware, or correct the table of the profile '{self._profile.name}'"
             )
 
@@ -329,7 +329,7 @@ class DynamixelBus:
         if value('bus_watchdog') == TRIPPED:
             raise DeviceError(
                 f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
-                'or the bus was held up; all motors were let go'
+                'or the bus was held up; all motors were released'
             )
         if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
             self._reasons[motor] = f'{owner} {RESET}'
@@ -361,11 +361,11 @@ class DynamixelBus:
                 break
         if result != SUCCESS:
             why = self._packets.getTxRxResult(result)
-            raise NoAnswer(f"{self._profile.owner(motor)} did not take '{register}': {why}")
+            raise NoAnswer(f"{self._profile.owner(motor)} did not accept '{register}': {why}")
         # The highest bit only tells that there is a hardware error, which is asked for by itself.
         if error & 0x7F:
             why = self._packets.getRxPacketError(error & 0x7F)
-            raise DeviceError(f"{self._profile.owner(motor)} did not take '{register}': {why}")
+            raise DeviceError(f"{self._profile.owner(motor)} did not accept '{register}': {why}")
 
     def read_register(self, motor: int, register: str) -> int | None:
         """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
@@ -431,7 +431,7 @@ class DynamixelBus:
             group.addParam(motor, list((value % (1 << 8 * size)).to_bytes(size, 'little')))
         with self._line():
             if values and group.txPacket() != SUCCESS:
-                raise DeviceError(f"device '{self._device}' did not take an order; no other program may use it")
+                raise DeviceError(f"device '{self._device}' did not accept a command; no other program may use it")
 
     @contextlib.contextmanager
     def _line(self) -> Iterator[None]:
@@ -539,7 +539,7 @@ class DynamixelHand:
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._failure:
-            failure = self._failure or f"the motors on '{self._device}' answer only in part; check the cables"
+            failure = self._failure or f"the motors on '{self._device}' answer only partly; check the cables"
             self.close()
             raise DeviceError(failure)
 
@@ -586,8 +586,8 @@ class DynamixelHand:
             bus.close()
         self._failure = NOT_CONNECTED
         if not rebooted:
-            return 'no motor that answers reports an error; none was rebooted, and the hand let go'
-        return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; the hand let go, the next request connects'
+            return 'no motor that answers reports an error; none was rebooted, and the hand was released'
+        return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; released until the next request'
 
     def _order(self, fingers: Sequence[str], command: ArmCommand) -> None:
         for name in fingers:
@@ -622,7 +622,7 @@ class DynamixelHand:
             self._failure = str(error)
         except BaseException as error:
             # Also an error of this program must neither leave the motors pressing nor pass in silence.
-            self._failure = f'the hand was let go after an error in its program ({type(error).__name__}: {error})'
+            self._failure = f'the hand was released after an error in its program ({type(error).__name__}: {error})'
             raise
         finally:
             if bus is not None:

@@ -265,7 +265,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
             f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
         )
     if len(set(profile.ids)) != len(profile.ids):
-        raise InvalidParameter(f'{where}: a motor is named twice; each has one place')
+        raise InvalidParameter(f'{where}: a motor is named twice; each has one role')
     return profile
 
 
@@ -290,12 +290,12 @@ def _check_models(profile: Profile, where: str) -> None:
         for register, place in profile.table.items():
             if model in MODELS and place != X_SERIES.get(register, place):
                 raise InvalidParameter(
-                    f"{where}: '{register}' stands at {list(place)} in the table; motors of model {describe(model)} "
-                    f'have it at {list(X_SERIES[register])}, and what protects would not be armed'
+                    f"{where}: '{register}' is at {list(place)} in the table; motors of model {describe(model)} "
+                    f'have it at {list(X_SERIES[register])}, and the protection would not be armed'
                 )
         if difference := differs(model, profile.current_a, profile.torque_nm_a):
             raise InvalidParameter(
-                f'{where}: {difference}; give each model a profile of its own, with its current_a and torque_nm_a'
+                f'{where}: {difference}; give each model a separate profile, with its current_a and torque_nm_a'
             )
 
 

@@ -36,7 +36,7 @@ class InHandParams(CommandLimits):
     torque_off_on_fault: bool = param(
         False, 'Switches the torque off, which releases the object, when a motor of a Dynamixel hand reports a fault.'
     )
-    finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
+    finger_pipe: str = param('', "Named pipe for the finger position that the emulator reads; '' for none.")
 
 
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {

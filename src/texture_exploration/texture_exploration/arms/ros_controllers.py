@@ -365,9 +365,9 @@ class RosControllersArm(SurfaceArm):
             give_up_when_ending()
             self._take(topics, self._clock())
             missing = {
-                f"no pose comes on '{params.pose_topic}'": not tool.came_ns['pose'],
-                f"no force comes on '{params.wrench_topic}'": not tool.came_ns['force'],
-                f"nobody listens on '{params.twist_topic}'": topics.listeners() == 0,
+                f"no pose arrives on '{params.pose_topic}'": not tool.came_ns['pose'],
+                f"no force arrives on '{params.wrench_topic}'": not tool.came_ns['force'],
+                f"no node subscribes to '{params.twist_topic}'": topics.listeners() == 0,
             }
             faults = [what for what, is_missing in missing.items() if is_missing]
             if unsafe := topics.unsafe():
@@ -398,8 +398,8 @@ class RosControllersArm(SurfaceArm):
         if topics.listeners() == 0:
             self._gone_ns = self._gone_ns or now_ns
             if now_ns - self._gone_ns > GONE_NS:
-                return f"nobody listens on '{topic}' any more: the controller has ended"
-            self._unsafe = self._unsafe or f"for a moment nobody listened on '{topic}'; see why its controller left"
+                return f"no node subscribes to '{topic}' any more: the controller has ended"
+            self._unsafe = self._unsafe or f"for a moment no node subscribed to '{topic}'; see its controller"
             self._follow.restart()
             self._let_rest()
             return ''
@@ -431,7 +431,7 @@ class RosControllersArm(SurfaceArm):
         if now_ns - self._halted_ns <= RESTS_WITHIN_NS:
             return ''
         return (
-            f"the arm moves although zero velocity is commanded on '{self._params.twist_topic}': see what else moves "
+            f"the arm moves although zero velocity is commanded on '{self._params.twist_topic}': check what else moves "
             'it, or whether this topic leads to its controller'
         )
 

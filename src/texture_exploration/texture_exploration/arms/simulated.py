@@ -146,7 +146,7 @@ class SimulatedArmParams(ForceLoopParams, CommandLimits):
         0.01, 'Height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
     )
     command_timeout_s = 0.1  # that a command holds without a new one; afterwards the arm stands
-    finger_pipe: str = param('', "Named pipe on which the emulator is told where the finger is; '' tells nobody.")
+    finger_pipe: str = param('', "Named pipe for the finger position that the emulator reads; '' for none.")
 
 
 SEED = 1  # of the noise: equal runs are equal

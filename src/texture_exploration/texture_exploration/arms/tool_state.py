@@ -52,7 +52,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         '', "Frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
     )
     controller_manager: str = param(
-        '', "Controller manager that switches controllers when the arm is connected and let go; '' switches nothing."
+        '', "Controller manager that switches controllers when the arm is connected and released; '' switches nothing."
     )
     activate_controllers: str = param(
         'twist_controller', 'Controllers, separated by spaces, that are active only while the arm is connected.'
@@ -70,7 +70,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     loop_delay_s: float = param(
         0.02,
-        'Largest delay from a measured force to the motion that answers it; a longer one is measured as the '
+        'Largest delay from a measured force to the motion that responds to it; a longer one is measured as the '
         'finger comes down. Larger values lower the gain.',
         unit='s',
         low=0.0,
@@ -81,12 +81,12 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
     )
     accept_no_timeout: bool = param(
         False,
-        'Accepts a controller that holds the last velocity for ever: then nothing stops the arm when this machine or '
+        'Accepts a controller that keeps executing the last velocity: then nothing stops the arm when this machine or '
         'its network fails, but the limits of the robot.',
     )
     accept_shared_group: bool = param(
         False,
-        'Accepts such a controller also where the guard has no control group of its own, as in a container: what kills '
+        'Accepts such a controller also where the guard has no separate control group, as in a container: what kills '
         'the whole group leaves the arm moving.',
     )
     deadman_s: float = param(
@@ -99,7 +99,7 @@ class RosControllersParams(ForceLoopParams, ZeroingParams, SurfacePoseParams, Co
         False, 'Inverts the measured force, for a sensor that reports what the tool does to its surroundings.'
     )
     force_is_quantised: bool = param(
-        False, 'Lets a measured force repeat itself, as of a sensor that rounds, without being taken for frozen.'
+        False, 'Lets a measured force repeat itself, as of a sensor that rounds, without counting as frozen.'
     )
     force_smoothing_s: float = param(
         0.0, 'Time constant of the low-pass filter of the force; it delays the loop.', unit='s', low=0.0, high=0.1
@@ -237,7 +237,7 @@ class ToolState:
             self._refuse('pose', f"is given in the frame '{sample.frame_id}'; '{base}' is needed ('base_frame_id')")
         elif not (math.hypot(*sample.position_m) <= MOST_M and abs(norm - 1.0) <= 0.1):  # so NaN is none either
             numbers = f'{_shown(sample.position_m)} m, quaternion {_shown(sample.rotation)}'
-            self.garbled = f"a pose on '{self._topics['pose']}' is none: {numbers}; see what sends it"
+            self.garbled = f"a pose on '{self._topics['pose']}' is invalid: {numbers}; check its sender"
         elif self._is_new('pose', now_ns, sample):
             self.rotation = quaternion_matrix(sample.rotation)
             self._position = self._frame.place(sample.position_m)
@@ -253,7 +253,7 @@ class ToolState:
             return
         if not math.hypot(*sample.force_n) <= MOST_FORCE_N:  # so NaN is none either
             numbers = f'{_shown(sample.force_n)} N'
-            self.garbled = f"a force on '{self._topics['force']}' is none: {numbers}; see what sends it"
+            self.garbled = f"a force on '{self._topics['force']}' is invalid: {numbers}; check its sender"
             self.came_ns['force'] = now_ns  # the finger can be lifted without a force
             return
         before_ns = self._taken_ns['force']
@@ -299,7 +299,7 @@ class ToolState:
             if ahead_ns > SKEW_NS:
                 return (
                     f"the clock that stamps the {kind} on '{self._topics[kind]}' is {ahead_ns * 1e-6:.0f} ms ahead of "
-                    'the clock of this machine: a late sample is not seen; set both by each other (chrony)'
+                    'the clock of this machine: a late sample is not detected; synchronise the two clocks (chrony)'
                 )
         return ''
 
@@ -309,7 +309,7 @@ class ToolState:
             age_s = self.listening.silence_s(time_ns, now_ns)
             if age_s > self._params.deadman_s:
                 return (
-                    f"no {kind} has come on '{self._topics[kind]}' for {1e3 * age_s:.0f} ms, so zero velocity was "
+                    f"no {kind} has arrived on '{self._topics[kind]}' for {1e3 * age_s:.0f} ms, so zero velocity was "
                     'commanded; check that its broadcaster is active'
                 )
         return ''
@@ -329,9 +329,9 @@ class ToolState:
         self._late[kind] = ''
         if self.listening.silence_s(now_ns - age_ns, now_ns) > deadman_s:
             self._late[kind] = (
-                f"the {kind} on '{self._topics[kind]}' comes {age_ns * 1e-6:.0f} ms after its stamp, and "
-                f"{1e3 * deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find what holds "
-                'it up, or set the clocks of both machines by each other (chrony)'
+                f"the {kind} on '{self._topics[kind]}' arrives {age_ns * 1e-6:.0f} ms after its stamp, and "
+                f"{1e3 * deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find the cause "
+                'of the delay, or synchronise the clocks of both machines (chrony)'
             )
         return True
 

@@ -122,7 +122,7 @@ class UrReport(NamedTuple):
     """What the controller measured last, in the base frame, and how it is.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
-    says that the force sensor could not be zeroed, because the force changed all the while the finger rose; `zeroed`,
+    says that the force sensor could not be zeroed, because the force changed while the finger rose; `zeroed`,
     that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
 
     `counts` are totals since the arm was connected. `late`: gaps of more than 20 ms in what the controller sends.
@@ -164,7 +164,7 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
 
     ip: str = param('127.0.0.2', 'IP address of the controller; the default, and a path, are of the emulated one.')
     command_timeout_s: float = param(
-        0.2, 'How long a command holds without a new one; afterwards the arm stands.', unit='s', low=0.02, high=2.0
+        0.2, 'How long a command holds without a new one; afterwards the arm stops.', unit='s', low=0.02, high=2.0
     )
     watchdog_hz: float = param(
         10.0,
@@ -188,7 +188,7 @@ class UrArmParams(ZeroingParams, SurfacePoseParams, CommandLimits):
 
 
 RATE_HZ = 250.0  # of commands and states: half of that of an e-Series
-DELAY_S = 0.02  # from a force to the motion that answers it: walls were pressed with 26 to 40 N at 50 mm/s
+DELAY_S = 0.02  # from a force to the motion that responds to it: walls were pressed with 26 to 40 N at 50 mm/s
 ACCELERATION_M_S2 = 2.0  # towards a new velocity: 50 mm/s after 25 ms
 ACKNOWLEDGE_S = (
     1.0  # so long a controller may take to stop, to end force control and to zero; its watchdog waits as long
@@ -355,7 +355,7 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         answer = _ask(line, CONTROLLER_VERSION, b'')
     if len(answer) < 8:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell its version; is it a UR controller?')
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not report its version; is it a UR controller?')
     major, minor = struct.unpack_from('>2I', answer)
     return major, minor
 
@@ -368,7 +368,7 @@ def runtime_state(ip: str, timeout_s: float) -> int:
         _ask(line, START, b'')
         data = _await(line, DATA)
     if len(data) != STATE.size:
-        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell whether a program runs; is it a UR controller?')
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not report whether a program runs; is it a UR controller?')
     state: int
     _, state = STATE.unpack(data)
     return state
@@ -588,8 +588,8 @@ class UrArm(SurfaceArm):
         if self._series != CB3:
             return ''
         return (
-            f'the controller at {self._params.ip} is a CB3, which estimates forces within about 10 N: what is pressed '
-            'may be far from what is asked; use an e-Series, or a force sensor in the flange'
+            f'the controller at {self._params.ip} is a CB3, which estimates forces within about 10 N: the actual force '
+            'may be far from the requested one; use an e-Series, or a force sensor in the flange'
         )
 
     def close(self) -> None:

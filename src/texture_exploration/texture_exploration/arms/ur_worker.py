@@ -319,7 +319,7 @@ HANGING_S = 2.0  # no command takes so long
 RESTART_S = 5.0  # of the program on the controller
 LATE_S = 0.02
 OTHER_PROGRAM = (
-    'the program on the controller was stopped, and somebody else started one; see who uses the arm, and connect again'
+    'the program on the controller was stopped, and another user started one; check who uses the arm, and connect again'
 )
 LOST = 'the connection to the controller was lost; is it still on, and the cable in place?'
 
@@ -546,7 +546,7 @@ class Worker:
 
     def _set_watchdog(self) -> None:
         if not self._watchdog.arm():
-            raise RuntimeError('the controller did not take the watchdog, without which the arm does not move')
+            raise RuntimeError('the controller did not accept the watchdog, without which the arm does not move')
 
 
 def _vector(values: Sequence[float]) -> Vector:

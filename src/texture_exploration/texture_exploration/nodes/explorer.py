@@ -281,7 +281,7 @@ class ExplorerNode(PatientLifecycleNode):
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of the arm after an internal error in a transition."""
-        self.get_logger().error('a transition broke off through an internal error; the arm is let go')
+        self.get_logger().error('a transition was aborted by an internal error; the arm is released')
         self._let_go()
         return super().on_error(state)
 
@@ -401,7 +401,7 @@ class ExplorerNode(PatientLifecycleNode):
         """Refuse to move while the time of ROS stands still: nothing could be stamped."""
         if not self.get_clock().now().nanoseconds:
             raise MotionRefused(
-                "'use_sim_time' is true, and no time has come on '/clock'; start what publishes it, or set it to false",
+                "'use_sim_time' is true, and no time has arrived on '/clock'; start its publisher, or set it to false",
                 ExplorationError.NOT_ACTIVE,
             )
 
@@ -455,7 +455,7 @@ class ExplorerNode(PatientLifecycleNode):
     def _forget_touches(self) -> str:
         count = self._explorer.forget_touches()
         touches = 'the touch is' if count == 1 else f'{count} touches are'
-        forgotten = f'{touches} forgotten' if count else 'no touch was taken, so none is forgotten'
+        forgotten = f'{touches} forgotten' if count else 'no touch was recorded, so none is removed'
         return f'{forgotten}; the surface stays as it is'
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:

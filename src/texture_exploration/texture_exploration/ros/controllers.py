@@ -41,8 +41,8 @@ ANNOUNCED_S = 3.0  # participants announce themselves so often (rmw_fastrtps)
 # the publishers of another only when that one announces itself again, if the first messages between both were lost.
 ALONE_S = 2 * ANNOUNCED_S
 NO_TIMEOUT = (
-    "the controller on '{topic}' declares no timeout ('controller_timeout_s' is 0): it may hold the last velocity for "
-    "ever if this machine or its network fails. Set its timeout, or set 'accept_no_timeout: true' once the safety "
+    "the controller on '{topic}' declares no timeout ('controller_timeout_s' is 0): it may keep executing the last "
+    "velocity if this machine or its network fails. Set its timeout, or set 'accept_no_timeout: true' once the safety "
     'limits of the robot bound speed and force (docs/safety.md)'
 )
 NO_SCOPE = (
@@ -175,7 +175,7 @@ class RosTopics:
         if answer is None or not answer.ok:
             did = 'does not answer' if answer is None else f'refused: {getattr(answer, "message", "") or "see its log"}'
             raise DeviceError(
-                f"'{manager}' was asked to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
+                f"'{manager}' was to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
             )
 
     def _ask(self, kind: Any, name: str, request: Any) -> Any:
@@ -205,8 +205,8 @@ class RosTopics:
                     if other:
                         raise DeviceError(f'{other}; end it first. ROS forgets one that was killed after 20 s')
                     raise DeviceError(
-                        f"nobody listens on '{topic}'. Check that the controller is active, and that ROS_DOMAIN_ID and "
-                        'ROS_AUTOMATIC_DISCOVERY_RANGE are those of the robot'
+                        f"no node subscribes to '{topic}'. Check that the controller is active, and that ROS_DOMAIN_ID "
+                        'and ROS_AUTOMATIC_DISCOVERY_RANGE are those of the robot'
                     )
             else:
                 alone_s = alone_s or now_s
@@ -220,7 +220,7 @@ class RosTopics:
             for info in self._node.get_publishers_info_by_topic(topic):
                 if sender(info) not in ours:
                     name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-                    return f"'{name}' commands the arm, too: it publishes on '{topic}'"
+                    return f"'{name}' also commands the arm: it publishes on '{topic}'"
         return ''
 
     def close(self) -> None:

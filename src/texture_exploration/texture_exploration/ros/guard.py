@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The process that brings an arm to rest when the process that commanded it is silent or gone.
 
-A controller may hold the last velocity for ever: the twist controller of `ur_robot_driver` has no timeout. The guard
+A controller may keep executing the last velocity: the twist controller of `ur_robot_driver` has no timeout. The guard
 hears a heartbeat on a socket whose other end only the commanding process holds. When an arm that may still move is no
 longer spoken for, as when that process hangs, is stopped (SIGSTOP) or frozen, it commands zero velocity, and zero force
 to a compliance controller; the kernel closes the socket however the process ends, also by SIGKILL. It goes on until

@@ -197,9 +197,7 @@ def _checked(segment: bytes) -> bytes | None:
 class FingerPipeParams:
     """Whom an emulated robot tells where its finger is."""
 
-    finger_pipe: str = param(
-        '', "Path of the named pipe on which the emulator is told where the finger is; '' tells nobody."
-    )
+    finger_pipe: str = param('', "Path of the named pipe for the finger position that the emulator reads; '' for none.")
 
 
 LineT = TypeVar('LineT', bound='EmulatedSerialRobot')

@@ -93,7 +93,7 @@ class TwistControllerParams(TouchedSurfaceParams):
     )
     command_timeout_s: float = param(
         0.1,
-        'How long a command holds without a new one; 0 holds the last one for ever.',
+        'How long a command holds without a new one; 0 keeps executing the last one.',
         unit='s',
         low=0.0,
         high=5.0,
