@@ -24,7 +24,7 @@ from texture_bringup.demo import (
     ProgressLog,
     Slide,
     demonstrate,
-    explore_patiently,
+    explore_with_retries,
 )
 from texture_bringup.operator import ExplorationResult
 from texture_core.errors import ExplorationError, MotionAborted
@@ -73,9 +73,9 @@ def test_an_aborted_slide_is_made_again_and_that_is_said(aborted: int) -> None:
     made = iter(results)
     if aborted == ATTEMPTS:
         with pytest.raises(MotionAborted, match='the exploration of felt failed: the arm has not answered'):
-            explore_patiently(lambda _: next(made), ExplorationRequest('linear_slide', surface='felt'), said.append)
+            explore_with_retries(lambda _: next(made), ExplorationRequest('linear_slide', surface='felt'), said.append)
     else:
-        explored = explore_patiently(lambda _: next(made), ExplorationRequest('linear_slide'), said.append)
+        explored = explore_with_retries(lambda _: next(made), ExplorationRequest('linear_slide'), said.append)
         assert explored.exploration_id == 'good'
         assert said == ['aborted: the arm has not answered for 135 ms; trying again'] * aborted
 

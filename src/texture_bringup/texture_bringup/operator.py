@@ -59,13 +59,13 @@ def middleware() -> str:
 
 
 # --------------------
-# Wait in a coroutine for what ROS answers in its own thread.
+# Wait in a coroutine for an answer of ROS, which comes in another thread.
 
 FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
 
 
 async def ready(is_ready: Callable[[], bool], node: str) -> None:
-    """Wait until a node can be asked: one that has just started is found a moment later."""
+    """Wait until a node can be called: one that has just started is discovered a moment later."""
     deadline_s = time.monotonic() + FOUND_DEADLINE_S
     while not is_ready():
         if time.monotonic() > deadline_s:
@@ -110,11 +110,11 @@ def parameter_from_text(name: str, text: str, kind: int) -> Parameter:
 
 
 # --------------------
-# The messages of the nodes in a namespace, to what shows them.
+# Messages of the nodes in a namespace, for display.
 
 
 def subscribe(node: Node, feed: Feed, on_bad: Callable[[InvalidData], None]) -> None:
-    """Let a feed take what is published from now on; `on_bad` is called with what contradicts itself."""
+    """Pass all messages from now on to a feed; `on_bad` is called with the error of an inconsistent message."""
 
     def taking(take: Callable[[Any], None]) -> Callable[[Any], None]:
         def on_message(message: Any) -> None:
@@ -146,16 +146,16 @@ LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
 FEATURES_DEADLINE_S = 30.0
-# An explorer that explores sends feedback, and else its idle state once a second: silent for so long, it has ended or
-# hangs. Whether ROS still lists a killed one says nothing for 20 s.
+# An explorer that explores sends feedback, and else its idle state once a second: silent for this long, it has ended or
+# hangs. ROS lists a killed one for another 20 s.
 GONE_S = 4.0
-LISTEN_S = 0.5  # without feedback, until its state is listened to
-# So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
+LISTEN_S = 0.5  # without feedback, until its state is subscribed to
+# Time until a goal is accepted: it is short, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
-# So long a service is looked for, and so long its answer may take: an arm needs seconds to recover, a tare up to 65 s.
+# Time to find a service, and time for its answer: an arm needs seconds to recover, a tare up to 65 s.
 OFFERED_S, ANSWER_S = 10.0, 75.0
 RETRY_PERIOD_S = 5.0
-# What this process sees, the other processes see soon after.
+# What this process has discovered, the others discover soon after.
 DISCOVERY_S = 1.0
 # The transition that brings a lifecycle node one step nearer to being active, or to being inactive, by its state.
 STEPS: Mapping[bool, Mapping[str, int]] = {
@@ -200,10 +200,10 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
-        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
+        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: all nodes remember it
         self._heard_s = 0.0  # of the explorer
-        self._states: Any = None  # nobody listens yet
-        self._vectors: list[FeatureVector] | None = None  # nobody listens yet
+        self._states: Any = None  # not subscribed yet
+        self._vectors: list[FeatureVector] | None = None  # not subscribed yet
 
     def __enter__(self) -> Operator:
         return self
@@ -217,7 +217,7 @@ class Operator:
         self._context.try_shutdown()
 
     def wait_for_explorer(self, deadline_s: float, quiet_s: float | None = None) -> None:
-        """Wait until explorations can be asked for; the wait is shown after `quiet_s`."""
+        """Wait until explorations can be requested; the wait is shown after `quiet_s`."""
         advice = 'start one, such as the emulator with `texture launch emulator`'
         with task(f'waiting for an explorer; {advice}', quiet_s=quiet_s):
             self._until(self._explore.server_is_ready, deadline_s, f'no explorer answers; {advice}')
@@ -238,7 +238,7 @@ class Operator:
             self._node.destroy_subscription(subscription)
 
     def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
-        """Wait until topics have so many subscriptions, which had time to be found; `guard` is called meanwhile."""
+        """Wait until topics have `number` subscriptions and these are discovered; `guard` is called meanwhile."""
 
         def all_listen() -> bool:
             guard()
@@ -275,7 +275,7 @@ class Operator:
                     self._listen_to_states()
                 if silent_s > GONE_S:
                     raise MotionAborted(VANISHED)
-                if now_s - asked_s > RETRY_PERIOD_S:  # one that was started again says that it knows of nothing
+                if now_s - asked_s > RETRY_PERIOD_S:  # a restarted explorer answers that the goal is unknown
                     endings.append(goal.get_result_async())
                     asked_s = now_s
         except KeyboardInterrupt:
@@ -301,7 +301,7 @@ class Operator:
     def explore_with_features(
         self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
     ) -> tuple[ExplorationResult, list[FeatureVector]]:
-        """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration."""
+        """Explore as `explore` does, and also return the features of the windows; none of an aborted exploration."""
         vectors = self._listen_to_features()
         vectors.clear()
         explored = self.explore(request, on_progress)
@@ -315,11 +315,11 @@ class Operator:
         return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
 
     def stop(self) -> str:
-        """Stop whatever moves; return what the explorer says."""
+        """Stop any motion; return the message of the explorer."""
         return self.call('explorer/stop', 'start an explorer')[1]
 
     def call(self, service: str, advice: str) -> tuple[bool, str]:
-        """Call a `Trigger`; return whether it succeeded, and its sentence; `advice` is for one that no node offers."""
+        """Call a `Trigger`; return whether it succeeded, and its message; `advice` is for a missing service."""
         name = f"the service '{self._node.resolve_service_name(service)}'"
         missing = f'no node offers {name}; {advice}'
         silent = f'{name} does not answer; look at the robot, and at the output of its node'
@@ -369,7 +369,7 @@ class Operator:
             show()
 
     def _listen_to_features(self) -> list[FeatureVector]:
-        """Return the list to which feature vectors are added as they come, once they would come."""
+        """Return the list to which feature vectors are added as they arrive, once their topic has a publisher."""
         if self._vectors is not None:
             return self._vectors
         vectors: list[FeatureVector] = []
@@ -383,7 +383,7 @@ class Operator:
         return vectors
 
     def _settle(self) -> None:
-        """Wait until what this process sees is seen by the others."""
+        """Wait until other processes have discovered what this process has."""
         settled_s = time.monotonic() + DISCOVERY_S
         self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
@@ -396,7 +396,7 @@ class Operator:
         return answer
 
     def _ask(self, kind: Any, name: str, request: Any, offered: tuple[float, str], answered: tuple[float, str]) -> Any:
-        """Return the answer of a service; each step has the longest time, s, and what to say when it is over."""
+        """Return the answer of a service; each step has a timeout, s, and a message for it."""
         client = self._node.create_client(kind, name)
         try:
             self._until(client.service_is_ready, *offered)
@@ -476,7 +476,7 @@ class Operator:
         self._executor.spin_once(timeout_sec=STEP_S)
 
     def _cancel(self, goal: Any, ending: Future) -> str:
-        """Ask for the end, wait until the finger is lifted, and return in a sentence how it ended."""
+        """Cancel, wait until the finger is lifted, and return in a sentence how it ended."""
         goal.cancel_goal_async()
         deadline = time.monotonic() + CANCEL_DEADLINE_S
         while not ending.done() and time.monotonic() < deadline:

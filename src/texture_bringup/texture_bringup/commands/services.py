@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that ask a running node for one thing and print its answer."""
+"""The sub-commands of `texture` that call one service of a running node and print the answer."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ tare = trigger(
 )
 
 # --------------------
-# Textures that a running classifier learns and forgets.
+# Textures that are added to and removed from a running classifier.
 
 
 def _configure_add(parser: argparse.ArgumentParser) -> None:
@@ -96,7 +96,7 @@ remove = Command('remove a texture that was added since the training', _configur
 
 def _activating(active: bool) -> tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int]]:
     """Return what `activate` or `deactivate` is configured by, and what it does."""
-    # The arm is let go first, and taken last.
+    # The arm is released first and activated last.
     usual = ['sensor', 'explorer'] if active else ['explorer', 'sensor']
 
     def configure(parser: argparse.ArgumentParser) -> None:

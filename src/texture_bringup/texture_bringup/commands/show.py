@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-commands of `texture` that look at what there is: catalogues, a bag or a model, this machine."""
+"""The sub-commands of `texture` that show catalogues, a bag or a model, and this machine."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _info(options: argparse.Namespace) -> int:
     from texture_recordings.bags import find_bags
 
     path = Path(options.path)
-    # A model is one of two files that share a name; everything else is looked for as a bag, which says what is wrong.
+    # A model is one of two files with the same name; everything else is read as a bag, whose errors are reported.
     if not path.is_dir() and (path.suffix in ('.npz', '.json') or path.with_name(f'{path.name}.npz').is_file()):
         print('\n'.join(_model_lines(path)))
         return 0

@@ -43,7 +43,7 @@ class BringUp(Node):
         super().__init__('bring_up', **kwargs)
         params = declare(self, BringUpParams)
         names, lifecycle = params.nodes.split(), params.lifecycle_nodes.split()
-        with Operator(self.get_namespace(), guard=_end_when_told) as operator:
+        with Operator(self.get_namespace(), guard=_end_when_stopped) as operator:
             for place, name in enumerate(names, start=1):
                 try:
                     operator.wait_for_node(name, params.timeout_s)
@@ -55,7 +55,7 @@ class BringUp(Node):
         self.get_logger().info(f'all nodes are up: {params.nodes}')
 
 
-def _end_when_told() -> None:
+def _end_when_stopped() -> None:
     if STOPPED.is_set():
         raise ExternalShutdownException
 

@@ -217,8 +217,8 @@ class DashboardNode(Node):
                 *command, '--namespace', namespace, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
             )
             assert self._command.stdout is not None
-            async for said in self._command.stdout:
-                line = said.decode(errors='replace').strip().removeprefix('texture: ') or line
+            async for output in self._command.stdout:
+                line = output.decode(errors='replace').strip().removeprefix('texture: ') or line
                 self._feed.working = f'{name}: {line}'
             return {'success': await self._command.wait() == 0, 'message': line}
         finally:
