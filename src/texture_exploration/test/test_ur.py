@@ -279,7 +279,7 @@ def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(
 def test_connecting_releases_no_protective_stop(arm, emulator):
     emulator.controller.ask('emulate protective stop')
     arm.close()
-    with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find out why'):
+    with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find the cause'):
         arm.connect()
     wait_for(lambda: 'releasing' in emulator.controller.ask('unlock protective stop'))  # as a person at the pendant
 
@@ -371,7 +371,7 @@ def test_a_controller_that_hangs_in_the_handshake_blocks_nobody_and_leaves_no_pr
     [
         (['Robotmode: POWER_OFF'], 'switch it on and release its brakes'),
         (['Robotmode: RUNNING', 'false'], 'switch the pendant to remote control'),
-        (['Robotmode: RUNNING', 'true', 'Safetymode: ROBOT_EMERGENCY_STOP'], r'\(ROBOT_EMERGENCY_STOP\); find out why'),
+        (['Robotmode: RUNNING', 'true', 'Safetymode: ROBOT_EMERGENCY_STOP'], r'\(ROBOT_EMERGENCY_STOP\); find the cause'),
     ],
 )
 def test_an_arm_that_is_not_ready_is_refused_with_what_to_do(answers, sentence):

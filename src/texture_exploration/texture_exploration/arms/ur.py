@@ -431,8 +431,8 @@ def check_ready(ip: str, timeout_s: float) -> tuple[int, int]:
         safety = _safety(dashboard)
     if safety not in FREE_MODES:
         raise DeviceError(
-            f'the arm at {ip} is held by its safety system ({safety}); find out why, release it on the pendant, '
-            'and ask again'
+            f'the arm at {ip} is held by its safety system ({safety}); find the cause, release it on the '
+            'pendant, and repeat the request'
         )
     return version
 
