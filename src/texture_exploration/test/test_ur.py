@@ -371,7 +371,7 @@ def test_a_controller_that_hangs_in_the_handshake_blocks_nobody_and_leaves_no_pr
     [
         (['Robotmode: POWER_OFF'], 'switch it on and release its brakes'),
         (['Robotmode: RUNNING', 'false'], 'switch the pendant to remote control'),
-        (['Robotmode: RUNNING', 'true', 'Safetymode: ROBOT_EMERGENCY_STOP'], r'\(ROBOT_EMERGENCY_STOP\); find the cause'),
+        (['Robotmode: RUNNING', 'true', 'Safetymode: ROBOT_EMERGENCY_STOP'], r'\(ROBOT_EMERGENCY_STOP\); find'),
     ],
 )
 def test_an_arm_that_is_not_ready_is_refused_with_what_to_do(answers, sentence):

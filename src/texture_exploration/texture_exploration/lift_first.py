@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Lift the finger before a motion begins: after a fault nobody knows whether it still presses.
+"""Lift the finger before a motion begins: after a fault the contact state is unknown.
 
-Nobody knows either whether frames and signs are what they are said to be, so that the lift begins with a probe, and is
+Frames and signs may also differ from the declared ones, so that the lift begins with a probe, and is
 slow and watched to its end.
 """
 
@@ -24,18 +24,18 @@ CALM_S = 0.15  # at rest; an arm that zeroes its force sensor does so now
 PROBE_M = 0.0005
 PROBE_M_S = 0.002
 PROBE_TIMEOUT_S = 2.0
-STILL_M, STILL_S = 0.00005, 0.06  # an arm that moves less in this time stands still
-ASTRAY_M = 0.0002  # beside the commanded way: more than noise and play
+STILL_M, STILL_S = 0.00005, 0.06  # an arm that moves less in this time is at rest
+ASTRAY_M = 0.0002  # off the commanded path: more than noise and play
 MET_GROWTH = 2.0  # times the change in the first half of the way
-MOST_FORCE_SHARE = 0.65  # of the force limit: no finger that was pressed as asked is left pressed harder
+MOST_FORCE_SHARE = 0.65  # of the force limit: no finger with a permitted force is left pressed harder
 GO_BACK_S = 0.5
 UNKNOWN_STATE = ArmState(0, (math.inf,) * 3, (0.0,) * 3, math.nan)
 REST_STEP_M = 1e-5  # way between two states of an arm at rest
-PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so where it stands
+PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so at this place
 
 
 class Detour(MotionAborted):
-    """What ends a stage is left by other stages, and the motion ends with them."""
+    """An end of a stage with other stages after it, which end the motion."""
 
     def __init__(self, reason: str, *stages: Stage, error: ExplorationError = ExplorationError.MOTION_FAILED) -> None:
         super().__init__(reason, error)
@@ -72,17 +72,17 @@ class Rise(Stage):
         self._first = UNKNOWN_STATE
         self._most_n = MOST_FORCE_SHARE * limits.force_limit_n
         self._impact_n = IMPACT * force_n
-        self._signed = signed  # the sign of the force is not known to be wrong
+        self._signed = signed  # no wrong sign of the force was found
         self._zero_n = zero_n  # from which the force counts: that before the first of several rises
         self._air = FreeAir(touch.clearance_m, touch.contact_force_n)
         self._start_ns: int | None = None  # of the probe
         self._rest_ns = 0
-        self._heights_m: list[float] = []  # of the way so far, and the forces there
+        self._heights_m: list[float] = []  # along the rise, and the forces there
         self._forces_n: list[Vector] = []
         self.free = False
 
     def again(self) -> Rise:
-        """Return a rise that comes after this one, whatever the sign of the force; it counts from the same zero."""
+        """Return a rise after this one, for any sign of the force; it counts from the same zero."""
         return Rise(*self._given, signed=False, zero_n=self._zero_n)
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
@@ -120,7 +120,7 @@ class Rise(Stage):
         return ArmCommand(normal_m_s=max(PROBE_M_S, min(self._speed_m_s, gentle_m_s)))
 
     def _rests(self, time_ns: int, arm: ArmState) -> bool:
-        """Wait until the arm stands still, as it may not do yet after a fault; note place and force."""
+        """Wait until the arm is at rest, which may take time after a fault; note place and force."""
         if self.elapsed_s(time_ns) > PROBE_TIMEOUT_S:
             raise MotionAborted(
                 'the arm moves although zero velocity is commanded; see what moves it', ExplorationError.ARM_FAULT
@@ -159,7 +159,7 @@ class Rise(Stage):
             )
 
     def _watch_growth(self, arm: ArmState) -> float:
-        """Return the stiffness of what the finger leaves, N/m, 0 in the air; Detour if it meets something.
+        """Return the stiffness of the contact that the finger leaves, N/m, 0 in the air; Detour if it meets something.
 
         A surface that is left lets the force change less and less; what is met changes it more in the second half of
         the way than in the first.
@@ -205,11 +205,11 @@ class GoBack(Stage):
 
 
 class CalmDown(Stage):
-    """Stand still, until the force sensor can be believed.
+    """Rest until the force sensor is valid.
 
-    An arm that proves free air by itself may have seen less of the lift than the explorer did, or its controller may
-    not have taken the command to zero. Standing still would prove nothing more, so that the finger rises again, as long
-    as the force stays what it was when it first stood.
+    An arm that detects free air may have observed less of the lift than the explorer, or its controller may
+    not have accepted the command to zero. More rest would prove nothing, so that the finger rises again, as long
+    as the force stays that of the first rest.
     """
 
     commands = ('rest', 'up')
@@ -247,7 +247,7 @@ class CalmDown(Stage):
         if rested_s >= CALM_S and self._zeroed():
             if self._believed:
                 return None
-            self._believed = True  # the arm tells so at once, and this state may still be without the zero
+            self._believed = True  # the arm reports it at once, and this state may still be without the zero
             return ArmCommand()
         height_m = arm.position[2]
         if rested_s < PATIENCE_S or height_m - self._start_m > self._touch.approach_travel_m:
