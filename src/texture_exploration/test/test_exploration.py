@@ -235,9 +235,9 @@ def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
     watch = SignalWatch(0.12, lambda: table.now_ns)
 
     def signal_fault(listening):
-        told = watch.signal_fault(listening)
+        message = watch.signal_fault(listening)
         watch.on_samples()
-        return told
+        return message
 
     table.signal_fault = signal_fault
     table.when[Phase.SLIDE] = table.sleep

@@ -423,10 +423,10 @@ def test_a_finger_that_trembles_across_its_path_does_not_get_ahead():
 def test_a_ramp_keeps_to_the_acceleration_and_takes_half_the_speed_in_the_mean():
     speed, acceleration = 0.2, 1.0
     duration = ramp_s(speed, acceleration)
-    shares = [k / 1000 for k in range(1001)]
-    steepest = max(smooth(b) - smooth(a) for a, b in pairwise(shares)) * 1000
+    fractions = [k / 1000 for k in range(1001)]
+    steepest = max(smooth(b) - smooth(a) for a, b in pairwise(fractions)) * 1000
     assert steepest * speed / duration == pytest.approx(acceleration, rel=1e-3)
-    mean = sum(map(smooth, shares)) / len(shares)
+    mean = sum(map(smooth, fractions)) / len(fractions)
     assert 2 * mean * speed * duration == pytest.approx(ramps_m(speed, duration) - 0.05 * speed)
 
 

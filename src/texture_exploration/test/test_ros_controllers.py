@@ -592,9 +592,9 @@ def explorer_over(robot):
     return explorer
 
 
-def press_at(robot, x_m, y_m, z_m=0.0, share=2.0):
+def press_at(robot, x_m, y_m, z_m=0.0, fraction=2.0):
     """Press a place as an operator would, `z_m` above the surface, with so many times the least force of a touch."""
-    depth_m = share * TouchParams().contact_force_n / robot.arm.params.stiffness_n_m
+    depth_m = fraction * TouchParams().contact_force_n / robot.arm.params.stiffness_n_m
     robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, z_m - depth_m]
     robot.pass_time(0.02)
     return depth_m
@@ -614,7 +614,7 @@ def test_a_tilted_surface_is_found_by_four_touches_and_the_last_shows_the_residu
     assert patch.patch_x_high_m - patch.patch_x_low_m == pytest.approx(0.05, abs=0.002)
     explorer.connect()
     for place in ((0.01, -0.03), (-0.04, 0.02)):
-        press_at(robot, *place, share=0.0)
+        press_at(robot, *place, fraction=0.0)
         assert robot.driven.state().position[2] == pytest.approx(depth_m, abs=1e-6)
     normal = rotation_matrix(robot.driven.surface_pose[3:])[:, 2]
     assert normal == pytest.approx(robot.arm._axes[:, 2])
@@ -632,8 +632,8 @@ def test_touches_that_are_forgotten_are_made_again(robot):
 
 def test_a_touch_below_the_contact_force_is_refused_with_both_forces(robot):
     explorer = explorer_over(robot)
-    for share, said in ((0.0, '0.00'), (0.5, '0.10')):
-        press_at(robot, 0.0, 0.0, share=share)
+    for fraction, said in ((0.0, '0.00'), (0.5, '0.10')):
+        press_at(robot, 0.0, 0.0, fraction=fraction)
         with pytest.raises(MotionRefused, match=rf'the force is {said} N, and 0\.2 N are needed'):
             explorer.touch_surface()
     assert explorer.forget_touches() == 0
@@ -787,7 +787,7 @@ def test_clocks_that_do_not_agree_say_nothing_about_age(noisy, clock_ahead_s):
 
 def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot, monkeypatch):
     explorer = robot.explorer()
-    press_at(robot, 0.0, 0.0, share=0.0)
+    press_at(robot, 0.0, 0.0, fraction=0.0)
     robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.002]
     robot.pass_time(0.05)
     assert robot.arm.finger().force_n == pytest.approx(4.0)

@@ -48,9 +48,9 @@ def test_stamps_that_jump_by_50_ms_in_a_slide_are_no_speed(ahead_s):
     assert watch.flaw() == ''
 
 
-@pytest.mark.parametrize(('share', 'stalls'), [(0.3, False), (0.2, True), (-1.0, True)])
-def test_a_finger_counts_as_stalled_below_its_share_of_the_commanded_speed(share, stalls):
-    assert (watched(lambda s: share * SPEED_M_S * s, 1.0) is not None) is stalls
+@pytest.mark.parametrize(('fraction', 'stalls'), [(0.3, False), (0.2, True), (-1.0, True)])
+def test_a_finger_counts_as_stalled_below_its_fraction_of_the_commanded_speed(fraction, stalls):
+    assert (watched(lambda s: fraction * SPEED_M_S * s, 1.0) is not None) is stalls
 
 
 def test_noise_of_the_position_is_no_way():
@@ -138,8 +138,8 @@ def test_turns_are_no_part_of_the_speed_that_was_asked_for():
     assert watch.flaw() == ''
 
 
-@pytest.mark.parametrize('share', [1.86, 3.0])
-def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(table, share, monkeypatch):
+@pytest.mark.parametrize('peak_n', [1.86, 3.0])
+def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(table, peak_n, monkeypatch):
     monkeypatch.setattr(SimulatedArmParams, 'admittance_m_s_n', 7e-4)  # it gives way slowly
     table.when[Phase.SLIDE] = lambda: setattr(table, 'pressed_ns', table.now_ns)
     table.pressed_ns, go_on = None, table.pace
@@ -147,7 +147,7 @@ def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_fr
     def pace():
         go_on()
         pressed_s = (table.now_ns - table.pressed_ns) * 1e-9 if table.pressed_ns else 0.0
-        wanted_n = share + 0.01 * math.sin(1e3 * pressed_s)  # a frozen force would be named instead
+        wanted_n = peak_n + 0.01 * math.sin(1e3 * pressed_s)  # a frozen force would be named instead
         table.arm.push(wanted_n - table.arm.true_force_n + table.arm._push_n if 0.5 < pressed_s < 0.65 else 0.0)
 
     table.pace = pace

@@ -90,7 +90,7 @@ def stability_limit_gain(loop: LoopModel) -> float:
 def lowest_unstable_gain(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
     """Return the lowest gain that is not stable, around that of the pure delay, π / 2 / (k · delay)."""
     high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator is stable up to 2 / (k·T)
-    # Far below, the integral part makes a slow swing, which a short run could take for an unstable one.
+    # Far below, the integral part makes a slow oscillation that looks unstable in a short run.
     low = 0.1 / (loop.stiffness_n_m * (loop.delay_s + loop.period_s))
     for _ in range(bisections):
         middle = math.sqrt(low * high)

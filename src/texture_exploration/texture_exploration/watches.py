@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 Tactile Texture maintainers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a finger still touches, moves as it is commanded, and slides as was asked."""
+"""Checks that a finger keeps contact, moves as commanded, and slides as requested."""
 
 from __future__ import annotations
 
@@ -65,15 +65,15 @@ class ContactWatch:
 
 
 # --------------------
-# Whether the finger moves along the surface as it is commanded to, and whether the slide was what was asked for.
+# Whether the finger moves along the surface as commanded, and whether the slide was as requested.
 
-PEAK_NS = 50_000_000  # speed and tangential force are means over so long: motors step, sensors are noisy
+PEAK_NS = 50_000_000  # averaging time of speed and tangential force: motors step, sensors are noisy
 FORCES = 3  # newest normal forces, of which the middle one counts: one alone may be wrong
 LONGEST_STEP_NS = 50_000_000  # a command that was given longer ago may have run out: the comparison starts again
 
 
 class StallWatch:
-    """Compare the way that the finger makes with the way that was commanded, over the last `stall_s`.
+    """Compare the distance of the finger with the commanded one, over the last `stall_s`.
 
     Only the way in the commanded direction counts, so that noise of the position does not add up, and a finger that
     goes to and fro may turn. Time is that of the arm's states; after a pause of this machine the comparison starts
@@ -122,16 +122,16 @@ class StallWatch:
 
 
 class SlideWatch:
-    """Compare mean and peak of speed, normal and tangential force of a slide with what was asked for.
+    """Compare mean and peak of speed, normal and tangential force of a slide with the request.
 
-    The speed is that from place to place, where the path asks for a constant one: not in turns. The tangential force
+    The speed is that from place to place, where the path has a constant one: not in turns. The tangential force
     counts where the arm measures it.
     """
 
     def __init__(self, speed_m_s: float, force_n: float, touch: TouchParams) -> None:
         self._speed_m_s, self._force_n = speed_m_s, force_n
         self._touch = touch
-        # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
+        # A slide begins within twice the tolerance, so a smaller fraction would refuse accepted starts.
         self._mean_force_fraction = max(touch.mean_force_fraction, 2 * touch.force_tolerance)
         self._recent: deque[ArmState] = deque()  # over PEAK_NS of constant speed
         self._forces: deque[float] = deque(maxlen=FORCES)
@@ -142,7 +142,7 @@ class SlideWatch:
         self._peaks = [0.0, 0.0, 0.0]  # normal force, speed, tangential force
 
     def update(self, arm: ArmState, constant: bool) -> bool:
-        """Take a state; return whether what it shows is within what was asked for."""
+        """Take a state; return whether it is within the tolerance of the request."""
         last_ns = self._recent[-1].time_ns if self._recent else 0
         self._states += 1
         self._force_sum_n += arm.force_n
@@ -163,7 +163,7 @@ class SlideWatch:
         return all(value <= most for value, most in zip(now, self._most, strict=True))
 
     def flaw(self) -> str:
-        """Return in a sentence what was asked and what was measured if that differs too much, '' if not."""
+        """Return in a sentence the request and the measurement if they differ too much, '' if not."""
         return '; '.join(self._differences())
 
     @property
@@ -211,7 +211,7 @@ class SlideWatch:
                 )
 
     def _add_way(self, arm: ArmState) -> None:
-        """Add up the way in pieces of PEAK_NS: noise of the place makes shorter ones too long."""
+        """Sum the distance in pieces of PEAK_NS: noise of the position makes shorter ones too long."""
         if self._chunk is None:
             self._chunk = arm
         took_ns = arm.time_ns - self._chunk.time_ns
@@ -231,13 +231,13 @@ class SlideWatch:
 
 
 # --------------------
-# Whether it presses too hard before the slide.
+# Whether the force is too high before the slide.
 
 OVERSHOOT = 0.2  # of the wanted force, that pressing may exceed it
 
 
 class OvershootWatch:
-    """End what presses harder than was asked for, before the slide: the middle one of the newest forces counts."""
+    """Abort before the slide if the force exceeds the request: the middle one of the newest forces counts."""
 
     def __init__(self, force_n: float, touch: TouchParams) -> None:
         self._force_n = force_n
